@@ -1,0 +1,22 @@
+"""A parameter study of mass-spring models: from config/<study>.yaml to results/<study>/dataset.nc and what is read from it.
+
+    snakemake                                          the paper's study
+    snakemake --configfile config/quick.yaml           another one
+"""
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/mesh.smk"
+include: "workflow/rules/reference.smk"
+include: "workflow/rules/sensitivity.smk"
+include: "workflow/rules/solve.smk"
+include: "workflow/rules/collect.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/tables.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        rules.collect.output,
+        rules.figures_all.input,
+        rules.tables.output,

@@ -1,0 +1,147 @@
+"""The dataset of a study: dense labelled arrays, their units, and what is missing and why."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+STATUS = ("not_requested", "solved", "linear_only", "not_converged", "unstable", "failed")
+"""Meanings of the flags of `status`; a flag's value is its place here."""
+
+DIMENSIONS = {
+    "beam": "beam, length x height in mm",
+    "mesh_type": "mesh type",
+    "mesh_size": "asked length of an edge",
+    "material": "material",
+    "load": "load",
+    "definition": "definition of the spring stiffness",
+    "kinematics": "kinematics of the network",
+    "stiffness_ratio": "uniform stiffness over E t",
+}
+UNITS = {"mesh_size": "m"}
+"""Units of the coordinates that have one; the others are labels or ratios."""
+
+SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+MESH = ("beam", "mesh_type", "mesh_size")
+REFERENCE = ("beam", "material", "load")
+CURVE = ("beam", "mesh_type", "mesh_size", "material", "load", "kinematics")
+CELL = ("beam", "mesh_type", "mesh_size", "material", "load")
+
+ROOT_VARIABLES = {
+    # name: (dimensions, units, long name, what a cell without a value holds)
+    "displacement": (SCENE, "m", "mean axial displacement of the loaded end, network", np.nan),
+    "deformation_error": (SCENE, "1", "signed deformation error, (network - reference) / |reference|", np.nan),
+    "stiffness": (SCENE, "N/m", "uniform spring stiffness", np.nan),
+    "status": (SCENE, "1", "what became of the scene", 0),
+    "message": (SCENE, "1", "why the scene is not solved", ""),
+    "iterations": (SCENE, "1", "Newton steps", np.nan),
+    "residual": (SCENE, "1", "out-of-balance force over the load", np.nan),
+    "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
+    "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
+    "force": (REFERENCE, "N", "force on the right end, tension positive", np.nan),
+    "reference_displacement": (REFERENCE, "m", "mean axial displacement of the loaded end, reference", np.nan),
+    "reference_error_estimate": (REFERENCE, "1", "estimated relative error of the reference", np.nan),
+    "reference_seconds": (REFERENCE, "s", "time to solve the reference, shared by all loads", np.nan),
+    "particles": (MESH, "1", "number of particles", np.nan),
+    "springs": (MESH, "1", "number of springs", np.nan),
+    "minimum_angle": (MESH, "degree", "smallest angle of all triangles", np.nan),
+    "edge_length_spread": (MESH, "1", "standard deviation of the edge lengths over their mean", np.nan),
+    "mesh_seconds": (MESH, "s", "time to make the mesh", np.nan),
+    "paper_displacement": (CELL, "m", "displacement of the network as the paper prints it", np.nan),
+    "paper_reference_displacement": (CELL, "m", "displacement of the reference as the paper prints it", np.nan),
+    "paper_deformation_error": (CELL, "1", "deformation error as the paper prints it, without sign", np.nan),
+    "paper_stiffness": (CELL, "N/m", "stiffness as the paper prints it", np.nan),
+    "paper_table": (CELL, "1", "number of the paper's table", np.nan),
+    "paper_remark": (CELL, "1", "where the print contradicts itself", ""),
+}
+
+SENSITIVITY_VARIABLES = {
+    "stiffness": ((*CURVE, "stiffness_ratio"), "N/m", "uniform spring stiffness", np.nan),
+    "displacement": ((*CURVE, "stiffness_ratio"), "m", "mean axial displacement of the loaded end, network", np.nan),
+    "deformation_error": (
+        (*CURVE, "stiffness_ratio"),
+        "1",
+        "signed deformation error, (network - reference) / |reference|",
+        np.nan,
+    ),
+    "status": ((*CURVE, "stiffness_ratio"), "1", "what became of the point", 0),
+    "best_stiffness": (CURVE, "N/m", "stiffness with no deformation error", np.nan),
+    "predicted_stiffness": (CURVE, "N/m", "stiffness by closed form, full outline", np.nan),
+    "curve_seconds": (CURVE, "s", "time to trace the curve, networks shared", np.nan),
+}
+
+FIELD = (*SCENE, "particle")
+OUTLINE = ("beam", "material", "load", "outline_point")
+
+FIELD_VARIABLES = {
+    "x": ((*MESH, "particle"), "m", "position at rest along x", np.nan),
+    "y": ((*MESH, "particle"), "m", "position at rest along y", np.nan),
+    "spring_first": ((*MESH, "spring"), "1", "particle at the first end", np.nan),
+    "spring_second": ((*MESH, "spring"), "1", "particle at the second end", np.nan),
+    "displacement_x": (FIELD, "m", "displacement along x, network", np.nan),
+    "displacement_y": (FIELD, "m", "displacement along y, network", np.nan),
+    "outline_x": (("beam", "outline_point"), "m", "position at rest along x, reference", np.nan),
+    "outline_y": (("beam", "outline_point"), "m", "position at rest along y, reference", np.nan),
+    "reference_displacement_x": (OUTLINE, "m", "displacement along x, reference", np.nan),
+    "reference_displacement_y": (OUTLINE, "m", "displacement along y, reference", np.nan),
+}
+"""Whole fields, of each beam's and mesh type's coarsest mesh: they are there to be looked at."""
+
+
+def empty(axes, variables):
+    """Dataset whose cells hold nothing yet.
+
+    Parameters
+    ----------
+    axes : dict of str to tuple
+        Labels of each dimension.
+    variables : dict
+        `ROOT_VARIABLES` or the like.
+
+    Returns
+    -------
+    xarray.Dataset
+    """
+    data = {}
+    for name, (dimensions, units, long_name, nothing) in variables.items():
+        shape = [len(axes[dimension]) for dimension in dimensions]
+        values = np.full(shape, nothing, dtype=object if isinstance(nothing, str) else None)
+        attributes = {"long_name": long_name, "units": units}
+        if name == "status":
+            values = values.astype("int8")
+            attributes |= {"flag_values": np.arange(len(STATUS), dtype="int8"), "flag_meanings": " ".join(STATUS)}
+        data[name] = (dimensions, values, attributes)
+    used = {dimension for dimensions, *_ in variables.values() for dimension in dimensions}
+    coordinates = {}
+    for dimension, long_name in DIMENSIONS.items():
+        if dimension in used:
+            values = np.array(axes[dimension])
+            if values.dtype.kind == "U":
+                values = values.astype(object)
+            coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": UNITS.get(dimension, "1")})
+    return xr.Dataset(data, coordinates)
+
+
+def write(path, groups, attributes):
+    """Write a dataset; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    groups : dict of str to xarray.Dataset
+        Dataset of each group, ``"/"`` for the root.
+    attributes : dict of str to str
+        Attributes of the root.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(path.name + ".unfinished")
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = attributes
+    encoding = {
+        group: {name: {"zlib": True, "complevel": 4} for name, array in data.items() if array.ndim and array.dtype != object}
+        for group, data in groups.items()
+    }
+    tree.to_netcdf(unfinished, engine="h5netcdf", encoding=encoding)
+    os.replace(unfinished, path)

@@ -1,0 +1,56 @@
+"""Which figures a study has, and the labels that each of them selects."""
+
+SENSITIVITY = ("beam", "mesh_type", "material", "load")
+SIZE = DEFORMED = ("mesh_type", "material", "load")
+
+FORMATS = ("png", "pdf")
+
+
+def selections(kind, labels, cells):
+    """Distinct selections of the dataset's cells, in order, and the stem of each one's file.
+
+    Parameters
+    ----------
+    kind : str
+        First part of the stem: ``sensitivity``, ``size`` or ``deformed``.
+    labels : tuple of str
+        Dimensions that a figure selects.
+    cells : iterable of dict
+        Labels of each cell that the study asks for.
+
+    Returns
+    -------
+    dict of str to dict
+        Selection by stem.
+    """
+    found = {}
+    for cell in cells:
+        chosen = {label: cell[label] for label in labels}
+        found.setdefault("_".join([kind, *chosen.values()]), chosen)
+    return found
+
+
+def of_study(study):
+    """Selections by kind of figure.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    dict of str to dict
+        ``sensitivity``, ``size`` and ``deformed``, each a dict of selections by stem.
+    """
+    curves = [_labels(curve) for curve in study.curves if curve.kinematics == "nonlinear"]
+    scenes = [_labels(scene) for scene in study.scenes if scene.kinematics == "nonlinear"]
+    return {
+        "sensitivity": selections("sensitivity", SENSITIVITY, curves),
+        "size": selections("size", SIZE, scenes),
+        "deformed": selections("deformed", DEFORMED, scenes),
+    }
+
+
+def _labels(item):
+    beam, mesh_type = item.mesh.beam.name, item.mesh.mesh_type
+    return {"beam": beam, "mesh_type": mesh_type, "material": item.material.name, "load": item.load}

@@ -1,0 +1,43 @@
+"""Delaunay triangulation inside an outline of imposed edge size: the mesh type ``free``."""
+
+import numpy as np
+
+from .triangles import TriangleMesh, signed_areas
+
+
+def free(length, height, size):
+    """Mesh a box by netgen's advancing front; the triangulation it returns is Delaunay.
+
+    The sides are divided into equal edges no longer than `size`; inside, netgen places points so that triangles come
+    out near-equilateral. Same input, same mesh.
+
+    Parameters
+    ----------
+    length, height : float
+        Extent of the box [m].
+    size : float
+        Imposed length of the edges on the outline [m].
+
+    Returns
+    -------
+    TriangleMesh
+    """
+    from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
+
+    # Lengths in units of the edge: netgen's own tolerances are absolute.
+    box = np.array([length, height]) / size
+    outline = SplineGeometry()
+    corners = [outline.AppendPoint(*(box * corner)) for corner in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    for start, end in zip(corners, corners[1:] + corners[:1]):
+        outline.Append(["line", start, end], leftdomain=1, rightdomain=0)
+    # A hair above 1: a side of exactly n edges shall not be split into n + 1 by rounding.
+    made = outline.GenerateMesh(maxh=1.0 + 1e-9)
+    points = np.array([point.p for point in made.Points()])[:, :2]
+    triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
+    for axis in range(2):
+        points[np.abs(points[:, axis]) < 1e-9, axis] = 0.0
+        points[np.abs(points[:, axis] - box[axis]) < 1e-9 * box[axis], axis] = box[axis]
+    points *= np.array([length, height]) / box
+    inverted = signed_areas(points, triangles) < 0
+    triangles[inverted] = triangles[inverted][:, ::-1]
+    return TriangleMesh(points, triangles)

@@ -1,0 +1,204 @@
+"""The equilibrium path of a network as a power series of its load, and sensitivity curves from it.
+
+With ``s = F / k`` a uniform network's path u(s) is analytic, so every stiffness k of a sensitivity curve lies on one
+path. A series costs one factorisation and one back-substitution an order (asymptotic numerical method: Cochelin,
+Damil and Potier-Ferry, Revue europeenne des elements finis 3(2):281, 1994); Pade approximants of the measured
+displacement continue it past its poles. The nearest of these is the buckling load, even for a beam in tension.
+"""
+
+import numpy as np
+
+from .network import SingularError
+
+ORDER = 16
+"""Order of a series that gives a whole curve."""
+
+CURVE_TOLERANCE = 1e-7
+"""Largest estimated relative error of a displacement on a sensitivity curve."""
+
+MAX_SOLVES = 3
+"""Nonlinear solves that a curve may add to the series about rest."""
+
+MAX_STEPS = 6
+"""Newton steps of each of them: from a point on the path two or three do, and next to buckling none suffice."""
+
+
+class Expansion:
+    """Power series of the equilibrium path about one of its points.
+
+    With ``sigma = s - s_0`` displacements, a spring's vector d, its length l and ``w = 1/l`` are power series. From
+    ``l^2 = d.d``, ``w l = 1`` and the force ``k (d - L w d)``, order n follows from lower orders by one solve with the
+    tangent at the point.
+
+    Parameters
+    ----------
+    network : Network
+    load : ndarray of float, shape (unknowns,)
+        Load pattern [1].
+    s : float
+        Force over the reference stiffness at the point [m].
+    displacements : ndarray of float, shape (n_points, 2), or None
+        Equilibrium at the point [m]; None at rest.
+    factor : Factor
+        Tangent factorised there.
+    order : int, optional
+
+    Attributes
+    ----------
+    coefficients : ndarray of float, shape (order + 1, n_points, 2)
+        The displacements are ``sum_n coefficients[n] sigma^n``.
+    """
+
+    def __init__(self, network, load, s, displacements, factor, order=ORDER):
+        self.s, self.order = s, order
+        springs = len(network.rest_lengths)
+        d = np.zeros((order + 1, springs, 2))
+        length = np.zeros((order + 1, springs))
+        inverse = np.zeros((order + 1, springs))
+        self.coefficients = np.zeros((order + 1, *network.held.shape))
+        if displacements is not None:
+            self.coefficients[0] = displacements
+        d[0] = network.rest_vectors + network.stretch(self.coefficients[0])
+        length[0] = np.sqrt(np.einsum("ij,ij->i", d[0], d[0]))
+        inverse[0] = 1.0 / length[0]
+        weight = network.stiffness * network.rest_lengths
+        for n in range(1, order + 1):
+            right = load
+            if n > 1:
+                # What lower orders give of order n, as if d[n] were 0.
+                square = np.einsum("nij,nij->i", d[1:n], d[n - 1 : 0 : -1])
+                square -= np.einsum("ni,ni->i", length[1:n], length[n - 1 : 0 : -1])
+                length[n] = 0.5 * square * inverse[0]
+                inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
+                known = np.einsum("ni,nij->ij", inverse[1 : n + 1], d[n - 1 :: -1])
+                right = -network.gather(weight[:, None] * known)
+            self.coefficients[n] = network.expand(factor.solve(right))
+            d[n] = network.stretch(self.coefficients[n])
+            change = np.einsum("ij,ij->i", d[0], d[n]) * inverse[0]
+            length[n] += change
+            inverse[n] -= inverse[0] ** 2 * change
+
+    def predict(self, s):
+        """Displacements at ``s`` [m], shape (n_points, 2), from the series cut off before its smallest term."""
+        powers = (s - self.s) ** np.arange(self.order + 1.0)
+        sizes = np.abs(powers[1:]) * np.linalg.norm(self.coefficients[1:].reshape(self.order, -1), axis=1)
+        kept = 2 + int(np.argmin(sizes))
+        return np.tensordot(powers[:kept], self.coefficients[:kept], axes=1)
+
+    def measure(self, weights, s):
+        """Weighted sum of the displacements at each of many ``s``, by Pade approximants.
+
+        Parameters
+        ----------
+        weights : ndarray of float, shape (n_points, 2)
+        s : ndarray of float, shape (n,)
+            Force over the reference stiffness [m].
+
+        Returns
+        -------
+        values : ndarray of float, shape (n,)
+        errors : ndarray of float, shape (n,)
+            Largest difference to the approximants of the two lower orders, relative to the value.
+        """
+        series = np.tensordot(self.coefficients, weights, axes=2)
+        sigma = np.asarray(s) - self.s
+        # Scaled to the largest argument, or the powers of small displacements underflow.
+        scale = np.abs(sigma).max() or 1.0
+        scaled = series[1:] * scale ** np.arange(1.0, self.order + 1)
+        x = sigma / scale
+        half = (self.order - 1) // 2
+        orders = ((half, half + 1), (half, half), (half - 1, half))
+        best, second, third = (series[0] + x * _pade(scaled, *order)(x) for order in orders)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors = np.maximum(np.abs(best - second), np.abs(second - third)) / np.abs(best)
+        return best, np.where(np.isfinite(errors), errors, np.inf)
+
+
+def _pade(series, upper, lower):
+    """Pade approximant of a series: numerator of degree `upper` over denominator of degree `lower`, as a function."""
+    padded = np.concatenate([np.zeros(lower), series])
+    matrix = np.array([padded[upper + row : upper + row + lower][::-1] for row in range(1, lower + 1)])
+    # Least squares: where the series needs fewer poles the matrix is singular, and the smallest solution is right.
+    solution = np.linalg.lstsq(matrix, -series[upper + 1 : upper + lower + 1], rcond=1e-14)[0]
+    denominator = np.concatenate([[1.0], solution])
+    numerator = np.convolve(denominator, series)[: upper + 1]
+    return lambda x: np.polyval(numerator[::-1], x) / np.polyval(denominator[::-1], x)
+
+
+def trace(problem, weights, targets):
+    """Weighted displacement at many loads on one equilibrium path.
+
+    From the series about rest; where its error estimate exceeds `CURVE_TOLERANCE`, from a series about a nonlinear
+    solution in the midst of the loads that are left, at most `MAX_SOLVES` of them.
+
+    Parameters
+    ----------
+    problem : StaticProblem
+    weights : ndarray of float, shape (n_points, 2)
+        Weights of the displacements to sum.
+    targets : ndarray of float, shape (n,)
+        Force over the reference stiffness, all of one sign [m].
+
+    Returns
+    -------
+    values : ndarray of float, shape (n,)
+        NaN where no equilibrium near the path was found: next to a buckling load there may be none.
+    errors : ndarray of float, shape (n,)
+        Estimated relative error.
+    """
+    targets = np.asarray(targets, dtype=float)
+    values, errors = problem.rest.measure(weights, targets)
+    by_load = np.argsort(np.abs(targets))
+    refused = np.zeros(len(targets), dtype=bool)
+    for _ in range(MAX_SOLVES):
+        left = by_load[((errors > CURVE_TOLERANCE) & ~refused)[by_load]]
+        if not len(left):
+            break
+        middle = left[len(left) // 2]
+        found = problem.newton(targets[middle], problem.rest.predict(targets[middle]), MAX_STEPS)
+        refused[middle] = True
+        if not found.converged:
+            continue
+        values[middle], errors[middle] = np.tensordot(found.displacements, weights, axes=2), found.residual
+        if len(left) > 1:
+            try:
+                factor = problem.network.factorize(found.displacements)
+            except SingularError:
+                continue
+            local = Expansion(problem.network, problem.load, targets[middle], found.displacements, factor)
+            better_values, better_errors = local.measure(weights, targets)
+            better = better_errors < errors
+            values[better], errors[better] = better_values[better], better_errors[better]
+    values[errors > CURVE_TOLERANCE] = np.nan
+    return values, errors
+
+
+def stable_until(problem, targets):
+    """Which loads of a path leave the beam stable, taking instability once begun to stay.
+
+    Found by bisection on the number of negative pivots of the tangent.
+
+    Parameters
+    ----------
+    problem : StaticProblem
+    targets : ndarray of float, shape (n,)
+        Force over the reference stiffness, all of one sign [m].
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    by_load = np.argsort(np.abs(targets))
+    low, high = 0, len(targets)  # all below low are stable; high is the first that is not
+    probe = high - 1
+    while low < high:
+        try:
+            factor = problem.network.factorize(problem.rest.predict(targets[by_load[probe]]))
+            stable = factor.negative_pivots == 0
+        except SingularError:
+            stable = False
+        low, high = (probe + 1, high) if stable else (low, probe)
+        probe = (low + high) // 2
+    result = np.zeros(len(targets), dtype=bool)
+    result[by_load[:low]] = True
+    return result

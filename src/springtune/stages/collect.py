@@ -1,0 +1,254 @@
+"""Stage `collect`: compare what was solved with its references and gather everything in one dataset."""
+
+import json
+import platform
+import subprocess
+import sys
+from collections import defaultdict
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from .. import __version__, dataset
+from ..compare import best_stiffness, deformation_error
+from ..mesh import read_mesh
+from ..springs.lattice import predicted_stiffness
+from ..study import load_study
+from . import files, store, tasks
+
+SOFTWARE = ("h5netcdf", "h5py", "meshio", "netgen-mesher", "numpy", "scikit-fem", "scipy", "snakemake", "xarray")
+
+
+def run(config, folder, output):
+    """Build the dataset of a study from its stored results.
+
+    Parameters
+    ----------
+    config : str or Path
+        YAML file of the study.
+    folder : str or Path
+        Where the study's results are.
+    output : str or Path
+        NetCDF file to write.
+    """
+    study, folder = load_study(config), Path(folder)
+    axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
+    root = _Filler(dataset.empty(axes, dataset.ROOT_VARIABLES))
+    _meshes(study, folder, root)
+    references = _references(study, folder, root)
+    _scenes(study, folder, root)
+    _printed(study, root)
+    data = root.data
+    data["deformation_error"].values = deformation_error(
+        *xr.broadcast(data.displacement, data.reference_displacement.broadcast_like(data.displacement))
+    )
+    groups = {"/": data}
+    if study.curves:
+        groups["/sensitivity"] = _sensitivity(study, folder, references, axes)
+    groups["/fields"] = _fields(study, folder, axes)
+    dataset.write(output, groups, _attributes(study, config))
+
+
+class _Filler:
+    """Writes single cells of a dataset by label."""
+
+    def __init__(self, data):
+        self.data = data
+        self._places = {name: {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords}
+
+    def put(self, values, **labels):
+        for name, value in values.items():
+            array = self.data[name]
+            array.values[tuple(self._places[dimension][labels[dimension]] for dimension in array.dims if dimension in labels)] = value
+
+    def put_rows(self, values, **labels):
+        """Write rows that may be shorter than the last dimension."""
+        for name, row in values.items():
+            array = self.data[name]
+            place = tuple(self._places[dimension][labels[dimension]] for dimension in array.dims[:-1])
+            array.values[place][: len(row)] = row
+
+
+def _mesh_labels(mesh):
+    return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+
+
+def _meshes(study, folder, root):
+    for mesh in study.meshes:
+        notes = files.read_json(folder / "meshes" / f"{mesh.name}.json")
+        del notes["key"]
+        root.put(notes, **_mesh_labels(mesh))
+
+
+def _references(study, folder, root):
+    """Displacement of each reference by (beam, material, load)."""
+    displacements = {}
+    for asked in study.references:
+        name = tasks.reference_key(asked.beam, asked.material)
+        file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
+        result = store.read(file, [name])[name]
+        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        root.put({"force": asked.force, "reference_seconds": result["seconds"]}, **labels)
+        if "displacement" not in result:
+            continue
+        displacements[tuple(labels.values())] = displacement = asked.force * result["displacement"]
+        root.put(
+            {"reference_displacement": displacement, "reference_error_estimate": result["error_estimate"]}, **labels
+        )
+    return displacements
+
+
+def _scenes(study, folder, root):
+    calibration = files.read_json(folder / "done" / "calibrate.json")
+    for mesh, scenes in _by_mesh(study.scenes).items():
+        names = [tasks.solved_key(study, scene, calibration) for scene in scenes]
+        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names))
+        for scene, name in zip(scenes, names):
+            result = results[name]
+            values = {"status": dataset.STATUS.index(result["status"]), "solve_seconds": result["seconds"]}
+            for label in ("displacement", "stiffness", "message", "iterations", "residual", "negative_pivots"):
+                if label in result:
+                    values[label] = result[label]
+            labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
+            root.put(values, kinematics=scene.kinematics, **labels, **_mesh_labels(mesh))
+
+
+def _printed(study, root):
+    for cell in study.printed:
+        labels = {name: getattr(cell, name) for name in dataset.CELL}
+        try:
+            root.put(
+                {
+                    "paper_displacement": cell.displacement,
+                    "paper_reference_displacement": cell.reference_displacement,
+                    "paper_deformation_error": cell.deformation_error,
+                    "paper_stiffness": cell.stiffness,
+                    "paper_table": cell.table,
+                    "paper_remark": cell.remark,
+                },
+                **labels,
+            )
+        except KeyError:
+            continue  # a cell that this study does not ask for
+
+
+def _sensitivity(study, folder, references, axes):
+    curves = _Filler(dataset.empty(axes, dataset.SENSITIVITY_VARIABLES))
+    for mesh, members in _by_mesh(study.curves).items():
+        names = [tasks.curve_key(study, curve) for curve in members]
+        results = store.read(folder / "curves" / f"{mesh.name}.h5", names, ["displacement", "stable"])
+        for curve, name in zip(members, names):
+            result, stiffness = results[name], np.array(tasks.stiffnesses(study, curve))
+            displacement = result["displacement"]
+            reference = references.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
+            solved, unstable, missing = map(dataset.STATUS.index, ("solved", "unstable", "not_converged"))
+            status = np.where(np.isnan(displacement), missing, np.where(result["stable"], solved, unstable))
+            curves.put(
+                {
+                    "stiffness": stiffness,
+                    "displacement": displacement,
+                    "deformation_error": deformation_error(displacement, reference),
+                    "status": status,
+                    "best_stiffness": best_stiffness(stiffness, displacement, reference),
+                    "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size),
+                    "curve_seconds": result["seconds"],
+                },
+                material=curve.material.name,
+                load=curve.load,
+                kinematics=curve.kinematics,
+                **_mesh_labels(mesh),
+            )
+    return curves.data
+
+
+def _fields(study, folder, axes):
+    coarsest = {}
+    for mesh in sorted(study.meshes, key=lambda mesh: mesh.mesh_size):
+        coarsest[mesh.beam, mesh.mesh_type] = mesh
+    meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in coarsest.values()}
+    outlines = {(asked.beam, asked.material): _outline(folder, asked) for asked in study.references}
+    lengths = {
+        "particle": max(len(mesh.points) for mesh in meshes.values()),
+        "spring": max(len(mesh.edges) for mesh in meshes.values()),
+        "outline_point": max(len(points) for points, _ in outlines.values()),
+    }
+    numbers = {name: tuple(range(length)) for name, length in lengths.items()}
+    fields = _Filler(dataset.empty(axes | numbers, dataset.FIELD_VARIABLES))
+    calibration = files.read_json(folder / "done" / "calibrate.json")
+    scenes = _by_mesh(study.scenes)
+    for spec, mesh in meshes.items():
+        labels = _mesh_labels(spec)
+        fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
+        fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
+        names = {tasks.solved_key(study, scene, calibration): scene for scene in scenes[spec]}
+        results = store.read(folder / "solutions" / f"{spec.name}.h5", names, ["displacements"])
+        for name, scene in names.items():
+            if "displacements" in results[name]:
+                found = results[name]["displacements"]
+                chosen = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
+                chosen["kinematics"] = scene.kinematics
+                fields.put_rows({"displacement_x": found[:, 0], "displacement_y": found[:, 1]}, **chosen, **labels)
+    for asked in study.references:
+        points, displacements = outlines[asked.beam, asked.material]
+        moved = asked.force * displacements
+        beam, load = {"beam": asked.beam.name}, {"material": asked.material.name, "load": asked.load}
+        fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
+        fields.put_rows(
+            {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
+        )
+    return fields.data
+
+
+def _outline(folder, asked):
+    """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
+    name = tasks.reference_key(asked.beam, asked.material)
+    file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
+    result = store.read(file, [name], ["points", "displacements"])[name]
+    if "points" not in result:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    points, box = result["points"], np.array([asked.beam.length, asked.beam.height])
+    on_outline = ((np.abs(points) < 1e-9 * box) | (np.abs(points - box) < 1e-9 * box)).any(axis=1)
+    points, displacements = points[on_outline], result["displacements"][on_outline]
+    around = np.argsort(np.arctan2(*(points - 0.5 * box).T[::-1]))
+    return points[around], displacements[around]
+
+
+def _by_mesh(items):
+    groups = defaultdict(list)
+    for item in items:
+        groups[item.mesh].append(item)
+    return groups
+
+
+def _attributes(study, config):
+    software = {name: version(name) for name in SOFTWARE} | {"python": platform.python_version()}
+    return {
+        "title": study.title,
+        "Conventions": "CF-1.11",
+        "study": study.name,
+        "config": study.text,
+        "springtune_version": __version__,
+        "git_commit": _git_commit(Path(config).parent),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "software": json.dumps(software, sort_keys=True),
+        "host": platform.node(),
+    }
+
+
+def _git_commit(folder):
+    """Commit of the checkout that holds the study, with "+changes" where files differ from it; empty outside of git."""
+    try:
+        answer = subprocess.run(
+            ["git", "describe", "--always", "--abbrev=40", "--dirty=+changes", "--exclude=*"],
+            cwd=folder, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return answer.stdout.strip()
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

@@ -1,0 +1,26 @@
+"""Keys of results, and JSON files that appear whole or not at all."""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+
+
+def key(*parts):
+    """Hash of what a result depends on: nested dicts, lists, texts and numbers."""
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def write_json(path, content):
+    """Write JSON; the file appears whole or not at all."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(path.name + ".unfinished")
+    unfinished.write_text(json.dumps(content, indent=1) + "\n")
+    os.replace(unfinished, path)
+
+
+def read_json(path):
+    """Content of a JSON file."""
+    return json.loads(Path(path).read_text())

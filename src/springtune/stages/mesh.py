@@ -1,0 +1,42 @@
+"""Stage `mesh`: one VTU file a mesh, with its quality figures in a JSON file beside it."""
+
+import sys
+import time
+from pathlib import Path
+
+from ..mesh import MESH_TYPES, quality, write_mesh
+from . import files
+
+
+def run(tasks, done):
+    """Make the meshes of a bundle that are not there yet.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder`` and ``meshes``, each with ``name, key, mesh_type, mesh_size, length, height``.
+    done : str or Path
+        JSON file to write: what was made.
+    """
+    tasks = files.read_json(tasks)
+    folder = Path(tasks["folder"])
+    folder.mkdir(parents=True, exist_ok=True)
+    made = []
+    for task in tasks["meshes"]:
+        path, notes = folder / f"{task['name']}.vtu", folder / f"{task['name']}.json"
+        if path.exists() and notes.exists() and files.read_json(notes)["key"] == task["key"]:
+            continue
+        begin = time.perf_counter()
+        mesh = MESH_TYPES[task["mesh_type"]](task["length"], task["height"], task["mesh_size"])
+        seconds = time.perf_counter() - begin
+        # The notes name the mesh they belong to, so they go first and come last.
+        notes.unlink(missing_ok=True)
+        write_mesh(path, mesh)
+        figures = quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
+        files.write_json(notes, {"key": task["key"], "mesh_seconds": seconds} | figures)
+        made.append(task["name"])
+    files.write_json(done, {"made": made})
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

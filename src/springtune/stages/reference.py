@@ -1,0 +1,50 @@
+"""Stage `reference`: one finite-element solution a beam and material, for a force of 1 N; loads scale it."""
+
+import sys
+import time
+from pathlib import Path
+
+from ..geometry import Beam
+from ..materials import Material
+from ..reference.small_strain import solve_small_strain
+from . import files, store
+
+
+def run(tasks, done):
+    """Solve the references that are not there yet.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder`` and ``references``, each with ``name, key, beam, material``.
+    done : str or Path
+        JSON file to write: what was solved.
+    """
+    tasks = files.read_json(tasks)
+    made = []
+    for task in tasks["references"]:
+        path = Path(tasks["folder"]) / f"{task['name']}.h5"
+        if task["key"] in store.stored(path):
+            continue
+        begin = time.perf_counter()
+        try:
+            solution = solve_small_strain(Beam(**task["beam"]), Material(**task["material"]), 1.0)
+        except RuntimeError as error:
+            result = {"message": str(error)}
+        else:
+            result = {
+                "displacement": solution.displacement,
+                "error_estimate": solution.error_estimate,
+                "points": solution.points,
+                "triangles": solution.triangles,
+                "displacements": solution.displacements,
+                "message": "",
+            }
+        result["seconds"] = time.perf_counter() - begin
+        store.add(path, {task["key"]: result})
+        made.append(task["name"])
+    files.write_json(done, {"made": made})
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

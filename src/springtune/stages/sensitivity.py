@@ -1,0 +1,59 @@
+"""Stage `sensitivity`: displacement against uniform stiffness, one equilibrium path for all loads of a mesh."""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ..boundary import clamped, end_weights
+from ..mesh import read_mesh
+from ..network import Network
+from ..path import stable_until, trace
+from ..springs.lattice import uniform
+from ..statics import StaticProblem
+from . import files, store
+
+
+def run(tasks, done):
+    """Trace the curves of a bundle that are not stored yet.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder``, ``meshes`` (folder) and ``families``, each with ``name``, ``length`` and ``curves``, and
+        each of these with ``key, force, kinematics, stiffnesses``.
+    done : str or Path
+        JSON file to write: how many curves were traced.
+    """
+    tasks = files.read_json(tasks)
+    traced = 0
+    for family in tasks["families"]:
+        path = Path(tasks["folder"]) / f"{family['name']}.h5"
+        present = store.stored(path)
+        missing = [curve for curve in family["curves"] if curve["key"] not in present]
+        if not missing:
+            continue
+        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        weights = end_weights(mesh, family["length"])
+        problem = StaticProblem(Network(mesh, clamped(mesh), uniform(mesh)), weights)
+        store.add(path, {curve["key"]: _trace(problem, weights, curve) for curve in missing})
+        traced += len(missing)
+    files.write_json(done, {"traced": traced})
+
+
+def _trace(problem, weights, curve):
+    begin = time.perf_counter()
+    targets = curve["force"] / np.array(curve["stiffnesses"])
+    if curve["kinematics"] == "linear":
+        displacement = targets * np.tensordot(problem.slope, weights, axes=2)
+        stable = np.ones(len(targets), dtype=bool)
+    else:
+        displacement, _ = trace(problem, weights, targets)
+        # A beam in tension does not buckle.
+        stable = stable_until(problem, targets) if curve["force"] < 0 else np.ones(len(targets), dtype=bool)
+    return {"displacement": displacement, "stable": stable, "seconds": time.perf_counter() - begin}
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

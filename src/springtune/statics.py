@@ -1,0 +1,205 @@
+"""Equilibria of a network under a growing load: linear, nonlinear, and the whole path of them.
+
+The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is the force over the reference stiffness
+[m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .network import SingularError
+from .path import Expansion
+
+TOLERANCE = 1e-10
+"""Largest residual of an equilibrium, relative to the load."""
+
+MAX_ITERATIONS = 12
+MAX_HALVINGS = 12
+START_ORDER = 5
+"""Orders of the series that starts Newton's method: together they cost a fifth of the factorisation they save."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """What a solve found.
+
+    Attributes
+    ----------
+    displacements : ndarray of float, shape (n_points, 2)
+        Displacement of each particle [m]; of the last iterate where it did not converge.
+    converged : bool
+    iterations : int
+        Newton steps, each with a new factorisation.
+    residual : float
+        Norm of the out-of-balance force over that of the load [1].
+    factor : Factor or None
+        The last factorised tangent.
+    reason : str
+        Why it did not converge, empty where it did.
+    """
+
+    displacements: np.ndarray
+    converged: bool
+    iterations: int
+    residual: float
+    factor: object
+    reason: str = ""
+
+
+class StaticProblem:
+    """A network under a load pattern.
+
+    Parameters
+    ----------
+    network : Network
+    pattern : ndarray of float, shape (n_points, 2)
+        Forces on the particles [1]; scaled by ``s``.
+    """
+
+    def __init__(self, network, pattern):
+        self.network = network
+        self.load = network.reduce(pattern)
+        self.load_norm = float(np.linalg.norm(self.load))
+
+    @cached_property
+    def rest_factor(self):
+        """Tangent factorised at rest."""
+        return self.network.factorize()
+
+    @cached_property
+    def slope(self):
+        """Displacements of the linear network over ``s`` [1], shape (n_points, 2)."""
+        return self.network.expand(self.rest_factor.solve(self.load))
+
+    @cached_property
+    def start(self):
+        """Short series about rest: where Newton's method starts."""
+        return Expansion(self.network, self.load, 0.0, None, self.rest_factor, order=START_ORDER)
+
+    @cached_property
+    def rest(self):
+        """Long series about rest, for a whole curve."""
+        return Expansion(self.network, self.load, 0.0, None, self.rest_factor)
+
+    def linear(self, s):
+        """Equilibrium of the network with linear kinematics.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+
+        Returns
+        -------
+        Equilibrium
+        """
+        displacements = s * self.slope
+        missing = s * self.load - self.network.linear_resistance(displacements)
+        residual = float(np.linalg.norm(missing)) / (abs(s) * self.load_norm)
+        converged = residual <= TOLERANCE
+        reason = "" if converged else f"linear solve left a residual of {residual:.1e}"
+        return Equilibrium(displacements, converged, 1, residual, self.rest_factor, reason)
+
+    def nonlinear(self, s):
+        """Equilibrium of the network with its springs' full length law.
+
+        Newton's method from the series about rest; where that fails, in load steps from rest.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+
+        Returns
+        -------
+        Equilibrium
+        """
+        found = self.newton(s, self.start.predict(s))
+        if found.converged:
+            return found
+        stepped = self._in_steps(s, found.iterations)
+        return stepped if stepped.converged else _worse(found, stepped)
+
+    def newton(self, s, start, max_iterations=MAX_ITERATIONS):
+        """Newton's method with the exact tangent and a line search on the norm of the residual.
+
+        A step is halved until the residual falls and no triangle is inverted. At least one step is taken, so that the
+        factorised tangent belongs to the solution.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        start : ndarray of float, shape (n_points, 2)
+            First guess of the displacements [m].
+        max_iterations : int, optional
+
+        Returns
+        -------
+        Equilibrium
+        """
+        network = self.network
+        scale = abs(s) * self.load_norm
+        displacements, factor = start, None
+        missing = s * self.load - network.resistance(displacements)
+        residual = _norm(missing) / scale
+        if not np.isfinite(residual) or network.inverted(displacements):
+            displacements = np.zeros_like(start)
+            missing, residual = s * self.load, 1.0
+        for iteration in range(1, max_iterations + 1):
+            try:
+                factor = network.factorize(displacements)
+            except SingularError:
+                return Equilibrium(displacements, False, iteration, residual, factor, "singular tangent")
+            step = network.expand(factor.solve(missing))
+            length = 1.0
+            for _ in range(MAX_HALVINGS):
+                trial = displacements + length * step
+                trial_missing = s * self.load - network.resistance(trial)
+                trial_residual = _norm(trial_missing) / scale
+                better = trial_residual <= max((1.0 - 1e-4 * length) * residual, 0.1 * TOLERANCE)
+                if better and not network.inverted(trial):
+                    break
+                length *= 0.5
+            else:
+                return Equilibrium(displacements, False, iteration, residual, factor, "line search found no descent")
+            displacements, missing, residual = trial, trial_missing, trial_residual
+            if residual <= TOLERANCE:
+                return Equilibrium(displacements, True, iteration, residual, factor)
+        return Equilibrium(displacements, False, max_iterations, residual, factor, "too many iterations")
+
+    def _in_steps(self, s, iterations, smallest=1 / 64):
+        """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
+        done, step = 0.0, 0.25
+        last = before = np.zeros(self.network.held.shape)
+        last_step = None
+        while True:
+            step = min(step, 1.0 - done)
+            guess = last if last_step is None else last + (last - before) * (step / last_step)
+            found = self.newton((done + step) * s, guess)
+            iterations += found.iterations
+            if found.converged:
+                before, last, last_step = last, found.displacements, step
+                done += step
+                if done >= 1.0:
+                    return Equilibrium(last, True, iterations, found.residual, found.factor)
+                step *= 1.5
+            elif step <= smallest:
+                missing = s * self.load - self.network.resistance(found.displacements)
+                residual = _norm(missing) / (abs(s) * self.load_norm)
+                reason = f"{found.reason} at {100 * (done + step):.3g} % of the load"
+                return Equilibrium(found.displacements, False, iterations, residual, found.factor, reason)
+            else:
+                step *= 0.5
+
+
+def _norm(vector):
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.linalg.norm(vector))
+
+
+def _worse(first, second):
+    """The failure to report: the load steps', with the iterations of both."""
+    return second if np.isfinite(second.residual) else first

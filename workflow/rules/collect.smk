@@ -1,0 +1,21 @@
+rule collect:
+    message:
+        "Comparing, and collecting the dataset"
+    input:
+        config=CONFIG,
+        references=rules.reference.output,
+        calibration=rules.calibrate.output,
+        curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES),
+        scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES),
+        printed=STUDY.printed_path or [],
+        code=modules("collect"),
+    output:
+        RESULTS / "dataset.nc",
+    params:
+        folder=str(RESULTS),
+    log:
+        RESULTS / "logs/collect.log",
+    benchmark:
+        RESULTS / "benchmarks/collect.tsv"
+    shell:
+        "python -m springtune.stages.collect {input.config} {params.folder} {output} > {log} 2>&1"

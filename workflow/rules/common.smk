@@ -1,0 +1,43 @@
+"""Helpers of the rules: the study, its folder and its bundles."""
+
+import os
+import sys
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+from springtune.stages import tasks
+from springtune.stages.code import modules
+from springtune.study import StudyError, load_study
+
+# One thread a process: the solvers are sequential, and cores are Snakemake's to share out.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+def chosen_config():
+    """The study that --configfile names, or the paper's."""
+    named = [str(path) for path in workflow.configfiles]
+    if len(named) > 1:
+        raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
+    path = Path(named[0] if named else "config/paper.yaml")
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
+
+
+def loaded_study():
+    try:
+        return load_study(CONFIG)
+    except StudyError as error:
+        # The message says it all; a traceback through Snakemake would bury it.
+        print(error, file=sys.stderr)
+        sys.exit(1)
+
+
+CONFIG = chosen_config()
+STUDY = loaded_study()
+RESULTS = Path("results") / STUDY.name
+BUNDLES = tasks.write_tasks(STUDY, RESULTS, workflow.cores or 1)
+
+
+wildcard_constraints:
+    bundle="|".join(BUNDLES),

@@ -1,0 +1,50 @@
+from springtune.figures.names import FORMATS, of_study
+
+FIGURES = {
+    kind: [RESULTS / "figures" / f"{stem}.{ending}" for stem in stems for ending in FORMATS]
+    for kind, stems in of_study(STUDY).items()
+}
+
+
+rule figures_sensitivity:
+    message:
+        "Drawing the sensitivity curves"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_sensitivity"),
+    output:
+        FIGURES["sensitivity"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_sensitivity.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_sensitivity.tsv"
+    shell:
+        "python -m springtune.stages.figures_sensitivity {input.dataset} {params.folder} > {log} 2>&1"
+
+
+rule figures_scenes:
+    message:
+        "Drawing errors against mesh size and deformed networks"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_scenes"),
+    output:
+        FIGURES["size"],
+        FIGURES["deformed"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_scenes.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_scenes.tsv"
+    shell:
+        "python -m springtune.stages.figures_scenes {input.dataset} {params.folder} > {log} 2>&1"
+
+
+rule figures_all:
+    input:
+        FIGURES["sensitivity"],
+        FIGURES["size"],
+        FIGURES["deformed"],

@@ -1,0 +1,16 @@
+rule solve:
+    message:
+        "Solving the networks of bundle {wildcards.bundle}"
+    input:
+        tasks=RESULTS / "tasks/solve_{bundle}.json",
+        meshes=RESULTS / "done/mesh_{bundle}.json",
+        calibration=rules.calibrate.output,
+        code=modules("solve"),
+    output:
+        RESULTS / "done/solve_{bundle}.json",
+    log:
+        RESULTS / "logs/solve_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/solve_{bundle}.tsv"
+    shell:
+        "python -m springtune.stages.solve {input.tasks} {input.calibration} {output} > {log} 2>&1"
