@@ -16,6 +16,8 @@ include: "workflow/rules/tables.smk"
 
 rule all:
     default_target: True
+    message:
+        f"The study is in {RESULTS}: dataset.nc, figures, tables/index.html"
     input:
         rules.collect.output,
         rules.figures_all.input,

@@ -7,7 +7,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from springtune.stages import tasks
-from springtune.stages.code import modules
+from springtune.stages.code import PACKAGE, modules
 from springtune.study import StudyError, load_study
 
 # One thread a process: the solvers are sequential, and cores are Snakemake's to share out.

@@ -53,7 +53,7 @@ def _draw(fields, root, selection, definition, folder, stem):
             x=0.01, y=0.99, ha="left",
         )  # fmt: skip
         height = drawn.get_size_inches()[1]
-        drawn.subplots_adjust(left=0.065, right=0.99, bottom=0.42 / height, top=1 - 0.55 / height, hspace=0.75)
+        drawn.subplots_adjust(left=0.085, right=0.99, bottom=0.42 / height, top=1 - 0.55 / height, hspace=0.75)
 
 
 def _panel(panel, fields, selection, beam):

@@ -28,7 +28,7 @@ SETTINGS = {
     "legend.frameon": False,
     "lines.linewidth": 1.6,
     "lines.markersize": 5,
-    "pdf.fonttype": 42,
+    "pdf.fonttype": 3,  # type 42 cuts fonts to size, in half of the time of a figure
     "savefig.dpi": 150,
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,

@@ -1,0 +1,42 @@
+# make study                             the paper's study: results/paper
+# make study STUDY=config/quick.yaml     another one
+# make test                              the tests; `make slow` runs the slow ones
+STUDY ?= config/paper.yaml
+VENV := .venv
+# Rules call `python`: it is to be the one that has springtune.
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+
+.PHONY: study test slow lint docs lock clean
+
+study: $(VENV)/.run
+	snakemake --configfile $(STUDY)
+
+test: $(VENV)/.test
+	pytest -n 2 -m "not slow"
+
+slow: $(VENV)/.test
+	pytest -n 2 -m slow
+
+lint: $(VENV)/.test
+	ruff check
+	ruff format --check
+
+# The configuration's schema and manual, from the models that validate it.
+docs: $(VENV)/.run
+	springtune schema --write
+
+# Stamps: nothing is installed again until a requirement changes.
+$(VENV)/.run: requirements/installer.txt requirements/run.txt pyproject.toml tools/setup.sh
+	sh tools/setup.sh run
+
+$(VENV)/.test: requirements/test.txt $(VENV)/.run
+	sh tools/setup.sh test
+
+LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
+lock: $(VENV)/.run
+	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
+	$(LOCK) pyproject.toml requirements/build.in --output-file requirements/run.txt
+	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+
+clean:
+	rm -rf results .snakemake

@@ -1,0 +1,111 @@
+"""Write the tables."""
+
+import csv
+import io
+import os
+from pathlib import Path
+
+import jinja2
+import numpy as np
+
+from ..dataset import STATUS
+from .names import TABLE, stem
+
+ROW = ("beam", "mesh_size")
+
+
+def write(tree, folder):
+    """Write one CSV file a table and a page with all of them.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+    folder : str or Path
+
+    Returns
+    -------
+    list of str
+        Names of the files written.
+    """
+    root = tree.to_dataset()
+    tables = [_table(root.sel(selection), selection) for selection in _selections(root)]
+    tables.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
+    written = {f"{table['stem']}.csv": _csv(table["rows"]) for table in tables}
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("springtune", "tables"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    page = environment.get_template("page.html")
+    definitions = [str(name) for name in root.definition.values]
+    kinematics = [str(name) for name in root.kinematics.values]
+    written["index.html"] = page.render(
+        tables=tables, definitions=definitions, kinematics=kinematics, attributes=tree.attrs, missing=np.nan
+    )
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name, text in written.items():
+        unfinished = Path(folder) / f"{name}.unfinished"
+        unfinished.write_text(text, encoding="utf-8")
+        os.replace(unfinished, Path(folder) / name)
+    return list(written)
+
+
+def _selections(root):
+    asked = (root.status != 0).any([dimension for dimension in root.status.dims if dimension not in TABLE])
+    asked = asked.stack(cell=TABLE)
+    return [dict(zip(TABLE, map(str, cell))) for cell in asked.cell.values[asked.values]]
+
+
+def _table(cells, selection):
+    numbers = np.unique(cells.paper_table.values[np.isfinite(cells.paper_table.values)])
+    number = int(numbers[0]) if len(numbers) == 1 else None
+    rows = []
+    for beam in cells.beam.values:
+        for size in cells.mesh_size.values:
+            cell = cells.sel(beam=beam, mesh_size=size)
+            if (cell.status != 0).any():
+                rows.append(_row(cell, str(beam), float(size)))
+    return {"number": number, "stem": stem(selection, number), "rows": rows, **selection}
+
+
+def _row(cell, beam, size):
+    reference = float(cell.reference_displacement)
+    row = {
+        "beam": beam,
+        "mesh_size_mm": 1e3 * size,
+        "force_N": float(cell.force),
+        "printed_stiffness_N_per_m": float(cell.paper_stiffness),
+        "printed_reference_mm": 1e3 * float(cell.paper_reference_displacement),
+        "printed_displacement_mm": 1e3 * float(cell.paper_displacement),
+        "printed_error_percent": 100 * float(cell.paper_deformation_error),
+        "reference_mm": 1e3 * reference,
+    }
+    for kinematics in cell.kinematics.values:
+        for definition in cell.definition.values:
+            one = cell.sel(kinematics=kinematics, definition=definition)
+            status = STATUS[int(one.status)]
+            if status == "not_requested":
+                continue
+            name = f"{definition}_{kinematics}"
+            row[f"{name}_stiffness_N_per_m"] = float(one.stiffness)
+            row[f"{name}_mm"] = 1e3 * float(one.displacement)
+            row[f"{name}_error_percent"] = 100 * float(one.deformation_error)
+            row[f"{name}_status"] = status
+            row[f"{name}_message"] = str(one.message.item())
+    row["remark"] = str(cell.paper_remark.item())
+    return row
+
+
+def _csv(rows):
+    """Rows as CSV; a number that is not there is an empty field."""
+    text = io.StringIO()
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: _number(value) for name, value in row.items()})
+    return text.getvalue()
+
+
+def _number(value):
+    if not isinstance(value, float):
+        return value
+    return "" if np.isnan(value) else f"{value:.8g}"

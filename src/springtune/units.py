@@ -1,0 +1,145 @@
+"""Quantities with units: "200 mm" to 0.2, "210 GPa" to 210e9.
+
+Units that studies usually use stand in a table here; all others are pint's. A test holds the table to pint, whose import
+and registry would cost every start of a workflow half a second.
+"""
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from decimal import Decimal
+from difflib import get_close_matches
+from functools import cache
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of quantity.
+
+    Attributes
+    ----------
+    name : str
+        E.g. ``"length"``.
+    unit : str
+        Its SI unit, in which numbers are returned.
+    example : str
+        A quantity to show in messages.
+    """
+
+    name: str
+    unit: str
+    example: str
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("length", "m", "200 mm"),
+        Kind("force", "N", "400 kN"),
+        Kind("stiffness", "N/m", "170e6 N/m"),
+        Kind("stress", "Pa", "210 GPa"),
+    )
+}
+"""Kinds of quantity by name."""
+
+COMMON = {
+    "length": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "km": "1e3"},
+    "force": {"N": "1", "mN": "1e-3", "kN": "1e3", "MN": "1e6"},
+    "stiffness": {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6", "N/cm": "1e2"},
+    "stress": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/m^2": "1", "N/mm^2": "1e6"},
+}
+"""Usual units of each kind and their size in its SI unit."""
+
+_KNOWN = {unit: (kind, Decimal(size)) for kind, units in COMMON.items() for unit, size in units.items()}
+
+_QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.DOTALL)
+
+
+class UnitError(ValueError):
+    """A text that is not a quantity of the wanted kind; the message says why and what to write instead."""
+
+
+def parse(text, kind):
+    """Number in SI units of a quantity.
+
+    Parameters
+    ----------
+    text : str
+        Number and unit, e.g. ``"200 mm"``.
+    kind : str
+        Key of `KINDS`.
+
+    Returns
+    -------
+    float
+        In the kind's SI unit, correctly rounded: ``"5 mm"``, ``"0.5 cm"`` and ``"0.005 m"`` are one number.
+
+    Raises
+    ------
+    UnitError
+
+    Examples
+    --------
+    >>> parse("200 mm", "length")
+    0.2
+    >>> parse("170e6 N/m", "stiffness")
+    170000000.0
+    """
+    wanted = KINDS[kind]
+    remedy = f"give a {kind} such as '{wanted.example}'"
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found:
+        raise UnitError(f"'{text}' does not begin with a finite number; {remedy}")
+    number, unit = found.groups()
+    if not unit:
+        raise UnitError(f"'{text}' has no unit; {remedy}")
+    known = _measure(_spelling(unit))
+    if known is None:
+        near = get_close_matches(unit, COMMON[kind], n=1, cutoff=0.5)
+        meant = f", did you mean '{near[0]}'?" if near else ";"
+        raise UnitError(f"'{text}': unknown unit '{unit}'{meant} {remedy}")
+    is_kind, size = known
+    if is_kind != kind:
+        raise UnitError(f"'{text}' is {_article(is_kind)}; {remedy}")
+    try:
+        value = float(Decimal(number) * size)
+    except ArithmeticError:
+        value = float("inf")
+    if value in (float("inf"), float("-inf")):
+        raise UnitError(f"'{text}' is too large a number; {remedy}")
+    return value
+
+
+def _spelling(unit):
+    """One spelling of a unit: micro and squares are written in several ways."""
+    return unicodedata.normalize("NFKC", unit.replace("²", "^2")).replace("μ", "u").replace("**", "^")
+
+
+def _article(kind):
+    return f"a {kind}" if kind in KINDS else kind
+
+
+def _measure(unit):
+    """Kind and size in SI units of a unit; None where nobody knows it."""
+    return _KNOWN.get(unit) or _ask_pint(unit)
+
+
+@cache
+def _registry():
+    import pint  # here, since few studies need it
+
+    return pint.UnitRegistry()
+
+
+@cache
+def _ask_pint(unit):
+    registry = _registry()
+    try:
+        asked = registry.parse_units(unit)
+        size = registry.Quantity(1.0, asked).to_base_units().magnitude
+    except Exception:  # pint raises many kinds, tokenizer's and its own
+        return None
+    for kind in KINDS.values():
+        if asked.dimensionality == registry.parse_units(kind.unit).dimensionality:
+            return kind.name, Decimal(f"{size:.15g}")
+    return f"of dimension {asked.dimensionality}", Decimal(1)

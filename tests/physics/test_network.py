@@ -1,0 +1,114 @@
+"""Networks against closed forms, and their forces and tangents against each other."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from problems import beam_problem, roller_patch
+from springtune.materials import Material
+from springtune.springs import lattice as lattice_springs
+from springtune.springs.lattice import COEFFICIENT, uniform
+
+STEEL = Material("steel", 210e9, 0.3)
+
+
+def half_outline(mesh):
+    return lattice_springs.springs(mesh, STEEL, 1e-3)[1]
+
+
+@pytest.mark.parametrize("rows", [2, 4, 6, 10, 20])
+def test_lattice_gives_young_modulus_and_one_third_exactly(rows):
+    young_times_thickness, poisson_ratio = roller_patch(12, rows, half_outline)
+    # Rounding of a few hundred unknowns only.
+    assert young_times_thickness * COEFFICIENT == pytest.approx(1.0, rel=1e-10)
+    assert poisson_ratio == pytest.approx(1 / 3, rel=1e-10)
+
+
+def test_lattice_reference_stiffness_is_that_of_steel():
+    from springtune.mesh import lattice
+
+    reference, _ = lattice_springs.springs(lattice(2, 2), STEEL, 1e-3)
+    assert reference == pytest.approx(181.865e6, rel=1e-5)
+
+
+@pytest.mark.parametrize("rows", [2, 4, 6, 10, 20, 40])
+def test_uniform_network_is_too_stiff_by_the_law(rows):
+    young_times_thickness, _ = roller_patch(12, rows, uniform)
+    slenderness = 1.0 / (rows * COEFFICIENT)  # a / H
+    assert young_times_thickness * COEFFICIENT == pytest.approx(1 + COEFFICIENT * slenderness, rel=1e-9)
+
+
+def bent(problem, seed, amplitude):
+    """Displacements of the size of a tenth of an edge, held particles at rest."""
+    generator = np.random.default_rng(seed)
+    displacements = amplitude * generator.standard_normal(problem.network.held.shape)
+    return np.where(problem.network.held, 0.0, displacements)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 5e-4), mesh_type=st.sampled_from(["structured", "free"]))
+def test_tangent_is_the_derivative_of_the_resistance(seed, amplitude, mesh_type):
+    problem, _ = beam_problem(mesh_type)
+    network = problem.network
+    here = bent(problem, seed, amplitude)
+    direction = network.reduce(bent(problem, seed + 1, 1.0))
+    step = 1e-6 * amplitude
+    moved = step * network.expand(direction)
+    difference = (network.resistance(here + moved) - network.resistance(here - moved)) / (2 * step)
+    exact = network.tangent(here) @ direction
+    # Central differences leave step^2 (here 1e-12 of the bend) and rounding of forces over the step.
+    assert np.linalg.norm(difference - exact) <= 1e-7 * np.linalg.norm(exact)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-5, 5e-4))
+def test_resistance_is_the_derivative_of_the_energy(seed, amplitude):
+    problem, _ = beam_problem("free")
+    network = problem.network
+    here, direction = bent(problem, seed, amplitude), bent(problem, seed + 1, amplitude)
+    step = 1e-4
+    difference = network.energy(here + step * direction) - network.energy(here - step * direction)
+    work = network.resistance(here) @ network.reduce(direction)
+    scale = np.linalg.norm(network.resistance(here)) * np.linalg.norm(direction)
+    assert abs(difference / (2 * step) - work) <= 1e-6 * scale
+
+
+@given(angle=st.floats(-3.1, 3.1), shift=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
+@settings(max_examples=30, deadline=None)
+def test_rigid_motion_meets_no_resistance(angle, shift):
+    problem, _ = beam_problem()
+    points = problem.network.mesh.points
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    displacements = points @ turn.T + np.array(shift) - points
+    # Coordinates of size 1 are rounded to 1e-16, over springs of 5 mm.
+    assert np.abs(problem.network.resistance(displacements)).max() <= 1e-14
+    assert problem.network.energy(displacements) <= 1e-25
+
+
+def test_tangent_is_symmetric_and_matches_a_dense_assembly():
+    problem, _ = beam_problem("free")
+    network = problem.network
+    here = bent(problem, 7, 2e-4)
+    dense = np.zeros((network.held.size, network.held.size))
+    points = network.mesh.points + here
+    for stiffness, (i, j), rest in zip(network.stiffness, network.mesh.edges, network.rest_lengths):
+        vector = points[j] - points[i]
+        length = np.linalg.norm(vector)
+        normal = vector / length
+        block = stiffness * ((1 - rest / length) * np.eye(2) + rest / length * np.outer(normal, normal))
+        for (a, b), sign in (((i, i), 1), ((j, j), 1), ((i, j), -1), ((j, i), -1)):
+            dense[2 * a : 2 * a + 2, 2 * b : 2 * b + 2] += sign * block
+    free = ~network.held.ravel()
+    ours = network.tangent(here).toarray()
+    assert np.abs(ours - ours.T).max() <= 1e-14
+    assert np.abs(ours - dense[np.ix_(free, free)]).max() <= 1e-12
+
+
+def test_negative_pivots_count_negative_eigenvalues():
+    problem, _ = beam_problem()
+    # Pressed to a third of its length along a line, the network is far beyond buckling.
+    displacements = np.zeros_like(problem.network.mesh.points)
+    displacements[:, 0] = -0.3 * problem.network.mesh.points[:, 0]
+    factor = problem.network.factorize(displacements)
+    eigenvalues = np.linalg.eigvalsh(problem.network.tangent(displacements).toarray())
+    assert factor.negative_pivots == (eigenvalues < 0).sum() > 0
