@@ -7,6 +7,7 @@ displacement continue it past its poles. The nearest of these is the buckling lo
 """
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from .network import SingularError
 
@@ -19,8 +20,8 @@ CURVE_TOLERANCE = 1e-7
 MAX_SOLVES = 3
 """Nonlinear solves that a curve may add to the series about rest."""
 
-MAX_STEPS = 6
-"""Newton steps of each of them: from a point on the path two or three do, and next to buckling none suffice."""
+MAX_STEPS = 4
+"""Factorisations of each of them: from near the path one or two do, and next to buckling none suffice."""
 
 
 class Expansion:
@@ -158,7 +159,7 @@ def trace(problem, weights, targets):
         found = problem.newton(targets[middle], problem.rest.predict(targets[middle]), MAX_STEPS)
         refused[middle] = True
         if not found.converged:
-            continue
+            break
         values[middle], errors[middle] = np.tensordot(found.displacements, weights, axes=2), found.residual
         if len(left) > 1:
             try:
@@ -176,7 +177,7 @@ def trace(problem, weights, targets):
 def stable_until(problem, targets):
     """Which loads of a path leave the beam stable, taking instability once begun to stay.
 
-    Found by bisection on the number of negative pivots of the tangent.
+    A linear buckling analysis says where to look; the number of negative pivots of the tangent decides.
 
     Parameters
     ----------
@@ -189,16 +190,43 @@ def stable_until(problem, targets):
     ndarray of bool, shape (n,)
     """
     by_load = np.argsort(np.abs(targets))
-    low, high = 0, len(targets)  # all below low are stable; high is the first that is not
-    probe = high - 1
-    while low < high:
-        try:
-            factor = problem.network.factorize(problem.rest.predict(targets[by_load[probe]]))
-            stable = factor.negative_pivots == 0
-        except SingularError:
-            stable = False
-        low, high = (probe + 1, high) if stable else (low, probe)
-        probe = (low + high) // 2
+    loads = np.abs(targets)[by_load]
+    critical = _buckling_share(problem, targets[by_load[-1]]) * loads[-1]
     result = np.zeros(len(targets), dtype=bool)
-    result[by_load[:low]] = True
+    if critical > 2.0 * loads[-1]:
+        result[:] = True
+        return result
+
+    def stable(place):
+        try:
+            tangent = problem.network.factorize(problem.rest.predict(targets[by_load[place]]))
+        except SingularError:
+            return False
+        return tangent.negative_pivots == 0
+
+    count = int(np.searchsorted(loads, critical))  # of stable loads
+    if count and not stable(count - 1):
+        count -= 1
+        while count and not stable(count - 1):
+            count -= 1
+    else:
+        while count < len(loads) and stable(count):
+            count += 1
+    result[by_load[:count]] = True
     return result
+
+
+def _buckling_share(problem, s):
+    """Share of a load at which the beam buckles, were the tangent linear in the load up to there.
+
+    The tangent at share x of the load is then ``K0 + x (K - K0)``, singular first at one over the largest eigenvalue of
+    ``(K0 - K) v = mu K0 v``.
+    """
+    network = problem.network
+    rest = network.tangent()
+    loaded = network.tangent(problem.rest.predict(s))
+    inverse = LinearOperator(rest.shape, problem.rest_factor.solve, dtype=float)
+    # A fixed start, across the beam, since buckling bends it: the same numbers in every run.
+    start = network.reduce(network.mesh.points[:, ::-1] ** 2 * [0.0, 1.0] + 1e-3 * network.mesh.points)
+    largest = eigsh(rest - loaded, 1, rest, which="LA", Minv=inverse, v0=start, tol=1e-3, return_eigenvectors=False)[0]
+    return 1.0 / largest if largest > 0 else np.inf

@@ -4,7 +4,7 @@ The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is t
 [m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,8 +17,11 @@ TOLERANCE = 1e-10
 
 MAX_ITERATIONS = 12
 MAX_HALVINGS = 12
-START_ORDER = 5
-"""Orders of the series that starts Newton's method: together they cost a fifth of the factorisation they save."""
+KEEP_TANGENT = 0.03
+"""Share of the residual that a step may leave for its tangent to serve once more."""
+
+START_ORDER = 6
+"""Orders of the series that starts Newton's method: together they cost a quarter of a factorisation."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Equilibrium:
         Displacement of each particle [m]; of the last iterate where it did not converge.
     converged : bool
     iterations : int
-        Newton steps, each with a new factorisation.
+        Newton steps.
     residual : float
         Norm of the out-of-balance force over that of the load [1].
     factor : Factor or None
@@ -105,7 +108,8 @@ class StaticProblem:
     def nonlinear(self, s):
         """Equilibrium of the network with its springs' full length law.
 
-        Newton's method from the series about rest; where that fails, in load steps from rest.
+        Newton's method from the series about rest; where that fails, from the linear solution, which next to buckling
+        is the nearer guess; where that fails, in load steps from rest.
 
         Parameters
         ----------
@@ -116,17 +120,19 @@ class StaticProblem:
         -------
         Equilibrium
         """
-        found = self.newton(s, self.start.predict(s))
-        if found.converged:
-            return found
-        stepped = self._in_steps(s, found.iterations)
-        return stepped if stepped.converged else _worse(found, stepped)
+        iterations = 0
+        for start in (self.start.predict, lambda s: s * self.slope):
+            found = self.newton(s, start(s))
+            iterations += found.iterations
+            if found.converged:
+                return replace(found, iterations=iterations)
+        return self._in_steps(s, iterations)
 
     def newton(self, s, start, max_iterations=MAX_ITERATIONS):
         """Newton's method with the exact tangent and a line search on the norm of the residual.
 
-        A step is halved until the residual falls and no triangle is inverted. At least one step is taken, so that the
-        factorised tangent belongs to the solution.
+        A step is halved until the residual falls and no triangle is inverted. A factorised tangent serves as long as
+        its steps cut the residual by `KEEP_TANGENT`: near the solution a new one costs ten such steps.
 
         Parameters
         ----------
@@ -135,6 +141,7 @@ class StaticProblem:
         start : ndarray of float, shape (n_points, 2)
             First guess of the displacements [m].
         max_iterations : int, optional
+            Largest number of factorisations.
 
         Returns
         -------
@@ -142,33 +149,49 @@ class StaticProblem:
         """
         network = self.network
         scale = abs(s) * self.load_norm
-        displacements, factor = start, None
-        missing = s * self.load - network.resistance(displacements)
-        residual = _norm(missing) / scale
+
+        def balance(displacements):
+            missing = s * self.load - network.resistance(displacements)
+            return missing, _norm(missing) / scale
+
+        displacements, factor, factorised, steps = start, None, 0, 0
+        missing, residual = balance(displacements)
         if not np.isfinite(residual) or network.inverted(displacements):
             displacements = np.zeros_like(start)
             missing, residual = s * self.load, 1.0
-        for iteration in range(1, max_iterations + 1):
-            try:
-                factor = network.factorize(displacements)
-            except SingularError:
-                return Equilibrium(displacements, False, iteration, residual, factor, "singular tangent")
+
+        def end(reason=""):
+            return Equilibrium(displacements, not reason, steps, residual, factor, reason)
+
+        keep = False
+        while True:
+            if not keep:
+                if factorised == max_iterations:
+                    return end("too many iterations")
+                try:
+                    factor = network.factorize(displacements)
+                except SingularError:
+                    return end("singular tangent")
+                factorised += 1
             step = network.expand(factor.solve(missing))
             length = 1.0
             for _ in range(MAX_HALVINGS):
                 trial = displacements + length * step
-                trial_missing = s * self.load - network.resistance(trial)
-                trial_residual = _norm(trial_missing) / scale
+                trial_missing, trial_residual = balance(trial)
                 better = trial_residual <= max((1.0 - 1e-4 * length) * residual, 0.1 * TOLERANCE)
                 if better and not network.inverted(trial):
                     break
                 length *= 0.5
             else:
-                return Equilibrium(displacements, False, iteration, residual, factor, "line search found no descent")
+                if keep:  # the tangent is of an earlier iterate
+                    keep = False
+                    continue
+                return end("line search found no descent")
+            steps += 1
+            keep = trial_residual <= KEEP_TANGENT * residual
             displacements, missing, residual = trial, trial_missing, trial_residual
             if residual <= TOLERANCE:
-                return Equilibrium(displacements, True, iteration, residual, factor)
-        return Equilibrium(displacements, False, max_iterations, residual, factor, "too many iterations")
+                return end()
 
     def _in_steps(self, s, iterations, smallest=1 / 64):
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
@@ -184,13 +207,11 @@ class StaticProblem:
                 before, last, last_step = last, found.displacements, step
                 done += step
                 if done >= 1.0:
-                    return Equilibrium(last, True, iterations, found.residual, found.factor)
+                    return replace(found, iterations=iterations)
                 step *= 1.5
             elif step <= smallest:
-                missing = s * self.load - self.network.resistance(found.displacements)
-                residual = _norm(missing) / (abs(s) * self.load_norm)
                 reason = f"{found.reason} at {100 * (done + step):.3g} % of the load"
-                return Equilibrium(found.displacements, False, iterations, residual, found.factor, reason)
+                return replace(found, iterations=iterations, reason=reason)
             else:
                 step *= 0.5
 
@@ -198,8 +219,3 @@ class StaticProblem:
 def _norm(vector):
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.linalg.norm(vector))
-
-
-def _worse(first, second):
-    """The failure to report: the load steps', with the iterations of both."""
-    return second if np.isfinite(second.residual) else first

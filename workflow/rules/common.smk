@@ -14,6 +14,9 @@ from springtune.study import StudyError, load_study
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+# Jobs run on the Python that runs Snakemake, whether its environment is activated or not.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+
 
 def chosen_config():
     """The study that --configfile names, or the paper's."""
