@@ -140,7 +140,9 @@ def write(path, groups, attributes):
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = attributes
     encoding = {
-        group: {name: {"zlib": True, "complevel": 4} for name, array in data.items() if array.ndim and array.dtype != object}
+        group: {
+            name: {"zlib": True, "complevel": 4} for name, array in data.items() if array.ndim and array.dtype != object
+        }
         for group, data in groups.items()
     }
     tree.to_netcdf(unfinished, engine="h5netcdf", encoding=encoding)

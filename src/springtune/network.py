@@ -130,9 +130,7 @@ class Network:
         """
         matrix = self.tangent(displacements)
         try:
-            lu = splu(
-                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
+            lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError as error:
             raise SingularError(str(error)) from error
         return Factor(lu)

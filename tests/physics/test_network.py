@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems import beam_problem, roller_patch
+
 from springtune.materials import Material
 from springtune.springs import lattice as lattice_springs
 from springtune.springs.lattice import COEFFICIENT, uniform
+
+from problems import beam_problem, roller_patch
 
 STEEL = Material("steel", 210e9, 0.3)
 

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems import beam_problem
+
 from springtune.path import ORDER, Expansion, stable_until, trace
+
+from problems import beam_problem
 
 K = 181.87e6
 RATIOS = np.linspace(0.4, 1.6, 61)

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
-from problems import beam_problem
 from scipy.optimize import root
+
 from springtune.statics import TOLERANCE
+
+from problems import beam_problem
 
 STRONG = 400e3 / 181.87e6  # F/k of the paper's heaviest load [m]
 

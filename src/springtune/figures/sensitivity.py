@@ -58,7 +58,9 @@ def _draw(curves, root, selection, folder, stem):
                 unstable_shown = True
                 axes.plot(stiffness, np.where(stable, np.nan, error), color=look["color"], linewidth=0.7)
             axes.plot(best / unit, 0, marker=marker, color=look["color"], clip_on=False, zorder=4)
-            axes.plot(predicted / unit, 0, marker="|", markersize=13, markeredgewidth=1.6, color=look["color"], clip_on=False)
+            axes.plot(
+                predicted / unit, 0, marker="|", markersize=13, markeredgewidth=1.6, color=look["color"], clip_on=False
+            )
         printed = np.unique(root.paper_stiffness.values[np.isfinite(root.paper_stiffness.values)])
         for value in printed:
             axes.axvline(value / unit, color="0.45", linewidth=0.8, linestyle=(0, (2, 2)), zorder=1)

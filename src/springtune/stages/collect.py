@@ -62,7 +62,9 @@ class _Filler:
     def put(self, values, **labels):
         for name, value in values.items():
             array = self.data[name]
-            array.values[tuple(self._places[dimension][labels[dimension]] for dimension in array.dims if dimension in labels)] = value
+            array.values[
+                tuple(self._places[dimension][labels[dimension]] for dimension in array.dims if dimension in labels)
+            ] = value
 
     def put_rows(self, values, **labels):
         """Write rows that may be shorter than the last dimension."""

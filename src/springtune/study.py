@@ -1,0 +1,1061 @@
+"""Studies: what a config file asks for, validated, named, free of duplicates and in a canonical order.
+
+`load_study` reads a YAML file. `StudyConfig` and the models it is made of say what the file may hold; the JSON schema for
+editors and the tables of config/README.md are generated from them (`springtune schema --write`).
+"""
+
+import csv
+import math
+import re
+from collections import Counter
+from dataclasses import dataclass
+from decimal import Decimal
+from difflib import get_close_matches
+from itertools import product
+from pathlib import Path
+from typing import Annotated
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError, core_schema
+
+from . import units
+from .geometry import Beam
+from .loads import DIRECTION
+from .materials import Material
+from .mesh import MESH_TYPES
+from .springs import DEFINITIONS
+from .springs.lattice import COEFFICIENT
+
+KINEMATICS = ("nonlinear", "linear")
+"""Kinematics of a network: springs that keep their length law, or their tangent at rest."""
+
+PLAUSIBLE = 20.0
+"""A stated stiffness farther than this factor from sqrt(3)/2 E t is taken for an error of units."""
+
+MOST_PARTICLES = 5e6
+"""A mesh with more particles is taken for an error of units."""
+
+MOST_POINTS = 10_001
+"""Most points of a sensitivity curve."""
+
+SHOWN_PROBLEMS = 5
+"""Problems that one message lists; it counts the others."""
+
+
+class StudyError(ValueError):
+    """A study that cannot be run; the message names file, line, key, value and remedy."""
+
+
+# -- what is asked --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MeshSpec:
+    """A mesh that a study asks for.
+
+    Attributes
+    ----------
+    beam : Beam
+    mesh_type : str
+        Key of `springtune.mesh.MESH_TYPES`.
+    mesh_size : float
+        Asked length of an edge [m].
+    """
+
+    beam: Beam
+    mesh_type: str
+    mesh_size: float
+
+    @property
+    def name(self):
+        """File stem, e.g. ``"200x40_structured_5mm"``."""
+        return f"{self.beam.name}_{self.mesh_type}_{1e3 * self.mesh_size:g}mm"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One boundary-value problem on one mesh.
+
+    Attributes
+    ----------
+    mesh : MeshSpec
+    material : Material
+    load : str
+        Key of `springtune.loads.DIRECTION`.
+    force : float
+        Force on the right end, tension positive [N].
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    kinematics : str
+        One of `KINEMATICS`.
+    """
+
+    mesh: MeshSpec
+    material: Material
+    load: str
+    force: float
+    definition: str
+    kinematics: str
+
+    @property
+    def name(self):
+        """Readable name, unique in a study."""
+        return f"{self.mesh.name}_{self.material.name}_{self.load}_{self.definition}_{self.kinematics}"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A sensitivity curve: attributes as a `Scene`'s, its stiffness running through `Study.stiffness_ratios`."""
+
+    mesh: MeshSpec
+    material: Material
+    load: str
+    force: float
+    kinematics: str
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A finite-element answer: attributes as a `Scene`'s."""
+
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What one grid of a study asks for, whether or not other grids ask for it, too.
+
+    Attributes
+    ----------
+    name : str
+    scenes : tuple of Scene
+    curves : tuple of Curve
+    """
+
+    name: str
+    scenes: tuple
+    curves: tuple
+
+
+@dataclass(frozen=True)
+class PrintedCell:
+    """A cell of a printed table, as printed.
+
+    Attributes
+    ----------
+    table : int
+        Number of the table.
+    beam, mesh_type, material, load : str
+        Labels of the cell.
+    mesh_size : float
+        Length of an edge [m].
+    force : float
+        Force, without sign [N].
+    stiffness : float
+        Stiffness of the springs [N/m].
+    reference_displacement, displacement : float
+        Displacement by finite elements and of the network, without sign [m].
+    deformation_error : float
+        Deformation error, without sign [1].
+    remark : str
+        Where the print contradicts itself; empty otherwise.
+    """
+
+    table: int
+    beam: str
+    mesh_type: str
+    mesh_size: float
+    material: str
+    load: str
+    force: float
+    stiffness: float
+    reference_displacement: float
+    displacement: float
+    deformation_error: float
+    remark: str
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study, ready to run.
+
+    All tuples are free of duplicates and ordered by beam and material as declared, then by mesh type, mesh size, load,
+    definition and kinematics, whatever the order of grids and of the lists in them.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the file.
+    path : Path
+        The file.
+    text : str
+        The file as read.
+    title : str
+    meshes : tuple of MeshSpec
+    scenes : tuple of Scene
+    curves : tuple of Curve
+    references : tuple of Reference
+    grids : tuple of Grid
+        In the order of the file.
+    stiffness_ratios : tuple of float
+        k / (E t) along every curve, ascending [1].
+    stiffness_table : dict
+        Stiffness [N/m] of the definition ``paper`` by (mesh type, material).
+    calibration : tuple of str or None
+        Beam and load whose curves calibrate the definition ``calibrated``.
+    printed : tuple of PrintedCell
+    printed_path : Path or None
+        File of the printed values.
+    axes : dict of str to tuple
+        Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
+    """
+
+    name: str
+    path: Path
+    text: str
+    title: str
+    meshes: tuple
+    scenes: tuple
+    curves: tuple
+    references: tuple
+    grids: tuple
+    stiffness_ratios: tuple
+    stiffness_table: dict
+    calibration: tuple | None
+    printed: tuple
+    printed_path: Path | None
+    axes: dict
+
+
+# -- problems -------------------------------------------------------------------------------------------------------------
+
+
+class _Problems:
+    """Collects what is wrong with a file and raises it as one `StudyError`.
+
+    Parameters
+    ----------
+    file : str
+        The file as its user named it.
+    lines : dict of tuple to int, optional
+        Line of each path of keys.
+    """
+
+    def __init__(self, file, lines=None):
+        self._file, self._lines, self._found = file, lines or {}, []
+
+    def add(self, path, message, line=0):
+        path = tuple(path)
+        # What is missing has no line of its own; that of what should hold it helps.
+        above = (path[:size] for size in range(len(path), 0, -1))
+        line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
+        place = f"{self._file}:{line}" if line else self._file
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
+        self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
+
+    def stop(self):
+        """Raise if anything was found."""
+        if not self._found:
+            return
+        messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
+        more = len(messages) - SHOWN_PROBLEMS
+        messages[SHOWN_PROBLEMS:] = [f"... and {more} more"] if more > 0 else []
+        raise StudyError("\n".join(messages))
+
+
+def _refuse(message, *path):
+    """Error of a validator; `path` leads from the validated value to the culprit inside it."""
+    return PydanticCustomError("study", "{message}", {"message": message, "path": path})
+
+
+def _show(value):
+    """A value of the file, for a message."""
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return "a list" if value else "an empty list"
+    if value is None:
+        return "nothing"
+    return f"'{value}'" if len(value) <= 60 else f"'{value[:57]}...'"
+
+
+def _nearest(word, words):
+    """``did you mean ...? `` if one of the words is near, and all of them."""
+    words = list(words)
+    near = get_close_matches(word, words, n=1, cutoff=0.6)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}known: {', '.join(words)}"
+
+
+# -- YAML with line numbers -----------------------------------------------------------------------------------------------
+
+
+def _read_yaml(text, file):
+    """Content of a YAML text as dicts, lists and texts, and the line of each path of keys.
+
+    Scalars stay the texts they are, so that names such as ``1e3`` or ``no`` are no numbers or booleans, and messages
+    show what the file holds.
+    """
+    lines = {}
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        return _content(root, (), lines, file), lines
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        line = f":{mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "unreadable"
+        raise StudyError(
+            f"{file}{line}: not YAML: {problem}; check colons, brackets and indentation of this line and the one above"
+        ) from None
+    except RecursionError:
+        raise StudyError(f"{file}: not a study: nested too deeply; see config/README.md for what it may hold") from None
+
+
+def _content(node, path, lines, file):
+    if node is None or node.tag == "tag:yaml.org,2002:null":
+        return None
+    lines.setdefault(path, node.start_mark.line + 1)
+    if isinstance(node, yaml.ScalarNode):
+        return node.value
+    if isinstance(node, yaml.SequenceNode):
+        return [_content(item, (*path, number), lines, file) for number, item in enumerate(node.value)]
+    content, merged = {}, {}
+    for key, value in node.value:
+        line = key.start_mark.line + 1
+        if not isinstance(key, yaml.ScalarNode):
+            raise StudyError(f"{file}:{line}: a list or mapping cannot be a key; write a name before the colon")
+        if key.tag == "tag:yaml.org,2002:merge":
+            for base in value.value if isinstance(value, yaml.SequenceNode) else [value]:
+                inherited = _content(base, path, {}, file)
+                if not isinstance(inherited, dict):
+                    raise StudyError(f"{file}:{line}: '<<' merges mappings only; give it an alias such as *name")
+                merged = inherited | merged
+            continue
+        inside = (*path, key.value)
+        if key.value in content:
+            problems = _Problems(file, {inside: line})
+            problems.add(inside, f"'{key.value}' is given twice, first in line {lines[inside]}; rename or remove one")
+            problems.stop()
+        lines[inside] = line
+        content[key.value] = _content(value, inside, lines, file)
+    return merged | content
+
+
+# -- what a file may hold -------------------------------------------------------------------------------------------------
+
+
+class _Scalar:
+    """Annotation of a field: how its text is read, its JSON schema and words for the manual."""
+
+    def __init__(self, read, schema, words):
+        self.read, self.schema, self.words = read, schema, words
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        return dict(self.schema)
+
+    def _read(self, value):
+        if not isinstance(value, str) or not value.strip():
+            raise _refuse(f"{_show(value)} instead of {self.words}; give {self.words}")
+        return self.read(value)
+
+
+def _quantity(kind, negative="give a size above zero"):
+    example = units.KINDS[kind].example
+
+    def read(value):
+        try:
+            number = units.parse(value, kind)
+        except units.UnitError as error:
+            raise _refuse(str(error)) from None
+        if not number > 0:
+            raise _refuse(f"'{value}' is not above zero; {negative}, such as '{example}'")
+        return number
+
+    schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
+    return Annotated[float, _Scalar(read, schema, f"a {kind} such as '{example}'")]
+
+
+def _number(words, low, high, *, above=False, whole=False):
+    def read(value):
+        try:
+            number = int(value) if whole else float(value)
+        except ValueError:
+            raise _refuse(f"'{value}' is not a {'whole ' if whole else ''}number; give {words}") from None
+        if not (low < number if above else low <= number) or not number <= high or not math.isfinite(number):
+            raise _refuse(f"'{value}' is out of range; give {words}")
+        return number
+
+    schema = {"type": "integer" if whole else "number", "exclusiveMinimum" if above else "minimum": low}
+    if math.isfinite(high):
+        schema["maximum"] = high
+    return Annotated[int if whole else float, _Scalar(read, schema, words)]
+
+
+def _one_of(what, names):
+    names = list(names)
+
+    def read(value):
+        if value not in names:
+            raise _refuse(f"unknown {what} '{value}'; {_nearest(value, names)}")
+        return value
+
+    words = f"a {what} ({' or '.join(names)})" if len(names) < 3 else f"a {what} ({', '.join(names)})"
+    return Annotated[str, _Scalar(read, {"enum": names}, words)]
+
+
+def _read_flag(value):
+    if value.lower() not in ("true", "false"):
+        raise _refuse(f"'{value}' is neither true nor false; give one of them")
+    return value.lower() == "true"
+
+
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
+_NAME_RULE = "use letters, digits, '.', '_' and '-', and no '.' in front: names become parts of file names"
+
+Length = _quantity("length")
+Force = _quantity("force", "the load's name carries the sign: give a magnitude")
+Stiffness = _quantity("stiffness")
+Stress = _quantity("stress")
+PoissonRatio = _number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
+Ratio = _number("a number above 0, such as 0.4", 0, math.inf, above=True)
+Points = _number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
+MeshType = _one_of("mesh type", MESH_TYPES)
+Load = _one_of("load", DIRECTION)
+Kinematics = _one_of("kinematics", KINEMATICS)
+DefinitionName = _one_of("definition", DEFINITIONS)
+Flag = Annotated[bool, _Scalar(_read_flag, {"type": "boolean"}, "true or false")]
+Text = Annotated[str, _Scalar(str, {"type": "string", "minLength": 1}, "a text")]
+BeamName = Annotated[str, _Scalar(str, {"type": "string"}, "the name of a beam")]
+MaterialName = Annotated[str, _Scalar(str, {"type": "string"}, "the name of a material")]
+
+
+class _OneOrMore:
+    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
+
+    words = "or a list"
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        array = handler(schema["schema"]) | {"minItems": 1, "uniqueItems": True}
+        return {"anyOf": [array["items"], array]}
+
+    @staticmethod
+    def _read(value, handler):
+        listed = [value] if isinstance(value, str) else value
+        if not isinstance(listed, list):
+            raise _refuse(f"{_show(value)} instead of a value or a list; write it as [first, second]")
+        if not listed:
+            raise _refuse("an empty list leaves the grid empty; give at least one value, or remove the grid")
+        items = handler(listed)
+        for number, item in enumerate(items):
+            if item in items[:number]:
+                raise _refuse(f"{_show(listed[number])} is listed twice; remove one", number)
+        return items
+
+
+class _PerBeam:
+    """Annotation of a mapping from beams to quantities; a single quantity, kept under None, stands for all beams."""
+
+    words = "a force such as '400 kN', or one for each beam"
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        single = handler.generate_schema(Force)
+        each = core_schema.no_info_wrap_validator_function(self._read_each, handler(source))
+        choices = {"single": core_schema.no_info_after_validator_function(lambda force: {None: force}, single)}
+        choices["each"] = each
+        return core_schema.tagged_union_schema(
+            choices, lambda value: "each" if isinstance(value, dict) else "single"
+        )
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        each = handler(schema["choices"]["each"]["schema"])
+        return {"anyOf": [each["additionalProperties"], each | {"minProperties": 1}]}
+
+    @staticmethod
+    def _read_each(value, handler):
+        if not value:
+            raise _refuse("no force at all; give one for each beam, such as {200x40: 400 kN}")
+        return handler(value)
+
+
+class _Named:
+    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one."""
+
+    def __init__(self, what, for_files=True):
+        self.what, self.for_files = what, for_files
+        self.words = f"a mapping from the name of each {what} to its keys"
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        described = handler(schema["schema"]) | {"minProperties": 1}
+        if self.for_files:
+            described["propertyNames"] = {"pattern": f"^{_NAME.pattern}$"}
+        return described
+
+    def _read(self, value, handler):
+        if not isinstance(value, dict) or not value:
+            shown = _show(value) if value else f"no {self.what} at all"
+            raise _refuse(f"{shown}; give at least one {self.what}, its name followed by a colon and its keys")
+        seen = {}
+        for name in value if self.for_files else ():
+            if not _NAME.fullmatch(name):
+                raise _refuse(f"'{name}' cannot name a {self.what}; {_NAME_RULE}", name)
+            other = seen.setdefault(name.casefold(), name)
+            if other != name:
+                message = f"'{name}' and '{other}' differ in case only and would share files on some systems; rename one"
+                raise _refuse(message, name)
+        return handler(value)
+
+
+class Section(BaseModel):
+    """A mapping of known keys in a study."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, value):
+        names = {field.alias or name: field for name, field in cls.model_fields.items()}
+        if not isinstance(value, dict):
+            raise _refuse(f"{_show(value)} instead of keys and values; give the keys {', '.join(names)}")
+        for key in value:
+            if key not in names:
+                raise _refuse(f"unknown key '{key}'; {_nearest(key, names)}", key)
+        given = {key: content for key, content in value.items() if content is not None}
+        for name, field in names.items():
+            if field.is_required() and name not in given:
+                raise _refuse(f"'{name}' is missing; give it: {field.description}", name)
+        return given
+
+
+class BeamConfig(Section):
+    """A rectangular sheet, its length along x."""
+
+    length: Length = Field(description="Extent along x, the direction of the load.")
+    height: Length = Field(description="Extent along y.")
+    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+
+
+class MaterialConfig(Section):
+    """An isotropic, linearly elastic material."""
+
+    young_modulus: Stress = Field(description="Young's modulus E.")
+    poisson_ratio: PoissonRatio = Field(description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress.")
+
+
+class StatedStiffness(Section):
+    """One stated stiffness."""
+
+    mesh_type: MeshType = Field(description="Mesh type that it is for.")
+    material: MaterialName = Field(description="Material that it is for.")
+    value: Stiffness = Field(
+        description=f"Stiffness of every spring; within a factor of {PLAUSIBLE:g} of sqrt(3)/2 E t, or it is taken for an error."
+    )
+
+
+class PaperConfig(Section):
+    """Parameters of the definition `paper`: stiffnesses that are stated, not derived."""
+
+    stiffness: list[StatedStiffness] = Field(
+        description="One entry for each mesh type and material that a grid uses with `paper`.", min_length=1
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _listed(cls, value):
+        rows = value.get("stiffness") if isinstance(value, dict) else None
+        if rows is not None and (not isinstance(rows, list) or not rows):
+            example = "- {mesh_type: structured, material: steel, value: 170e6 N/m}"
+            raise _refuse(f"{_show(rows)} instead of a list of stiffnesses; give entries such as {example}", "stiffness")
+        return value
+
+
+class CalibratedConfig(Section):
+    """Parameters of the definition `calibrated`.
+
+    Its stiffness is found per mesh type, material and kinematics: the mean over the mesh sizes of the best stiffness of
+    this study's own sensitivity curves of one beam and load.
+    """
+
+    beam: BeamName = Field(description="Beam whose curves calibrate.")
+    load: Load = Field(description="Load whose curves calibrate.")
+
+
+class DefinitionsConfig(Section):
+    """Parameters of those definitions that have any; `springtune definitions` lists all definitions."""
+
+    paper: PaperConfig | None = Field(None, description="Table of stated stiffnesses; needed where a grid uses `paper`.")
+    calibrated: CalibratedConfig | None = Field(
+        None, description="Where the stiffness is calibrated; needed where a grid uses `calibrated`."
+    )
+
+
+class SensitivityConfig(Section):
+    """Uniform stiffnesses of every sensitivity curve, equally spaced, in units of sqrt(3)/2 E t."""
+
+    start: Ratio = Field("0.4", validate_default=True, alias="from", description="Smallest stiffness.")
+    stop: Ratio = Field("1.6", validate_default=True, alias="to", description="Largest stiffness.")
+    points: Points = Field("61", validate_default=True, description="Number of stiffnesses, both ends included.")
+
+
+class GridConfig(Section):
+    """A product of parameters: every combination of the values listed is a scene.
+
+    A single value stands for a list of one. A scene that two grids ask for is solved once.
+    """
+
+    beam: Annotated[list[BeamName], _OneOrMore()] = Field(description="Beams, by name.")
+    mesh_type: Annotated[list[MeshType], _OneOrMore()] = Field(
+        description="`structured`: equilateral rows fitted to the box; `free`: Delaunay inside an outline of imposed edge size."
+    )
+    mesh_size: Annotated[list[Length], _OneOrMore()] = Field(
+        description="Lengths of an edge; at most the smaller side of each beam."
+    )
+    material: Annotated[list[MaterialName], _OneOrMore()] = Field(description="Materials, by name.")
+    load: Annotated[list[Load], _OneOrMore()] = Field(
+        description="Loads along x on the right end, spread evenly; the left end is clamped."
+    )
+    force: Annotated[dict[str, Force], _PerBeam()] = Field(
+        description="Magnitude of the force: one for all beams, or one for each. The load's name carries the sign. "
+        "A beam, material and load have the same force in all grids."
+    )
+    definition: Annotated[list[DefinitionName], _OneOrMore()] = Field(
+        description="Rules that give every spring its stiffness; `springtune definitions` explains them."
+    )
+    kinematics: Annotated[list[Kinematics], _OneOrMore()] = Field(
+        "nonlinear", validate_default=True, description="Whether springs keep their length law or their tangent at rest."
+    )
+    sensitivity: Flag = Field(
+        "true",
+        validate_default=True,
+        description="Whether each mesh, material, load and kinematics also gets a sensitivity curve. "
+        "Curves that `calibrated` needs are made in any case.",
+    )
+
+
+class StudyConfig(Section):
+    """A study."""
+
+    title: Text = Field(description="What the study is, in one line.")
+    beams: Annotated[dict[str, BeamConfig], _Named("beam")] = Field(description="Beams by name.")
+    materials: Annotated[dict[str, MaterialConfig], _Named("material")] = Field(description="Materials by name.")
+    definitions: DefinitionsConfig = Field(
+        default_factory=DefinitionsConfig, description="Parameters of the definitions that have any."
+    )
+    sensitivity: SensitivityConfig = Field(
+        default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
+    )
+    printed: Text | None = Field(
+        None, description="CSV file of printed values to compare with, its path relative to the study's folder."
+    )
+    grids: Annotated[dict[str, GridConfig], _Named("grid", for_files=False)] = Field(description="Grids by name.")
+
+
+SECTIONS = {
+    "": StudyConfig,
+    "beams.<name>": BeamConfig,
+    "materials.<name>": MaterialConfig,
+    "definitions": DefinitionsConfig,
+    "definitions.paper": PaperConfig,
+    "definitions.paper.stiffness[]": StatedStiffness,
+    "definitions.calibrated": CalibratedConfig,
+    "sensitivity": SensitivityConfig,
+    "grids.<name>": GridConfig,
+}
+"""Model of each section of a study, by its place."""
+
+
+def json_schema():
+    """JSON schema of a study, for editors."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | StudyConfig.model_json_schema()
+
+
+# -- from file to study ---------------------------------------------------------------------------------------------------
+
+
+def load_study(path):
+    """Read, validate and expand a study.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML file.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    StudyError
+        If anything is wrong with the file; nothing else is raised.
+    """
+    path, file = Path(path), str(path)
+    try:
+        text = path.read_bytes().decode()
+    except (OSError, ValueError) as error:
+        why = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
+        raise StudyError(f"{file}: cannot be read: {why}; give the path of a study such as config/paper.yaml") from None
+    if not _NAME.fullmatch(path.stem):
+        raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {_NAME_RULE}")
+    content, lines = _read_yaml(text, file)
+    problems = _Problems(file, lines)
+    config = _validate(content, problems)
+    _check_names(config, problems)
+    problems.stop()
+    _check_meshes(config, content, problems)
+    problems.stop()
+    grids = _expand(config, problems)
+    _check_definitions(config, grids, problems)
+    problems.stop()
+    printed_path = path.parent / config.printed if config.printed else None
+    return _study(config, grids, problems, {"name": path.stem, "path": path, "text": text, "printed_path": printed_path})
+
+
+def _validate(content, problems):
+    """Config of what a file holds."""
+    if content is None:
+        problems.add((), f"the file is empty; give the keys {', '.join(StudyConfig.model_fields)}")
+        problems.stop()
+    try:
+        return StudyConfig.model_validate(content)
+    except ValidationError as error:
+        for details in error.errors(include_url=False):
+            path, place = [], content
+            # pydantic's path has steps that the file has not: branches of a union, the item of a single value.
+            for step in details["loc"]:
+                if isinstance(place, dict) and step in place or isinstance(place, list) and isinstance(step, int):
+                    path.append(step)
+                    place = place[step]
+            own = details["type"] == "study"
+            path += [step for step in details["ctx"]["path"] if isinstance(place, list | dict)] if own else []
+            problems.add(path, details["msg"] if own else f"{_show(place)}: {details['msg']}; see config/README.md")
+        problems.stop()
+
+
+def _check_names(config, problems):
+    """Names that refer to what the study declares, and pairs of numbers."""
+
+    def known(path, what, name, names):
+        if name not in names:
+            problems.add(path, f"unknown {what} '{name}'; {_nearest(name, names)}; or declare it under {what}s")
+
+    for name, grid in config.grids.items():
+        for beam in grid.beam:
+            known(("grids", name, "beam"), "beam", beam, config.beams)
+        for material in grid.material:
+            known(("grids", name, "material"), "material", material, config.materials)
+        for beam in grid.force:
+            if beam is not None:
+                known(("grids", name, "force", beam), "beam", beam, config.beams)
+        if None not in grid.force:
+            for beam in grid.beam:
+                if beam not in grid.force:
+                    problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
+    calibrated, paper = config.definitions.calibrated, config.definitions.paper
+    if calibrated:
+        known(("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
+    seen = set()
+    for number, row in enumerate(paper.stiffness if paper else ()):
+        path = ("definitions", "paper", "stiffness", number)
+        known((*path, "material"), "material", row.material, config.materials)
+        if (row.mesh_type, row.material) in seen:
+            problems.add(path, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
+        seen.add((row.mesh_type, row.material))
+    if not config.sensitivity.start < config.sensitivity.stop:
+        start, stop = config.sensitivity.start, config.sensitivity.stop
+        problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
+
+
+def _check_meshes(config, content, problems):
+    """Mesh sizes against the beams they are for."""
+    for name, grid in config.grids.items():
+        written = content["grids"][name]["mesh_size"]
+        for number, size in enumerate(grid.mesh_size):
+            shown = f"'{written[number]}'" if isinstance(written, list) else f"'{written}'"
+            path = ("grids", name, "mesh_size", number) if isinstance(written, list) else ("grids", name, "mesh_size")
+            for beam in grid.beam:
+                length, height = config.beams[beam].length, config.beams[beam].height
+                if size > min(length, height):
+                    smaller = f"{1e3 * min(length, height):g} mm"
+                    problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {smaller}")
+                elif length * height / (COEFFICIENT * size**2) > MOST_PARTICLES:
+                    particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
+                    least = f"{1e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.1g} mm"
+                    problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
+
+
+def _ranks(config):
+    """Place of each label in the order of its dimension."""
+    names = {
+        "beam": config.beams,
+        "mesh_type": MESH_TYPES,
+        "material": config.materials,
+        "load": DIRECTION,
+        "definition": DEFINITIONS,
+        "kinematics": KINEMATICS,
+    }
+    return {dimension: {name: rank for rank, name in enumerate(labels)} for dimension, labels in names.items()}
+
+
+def _order(ranks):
+    """Sort key of meshes, scenes, curves and references."""
+
+    def key(item):
+        mesh = item if isinstance(item, MeshSpec) else getattr(item, "mesh", None)
+        beam = (mesh or item).beam
+        found = [ranks["beam"][beam.name]]
+        if mesh:
+            found += [ranks["mesh_type"][mesh.mesh_type], mesh.mesh_size]
+        if mesh is not item:
+            found += [ranks["material"][item.material.name], ranks["load"][item.load]]
+            for label in ("definition", "kinematics"):
+                if hasattr(item, label):
+                    found.append(ranks[label][getattr(item, label)])
+        return found
+
+    return key
+
+
+def _expand(config, problems):
+    """Grids with their scenes and curves, in canonical order."""
+    order = _order(_ranks(config))
+    beams = {name: Beam(name, beam.length, beam.height, beam.thickness) for name, beam in config.beams.items()}
+    materials = {
+        name: Material(name, material.young_modulus, material.poisson_ratio)
+        for name, material in config.materials.items()
+    }
+    forces, grids = {}, []
+    for name, grid in config.grids.items():
+        scenes, curves = [], []
+        for beam, material, load in product(grid.beam, grid.material, grid.load):
+            magnitude = grid.force[beam if beam in grid.force else None]
+            other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
+            if other != magnitude:
+                problems.add(
+                    ("grids", name, "force"),
+                    f"{magnitude:g} N on beam '{beam}' of {material} in {load}, but grid '{other_grid}' has {other:g} N; "
+                    "give both the same force, or the other one a study of its own",
+                )
+            force = DIRECTION[load] * magnitude
+            for mesh_type, size, kinematics in product(grid.mesh_type, grid.mesh_size, grid.kinematics):
+                common = (MeshSpec(beams[beam], mesh_type, size), materials[material], load, force)
+                scenes += [Scene(*common, definition, kinematics) for definition in grid.definition]
+                if grid.sensitivity:
+                    curves.append(Curve(*common, kinematics))
+        grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order))))
+    problems.stop()
+    return tuple(grids)
+
+
+def _check_definitions(config, grids, problems):
+    """Parameters of the definitions against what the grids need of them."""
+    stated = {(row.mesh_type, row.material): row.value for row in _stated(config)}
+    thicknesses = {}
+    for grid in grids:
+        lacking = set()
+        for scene in grid.scenes:
+            pair = (scene.mesh.mesh_type, scene.material.name)
+            if scene.definition == "paper":
+                thicknesses.setdefault(pair, {})[scene.mesh.beam.thickness] = None
+                if pair not in stated and pair not in lacking:
+                    lacking.add(pair)
+                    row = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
+                    problems.add(
+                        ("grids", grid.name, "definition"),
+                        f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; add {row} to definitions.paper.stiffness",
+                    )
+        if not config.definitions.calibrated and any(scene.definition == "calibrated" for scene in grid.scenes):
+            problems.add(
+                ("grids", grid.name, "definition"),
+                "'calibrated' needs to know on what; add definitions.calibrated with a beam and a load",
+            )
+    every = {beam.thickness: None for beam in config.beams.values()}
+    for number, row in enumerate(_stated(config)):
+        modulus = config.materials[row.material].young_modulus
+        for thickness in thicknesses.get((row.mesh_type, row.material), every):
+            expected = COEFFICIENT * modulus * thickness
+            if not expected / PLAUSIBLE <= row.value <= expected * PLAUSIBLE:
+                problems.add(
+                    ("definitions", "paper", "stiffness", number, "value"),
+                    f"{row.value:.4g} N/m cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick, "
+                    f"is {expected:.4g} N/m; give a stiffness near it, in N/m",
+                )
+                break
+
+
+def _stated(config):
+    return config.definitions.paper.stiffness if config.definitions.paper else []
+
+
+def _calibrating(config, scenes, problems):
+    """Curves that calibrate the scenes of the definition ``calibrated``."""
+    calibration = config.definitions.calibrated
+    if not calibration:
+        return []
+    cells = {
+        (scene.mesh, scene.material, scene.load, scene.force): None
+        for scene in scenes
+        if (scene.mesh.beam.name, scene.load) == (calibration.beam, calibration.load)
+    }
+    needed = {
+        (scene.mesh.mesh_type, scene.material, scene.kinematics): None
+        for scene in scenes
+        if scene.definition == "calibrated"
+    }
+    curves = []
+    for mesh_type, material, kinematics in needed:
+        found = [Curve(*cell, kinematics) for cell in cells if (cell[0].mesh_type, cell[1]) == (mesh_type, material)]
+        if not found:
+            problems.add(
+                ("definitions", "calibrated"),
+                f"no grid has beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name}, "
+                f"which calibrates {mesh_type} scenes of {material.name}; add it to a grid, or calibrate on another beam",
+            )
+        curves += found
+    return curves
+
+
+def _study(config, grids, problems, about):
+    """Study of a config and its grids."""
+    ranks = _ranks(config)
+    order = _order(ranks)
+
+    def in_order(items):
+        return tuple(sorted(dict.fromkeys(items), key=order))
+
+    scenes = in_order(scene for grid in grids for scene in grid.scenes)
+    curves = [curve for grid in grids for curve in grid.curves] + _calibrating(config, scenes, problems)
+    meshes = in_order(scene.mesh for scene in scenes)
+    references = in_order(Reference(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes)
+    _check_files(meshes, scenes, references, problems)
+    problems.stop()
+    used = {name: {getattr(scene, name) for scene in scenes} for name in ("load", "definition", "kinematics")}
+    used["beam"] = {mesh.beam.name for mesh in meshes}
+    used["mesh_type"] = {mesh.mesh_type for mesh in meshes}
+    used["material"] = {scene.material.name for scene in scenes}
+    axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}
+    axes["mesh_size"] = tuple(sorted({mesh.mesh_size for mesh in meshes}))
+    first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
+    steps = [first + (last - first) * step / (points - 1) for step in range(points)]
+    calibrated = config.definitions.calibrated
+    return Study(
+        title=config.title,
+        meshes=meshes,
+        scenes=scenes,
+        curves=in_order(curves),
+        references=references,
+        grids=grids,
+        stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
+        stiffness_table={(row.mesh_type, row.material): row.value for row in _stated(config)},
+        calibration=(calibrated.beam, calibrated.load) if calibrated else None,
+        printed=_read_printed(about["printed_path"], problems) if about["printed_path"] else (),
+        axes=axes,
+        **about,
+    )
+
+
+def _check_files(meshes, scenes, references, problems):
+    """Different things must not share a name: names become files."""
+    parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
+    pairs = {(reference.beam.name, reference.material.name) for reference in references}
+    sizes = {mesh.mesh_size for mesh in meshes}
+    for path, what, names, remedy in (
+        (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
+        (("beams",), "meshes", [mesh.name for mesh in meshes], "rename a beam"),
+        (("materials",), "materials", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
+        (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
+    ):
+        name, count = Counter(name.casefold() for name in names).most_common(1)[0]
+        if count > 1:
+            problems.add(path, f"{count} different {what} are all named '{name}'; {remedy}")
+            return
+
+
+# -- printed values -------------------------------------------------------------------------------------------------------
+
+_PRINTED_COLUMNS = {
+    # column: field and unit of PrintedCell; without unit, a text
+    "table": ("table", ""),
+    "beam": ("beam", None),
+    "mesh_type": ("mesh_type", None),
+    "mesh_size_mm": ("mesh_size", "1e-3"),
+    "material": ("material", None),
+    "load": ("load", None),
+    "force_N": ("force", "1"),
+    "stiffness_N_per_m": ("stiffness", "1"),
+    "reference_displacement_mm": ("reference_displacement", "1e-3"),
+    "displacement_mm": ("displacement", "1e-3"),
+    "deformation_error_percent": ("deformation_error", "1e-2"),
+    "remark": ("remark", None),
+}
+
+
+def _read_printed(path, problems):
+    """Cells of a CSV file of printed values; lines that begin with # are comments."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
+        problems.add(("printed",), f"'{path}' cannot be read: {why}; give the path of a CSV file, or remove the key")
+        problems.stop()
+    file_problems = _Problems(str(path))
+    # Empty lines in place of comments, so that the reader's line numbers are the file's.
+    rows = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
+    cells, header = {}, None
+    try:
+        for row in rows:
+            if row and header is None:
+                header = row
+                if sorted(header) != sorted(_PRINTED_COLUMNS):
+                    wanted = ",".join(_PRINTED_COLUMNS)
+                    file_problems.add((), f"has columns {','.join(header)}; give {wanted}", rows.line_num)
+                    break
+            elif row:
+                cell = _printed_cell(header, row, rows.line_num, file_problems)
+                if cell:
+                    label = (cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load)
+                    first = cells.setdefault(label, (rows.line_num, cell))[0]
+                    if first != rows.line_num:
+                        file_problems.add((), f"is the cell of line {first} again; remove one", rows.line_num)
+    except csv.Error as error:
+        file_problems.add((), f"not CSV: {error}; correct or remove the line", rows.line_num)
+    if not cells:
+        file_problems.add((), f"no printed values; give a line {','.join(_PRINTED_COLUMNS)} and a line for each cell")
+    file_problems.stop()
+    return tuple(cell for _, cell in cells.values())
+
+
+def _printed_cell(header, row, line, problems):
+    if len(row) != len(header):
+        problems.add((), f"{len(row)} values for {len(header)} columns; add or remove some", line)
+        return None
+    values = {}
+    for column, text in zip(header, row):
+        field, size = _PRINTED_COLUMNS[column]
+        known = {"mesh_type": MESH_TYPES, "load": DIRECTION}.get(field)
+        if size is None:
+            values[field] = text
+            if known and text not in known:
+                problems.add((column,), f"unknown {field.replace('_', ' ')} '{text}'; {_nearest(text, known)}", line)
+                return None
+            continue
+        try:
+            values[field] = int(text) if field == "table" else float(Decimal(text) * Decimal(size))
+            if not math.isfinite(values[field]) or values[field] < 0:
+                raise ValueError
+        except (ValueError, ArithmeticError):
+            problems.add((column,), f"'{text}' is not a number of 0 or more; give the printed one, unsigned", line)
+            return None
+    return PrintedCell(**values)

@@ -1,0 +1,65 @@
+"""The store of results and the digest of code."""
+
+import h5py
+import numpy as np
+import pytest
+
+from springtune.stages import code, files, store
+
+
+def test_results_come_back_as_they_went(tmp_path):
+    path = tmp_path / "a" / "results.h5"
+    result = {"displacement": 1.25e-3, "message": "µ", "iterations": 3, "field": np.arange(6.0).reshape(3, 2)}
+    store.add(path, {"one": result})
+    back = store.read(path, ["one"], ["field"])["one"]
+    assert {name: back[name] for name in ("displacement", "message", "iterations")} == {
+        name: result[name] for name in ("displacement", "message", "iterations")
+    }
+    assert (back["field"] == result["field"]).all()
+    assert "field" not in store.read(path, ["one"])["one"]
+
+
+def test_adding_keeps_what_was_there_and_leaves_nothing_half_written(tmp_path):
+    path = tmp_path / "results.h5"
+    store.add(path, {"one": {"value": 1.0}})
+    store.add(path, {"two": {"value": 2.0}})
+    assert store.stored(path) == {"one", "two"}
+    before = path.read_bytes()
+    with pytest.raises(TypeError):
+        store.add(path, {"three": {"value": object()}})
+    assert path.read_bytes() == before
+    store.add(path, {})
+    assert path.read_bytes() == before
+
+
+def test_broken_file_holds_nothing_and_is_replaced(tmp_path):
+    path = tmp_path / "results.h5"
+    path.write_text("not HDF5")
+    assert store.stored(path) == set()
+    store.add(path, {"one": {"value": 1.0}})
+    assert store.stored(path) == {"one"}
+    assert h5py.is_hdf5(path)
+
+
+def test_keys_depend_on_values_not_on_their_order():
+    assert files.key({"a": 1.0, "b": [2]}) == files.key({"b": [2], "a": 1.0})
+    assert files.key({"a": 1.0}) != files.key({"a": 1.0000000000000002})
+
+
+def test_stages_depend_on_what_they_import_and_on_nothing_else():
+    names = {stage: {path.rpartition("springtune/")[2] for path in code.modules(stage)} for stage in ("solve", "mesh")}
+    assert {"network.py", "statics.py", "springs/lattice.py", "mesh/free.py", "stages/store.py"} <= names["solve"]
+    for outside in ("figures/style.py", "dataset.py", "study.py", "reference/small_strain.py", "compare.py"):
+        assert outside not in names["solve"]
+    assert "statics.py" not in names["mesh"]
+
+
+@pytest.mark.parametrize("stage", ["mesh", "sensitivity", "solve", "reference"])
+def test_physics_imports_no_workflow_dataset_or_plots(stage):
+    """A job of these pays for numpy, scipy.sparse, h5py and its own libraries only."""
+    import subprocess
+    import sys
+
+    program = f"import sys, springtune.stages.{stage}; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"snakemake", "xarray", "matplotlib", "pandas", "pydantic", "pint"} & set(loaded)
