@@ -19,6 +19,9 @@ rule all:
     message:
         f"The study is in {RESULTS}: dataset.nc, figures, tables/index.html"
     input:
+        # Stages before the dataset, too: what they store is made again where it is missing.
+        rules.reference.output,
+        expand(RESULTS / "done/{stage}_{bundle}.json", stage=["mesh", "sensitivity", "solve"], bundle=BUNDLES),
         rules.collect.output,
         rules.figures_all.input,
         rules.tables.output,

@@ -1,7 +1,7 @@
 """Studies: what a config file asks for, validated, named, free of duplicates and in a canonical order.
 
-`load_study` reads a YAML file. `StudyConfig` and the models it is made of say what the file may hold; the JSON schema for
-editors and the tables of config/README.md are generated from them (`springtune schema --write`).
+`load_study` reads a YAML file. `StudyConfig` and the models it is made of say what the file may hold; the JSON schema
+for editors and the tables of config/README.md are generated from them (`springtune schema --write`).
 """
 
 import csv
@@ -13,7 +13,7 @@ from decimal import Decimal
 from difflib import get_close_matches
 from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -47,7 +47,7 @@ class StudyError(ValueError):
     """A study that cannot be run; the message names file, line, key, value and remedy."""
 
 
-# -- what is asked --------------------------------------------------------------------------------------------------------
+# -- what is asked -----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ class Study:
     axes: dict
 
 
-# -- problems -------------------------------------------------------------------------------------------------------------
+# -- problems ----------------------------------------------------------------------------------------------------------
 
 
 class _Problems:
@@ -291,7 +291,7 @@ def _nearest(word, words):
     return f"{hint}known: {', '.join(words)}"
 
 
-# -- YAML with line numbers -----------------------------------------------------------------------------------------------
+# -- YAML with line numbers --------------------------------------------------------------------------------------------
 
 
 def _read_yaml(text, file):
@@ -345,7 +345,7 @@ def _content(node, path, lines, file):
     return merged | content
 
 
-# -- what a file may hold -------------------------------------------------------------------------------------------------
+# -- what a file may hold ----------------------------------------------------------------------------------------------
 
 
 class _Scalar:
@@ -439,8 +439,6 @@ MaterialName = Annotated[str, _Scalar(str, {"type": "string"}, "the name of a ma
 class _OneOrMore:
     """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
 
-    words = "or a list"
-
     def __get_pydantic_core_schema__(self, source, handler):
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
@@ -472,9 +470,7 @@ class _PerBeam:
         each = core_schema.no_info_wrap_validator_function(self._read_each, handler(source))
         choices = {"single": core_schema.no_info_after_validator_function(lambda force: {None: force}, single)}
         choices["each"] = each
-        return core_schema.tagged_union_schema(
-            choices, lambda value: "each" if isinstance(value, dict) else "single"
-        )
+        return core_schema.tagged_union_schema(choices, lambda value: "each" if isinstance(value, dict) else "single")
 
     def __get_pydantic_json_schema__(self, schema, handler):
         each = handler(schema["choices"]["each"]["schema"])
@@ -492,7 +488,7 @@ class _Named:
 
     def __init__(self, what, for_files=True):
         self.what, self.for_files = what, for_files
-        self.words = f"a mapping from the name of each {what} to its keys"
+        self.words = f"the name of each {what}, and under it a section, see below"
 
     def __get_pydantic_core_schema__(self, source, handler):
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
@@ -513,9 +509,22 @@ class _Named:
                 raise _refuse(f"'{name}' cannot name a {self.what}; {_NAME_RULE}", name)
             other = seen.setdefault(name.casefold(), name)
             if other != name:
-                message = f"'{name}' and '{other}' differ in case only and would share files on some systems; rename one"
+                message = f"'{name}' and '{other}' differ in case only, which file systems may ignore; rename one"
                 raise _refuse(message, name)
         return handler(value)
+
+
+def expected_value(field):
+    """Words for what a field of a section expects, e.g. ``a length such as '200 mm'``."""
+    for note in field.metadata:
+        if isinstance(note, _OneOrMore):
+            item = get_args(field.annotation)[0]
+            return f"{get_args(item)[1].words}, or a list"
+        if hasattr(note, "words"):
+            return note.words
+    listed = get_origin(field.annotation) is list
+    text = next((note.words for part in get_args(field.annotation) for note in get_args(part)[1:]), None)
+    return text or ("a list of sections, see below" if listed else "a section, see below")
 
 
 class Section(BaseModel):
@@ -535,7 +544,7 @@ class Section(BaseModel):
         given = {key: content for key, content in value.items() if content is not None}
         for name, field in names.items():
             if field.is_required() and name not in given:
-                raise _refuse(f"'{name}' is missing; give it: {field.description}", name)
+                raise _refuse(f"'{name}' is missing; give {expected_value(field)}", name)
         return given
 
 
@@ -551,7 +560,9 @@ class MaterialConfig(Section):
     """An isotropic, linearly elastic material."""
 
     young_modulus: Stress = Field(description="Young's modulus E.")
-    poisson_ratio: PoissonRatio = Field(description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress.")
+    poisson_ratio: PoissonRatio = Field(
+        description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress."
+    )
 
 
 class StatedStiffness(Section):
@@ -560,7 +571,7 @@ class StatedStiffness(Section):
     mesh_type: MeshType = Field(description="Mesh type that it is for.")
     material: MaterialName = Field(description="Material that it is for.")
     value: Stiffness = Field(
-        description=f"Stiffness of every spring; within a factor of {PLAUSIBLE:g} of sqrt(3)/2 E t, or it is taken for an error."
+        description=f"Stiffness of every spring; refused if farther than a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
     )
 
 
@@ -577,7 +588,7 @@ class PaperConfig(Section):
         rows = value.get("stiffness") if isinstance(value, dict) else None
         if rows is not None and (not isinstance(rows, list) or not rows):
             example = "- {mesh_type: structured, material: steel, value: 170e6 N/m}"
-            raise _refuse(f"{_show(rows)} instead of a list of stiffnesses; give entries such as {example}", "stiffness")
+            raise _refuse(f"{_show(rows)} instead of a list; give entries such as {example}", "stiffness")
         return value
 
 
@@ -595,7 +606,7 @@ class CalibratedConfig(Section):
 class DefinitionsConfig(Section):
     """Parameters of those definitions that have any; `springtune definitions` lists all definitions."""
 
-    paper: PaperConfig | None = Field(None, description="Table of stated stiffnesses; needed where a grid uses `paper`.")
+    paper: PaperConfig | None = Field(None, description="Table of stiffnesses; needed where a grid uses `paper`.")
     calibrated: CalibratedConfig | None = Field(
         None, description="Where the stiffness is calibrated; needed where a grid uses `calibrated`."
     )
@@ -617,7 +628,8 @@ class GridConfig(Section):
 
     beam: Annotated[list[BeamName], _OneOrMore()] = Field(description="Beams, by name.")
     mesh_type: Annotated[list[MeshType], _OneOrMore()] = Field(
-        description="`structured`: equilateral rows fitted to the box; `free`: Delaunay inside an outline of imposed edge size."
+        description="`structured`: equilateral rows fitted to the box; "
+        "`free`: Delaunay inside an outline of imposed edge size."
     )
     mesh_size: Annotated[list[Length], _OneOrMore()] = Field(
         description="Lengths of an edge; at most the smaller side of each beam."
@@ -634,7 +646,9 @@ class GridConfig(Section):
         description="Rules that give every spring its stiffness; `springtune definitions` explains them."
     )
     kinematics: Annotated[list[Kinematics], _OneOrMore()] = Field(
-        "nonlinear", validate_default=True, description="Whether springs keep their length law or their tangent at rest."
+        "nonlinear",
+        validate_default=True,
+        description="Whether springs keep their length law or their tangent at rest.",
     )
     sensitivity: Flag = Field(
         "true",
@@ -681,7 +695,7 @@ def json_schema():
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | StudyConfig.model_json_schema()
 
 
-# -- from file to study ---------------------------------------------------------------------------------------------------
+# -- from file to study ------------------------------------------------------------------------------------------------
 
 
 def load_study(path):
@@ -717,10 +731,11 @@ def load_study(path):
     _check_meshes(config, content, problems)
     problems.stop()
     grids = _expand(config, problems)
-    _check_definitions(config, grids, problems)
+    _check_definitions(config, content, grids, problems)
     problems.stop()
     printed_path = path.parent / config.printed if config.printed else None
-    return _study(config, grids, problems, {"name": path.stem, "path": path, "text": text, "printed_path": printed_path})
+    about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path}
+    return _study(config, grids, problems, about)
 
 
 def _validate(content, problems):
@@ -788,11 +803,11 @@ def _check_meshes(config, content, problems):
             for beam in grid.beam:
                 length, height = config.beams[beam].length, config.beams[beam].height
                 if size > min(length, height):
-                    smaller = f"{1e3 * min(length, height):g} mm"
-                    problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {smaller}")
+                    side = f"{1e3 * min(length, height):g} mm"
+                    problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
                 elif length * height / (COEFFICIENT * size**2) > MOST_PARTICLES:
                     particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
-                    least = f"{1e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.1g} mm"
+                    least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.2g} mm"
                     problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
 
 
@@ -845,8 +860,8 @@ def _expand(config, problems):
             if other != magnitude:
                 problems.add(
                     ("grids", name, "force"),
-                    f"{magnitude:g} N on beam '{beam}' of {material} in {load}, but grid '{other_grid}' has {other:g} N; "
-                    "give both the same force, or the other one a study of its own",
+                    f"{magnitude:g} N on beam '{beam}' of {material} in {load}, but grid '{other_grid}' has "
+                    f"{other:g} N; give both the same force, or the other one a study of its own",
                 )
             force = DIRECTION[load] * magnitude
             for mesh_type, size, kinematics in product(grid.mesh_type, grid.mesh_size, grid.kinematics):
@@ -859,7 +874,7 @@ def _expand(config, problems):
     return tuple(grids)
 
 
-def _check_definitions(config, grids, problems):
+def _check_definitions(config, content, grids, problems):
     """Parameters of the definitions against what the grids need of them."""
     stated = {(row.mesh_type, row.material): row.value for row in _stated(config)}
     thicknesses = {}
@@ -874,7 +889,8 @@ def _check_definitions(config, grids, problems):
                     row = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
                     problems.add(
                         ("grids", grid.name, "definition"),
-                        f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; add {row} to definitions.paper.stiffness",
+                        f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; "
+                        f"add {row} to definitions.paper.stiffness",
                     )
         if not config.definitions.calibrated and any(scene.definition == "calibrated" for scene in grid.scenes):
             problems.add(
@@ -887,10 +903,11 @@ def _check_definitions(config, grids, problems):
         for thickness in thicknesses.get((row.mesh_type, row.material), every):
             expected = COEFFICIENT * modulus * thickness
             if not expected / PLAUSIBLE <= row.value <= expected * PLAUSIBLE:
+                written = content["definitions"]["paper"]["stiffness"][number]["value"]
                 problems.add(
                     ("definitions", "paper", "stiffness", number, "value"),
-                    f"{row.value:.4g} N/m cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick, "
-                    f"is {expected:.4g} N/m; give a stiffness near it, in N/m",
+                    f"'{written}' cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick, is "
+                    f"{expected:.4g} N/m; give a stiffness near that, in N/m",
                 )
                 break
 
@@ -920,8 +937,8 @@ def _calibrating(config, scenes, problems):
         if not found:
             problems.add(
                 ("definitions", "calibrated"),
-                f"no grid has beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name}, "
-                f"which calibrates {mesh_type} scenes of {material.name}; add it to a grid, or calibrate on another beam",
+                f"no grid has beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name}"
+                ", but scenes there are 'calibrated'; add it to a grid, or calibrate on another beam or load",
             )
         curves += found
     return curves
@@ -983,7 +1000,7 @@ def _check_files(meshes, scenes, references, problems):
             return
 
 
-# -- printed values -------------------------------------------------------------------------------------------------------
+# -- printed values ----------------------------------------------------------------------------------------------------
 
 _PRINTED_COLUMNS = {
     # column: field and unit of PrintedCell; without unit, a text

@@ -1,7 +1,7 @@
 """Quantities with units: "200 mm" to 0.2, "210 GPa" to 210e9.
 
-Units that studies usually use stand in a table here; all others are pint's. A test holds the table to pint, whose import
-and registry would cost every start of a workflow half a second.
+Units that studies usually use stand in a table here; all others are pint's. A test holds the table to pint, whose
+import and registry would cost every start of a workflow a third of a second.
 """
 
 import re

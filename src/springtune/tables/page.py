@@ -35,11 +35,8 @@ def write(tree, folder):
         loader=jinja2.PackageLoader("springtune", "tables"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     page = environment.get_template("page.html")
-    definitions = [str(name) for name in root.definition.values]
     kinematics = [str(name) for name in root.kinematics.values]
-    written["index.html"] = page.render(
-        tables=tables, definitions=definitions, kinematics=kinematics, attributes=tree.attrs, missing=np.nan
-    )
+    written["index.html"] = page.render(tables=tables, kinematics=kinematics, attributes=tree.attrs, missing=np.nan)
     Path(folder).mkdir(parents=True, exist_ok=True)
     for name, text in written.items():
         unfinished = Path(folder) / f"{name}.unfinished"
@@ -63,7 +60,9 @@ def _table(cells, selection):
             cell = cells.sel(beam=beam, mesh_size=size)
             if (cell.status != 0).any():
                 rows.append(_row(cell, str(beam), float(size)))
-    return {"number": number, "stem": stem(selection, number), "rows": rows, **selection}
+    asked = (cells.status != 0).any([dimension for dimension in cells.status.dims if dimension != "definition"])
+    definitions = [str(name) for name in cells.definition.values[asked.values]]
+    return {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions, **selection}
 
 
 def _row(cell, beam, size):

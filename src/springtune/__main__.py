@@ -1,0 +1,5 @@
+"""``python -m springtune``."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,56 @@
+"""A study run through Snakemake in a folder of its own."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+@dataclass
+class Run:
+    """Where a study runs, and how."""
+
+    folder: Path
+
+    def snakemake(self, config, *arguments):
+        """Exit code and output of a run of the repository's workflow in this folder."""
+        command = [
+            sys.executable,
+            "-m",
+            "snakemake",
+            "--snakefile",
+            REPOSITORY / "Snakefile",
+            "--directory",
+            self.folder,
+        ]
+        command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default", "--cores", "2"]
+        command += ["--configfile", self.folder / config, *arguments]
+        done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True, timeout=300)
+        return done.returncode, done.stdout + done.stderr
+
+    def write(self, name, text):
+        """Write a study."""
+        (self.folder / name).write_text(text)
+
+    def times(self, pattern):
+        """Time of the last change of each file."""
+        return {path.name: path.stat().st_mtime_ns for path in self.folder.glob(pattern)}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """An empty folder to run studies in, with the printed values beside them."""
+    folder = tmp_path_factory.mktemp("run")
+    shutil.copy(REPOSITORY / "config/paper_tables.csv", folder)
+    return Run(folder)
+
+
+@pytest.fixture(scope="session")
+def repository():
+    """The repository's folder."""
+    return REPOSITORY

@@ -1,0 +1,150 @@
+"""The quick study, end to end: the dataset's contract, and what the README says of it."""
+
+import csv
+import json
+import re
+import shutil
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+
+
+@pytest.fixture(scope="module")
+def tree(run, repository):
+    shutil.copy(repository / "config/quick.yaml", run.folder)
+    code, output = run.snakemake("quick.yaml")
+    assert code == 0, output
+    with xr.open_datatree(run.folder / "results/quick/dataset.nc", engine="h5netcdf") as opened:
+        yield opened.load()
+
+
+def test_root_has_the_names_of_the_contract(tree):
+    root = tree.to_dataset()
+    for name in ("displacement", "deformation_error", "stiffness", "status", "message", "solve_seconds", "iterations",
+                 "residual"):  # fmt: skip
+        assert root[name].dims == SCENE, name
+    for name in ("reference_displacement", "force"):
+        assert root[name].dims == ("beam", "material", "load"), name
+    for name in ("reference_error_estimate", "particles", "springs", "paper_displacement", "paper_deformation_error",
+                 "paper_reference_displacement", "minimum_angle", "edge_length_spread"):  # fmt: skip
+        assert name in root
+    assert root.mesh_size.values.tolist() == [2e-3, 5e-3]
+    assert root.status.attrs["flag_meanings"] == "not_requested solved linear_only not_converged unstable failed"
+    assert list(root.status.attrs["flag_values"]) == [0, 1, 2, 3, 4, 5]
+
+
+def test_every_variable_has_units_and_a_long_name(tree):
+    for group in tree.subtree:
+        for name, variable in group.to_dataset(inherit=False).variables.items():
+            assert variable.attrs.get("units") and variable.attrs.get("long_name"), f"{group.path}/{name}"
+
+
+def test_root_attributes_tell_where_the_data_come_from(tree, run):
+    for name in ("title", "Conventions", "study", "config", "springtune_version", "git_commit", "created", "software",
+                 "host"):  # fmt: skip
+        assert name in tree.attrs
+    assert tree.attrs["study"] == "quick"
+    assert tree.attrs["config"] == (run.folder / "quick.yaml").read_text()
+    assert "scipy" in json.loads(tree.attrs["software"])
+
+
+def test_what_was_asked_for_is_solved_and_nothing_else(tree):
+    root = tree.to_dataset()
+    meanings = np.array(root.status.attrs["flag_meanings"].split())[root.status.values]
+    assert set(np.unique(meanings)) == {"not_requested", "solved"}
+    assert (root.displacement.notnull() == (root.status == 1)).all()
+    assert int((root.status == 1).sum()) == 24 + 2 + 6
+    assert (root.residual.where(root.status == 1, 0) <= 1e-10).all()
+    assert (root.reference_error_estimate.max() <= 1e-4).all()
+
+
+def test_deformation_error_follows_its_formula(tree):
+    root = tree.to_dataset()
+    expected = (root.displacement - root.reference_displacement) / abs(root.reference_displacement)
+    xr.testing.assert_allclose(root.deformation_error, expected.transpose(*SCENE), rtol=1e-12)
+
+
+def test_uniform_scenes_lie_on_their_sensitivity_curve(tree):
+    """The same mechanics by two ways: a cell's own solve, and the curve at its stiffness."""
+    root, curves = tree.to_dataset(), tree["sensitivity"].to_dataset()
+    place = {"beam": "100x20", "mesh_type": "free", "mesh_size": 2e-3, "material": "steel", "load": "traction"}
+    place["kinematics"] = "nonlinear"
+    curve = curves.sel(place)
+    on_curve = np.interp(1 / 185e6, 1 / curve.stiffness.values[::-1], curve.displacement.values[::-1])
+    # Linear interpolation between 61 points in 1/k; the curve is nearly straight there.
+    assert float(root.displacement.sel(place | {"definition": "paper"})) == pytest.approx(on_curve, rel=1e-5)
+
+
+def test_calibrated_is_the_mean_best_stiffness(tree):
+    root, curves = tree.to_dataset(), tree["sensitivity"].to_dataset()
+    place = {
+        "mesh_type": "structured",
+        "material": "steel",
+        "load": "traction",
+        "kinematics": "nonlinear",
+        "beam": "100x20",
+    }
+    best = curves.best_stiffness.sel(place)
+    assert best.sizes == {"mesh_size": 2}
+    stiffness = root.stiffness.sel(place | {"definition": "calibrated"})
+    assert stiffness.values == pytest.approx(best.mean().item(), rel=1e-12)
+    assert np.isnan(root.stiffness.sel(place | {"definition": "lattice"})).all()
+
+
+def test_sensitivity_spans_the_asked_range(tree):
+    curves = tree["sensitivity"].to_dataset()
+    ratio = curves.stiffness_ratio.values / (np.sqrt(3) / 2)
+    assert len(ratio) >= 61 and ratio[0] == pytest.approx(0.4) and ratio[-1] == pytest.approx(1.6)
+    assert curves.best_stiffness.notnull().any() and curves.predicted_stiffness.notnull().any()
+
+
+def test_meshes_open_in_meshio(run, tree):
+    path = run.folder / "results/quick/meshes/100x20_structured_5mm.vtu"
+    mesh = meshio.read(path)
+    assert [block.type for block in mesh.cells] == ["triangle"]
+    assert mesh.points[:, 0].max() == pytest.approx(0.1)
+    counted = tree.particles.sel(beam="100x20", mesh_type="structured", mesh_size=5e-3)
+    assert int(counted) == len(mesh.points)
+
+
+def test_tables_and_figures_are_there(run, tree):
+    results = run.folder / "results/quick"
+    rows = list(csv.DictReader((results / "tables/table_1.csv").read_text().splitlines()))
+    assert [row["mesh_size_mm"] for row in rows] == ["2", "5"]
+    assert float(rows[0]["printed_displacement_mm"]) == 0.44
+    page = (results / "tables/index.html").read_text()
+    assert "Table 1" in page and "20 kN fits" in page
+    for stem in ("sensitivity_100x20_free_steel_traction", "size_structured_rubber_traction",
+                 "deformed_structured_steel_compression"):  # fmt: skip
+        for ending in ("png", "pdf"):
+            assert (results / f"figures/{stem}.{ending}").stat().st_size > 5000
+
+
+def test_readme_snippet_runs(run, tree, repository, monkeypatch):
+    snippet = re.search(r"```python\n(.*?)```", (repository / "README.md").read_text(), re.DOTALL).group(1)
+    monkeypatch.chdir(run.folder)
+    exec(snippet.replace("results/paper", "results/quick").replace('"200x30"', '"100x20"'), {})
+
+
+def test_second_run_has_nothing_to_do(run, tree):
+    code, output = run.snakemake("quick.yaml")
+    assert code == 0 and "Nothing to be done" in output
+
+
+def test_numbers_do_not_depend_on_the_number_of_cores(run, tree, repository, tmp_path):
+    """One core bundles and orders scenes in another way."""
+    from conftest import Run
+
+    other = Run(tmp_path)
+    shutil.copy(repository / "config/paper_tables.csv", tmp_path)
+    shutil.copy(repository / "config/quick.yaml", tmp_path)
+    code, output = other.snakemake("quick.yaml", "--cores", "1", "--until", "collect")
+    assert code == 0, output
+    with xr.open_datatree(tmp_path / "results/quick/dataset.nc", engine="h5netcdf") as again:
+        for name in ("displacement", "stiffness", "iterations", "residual", "reference_displacement"):
+            assert again[name].identical(tree[name]) or np.array_equal(again[name], tree[name], equal_nan=True), name
+        assert np.array_equal(again["sensitivity"].displacement, tree["sensitivity"].displacement, equal_nan=True)

@@ -1,0 +1,105 @@
+"""What runs again when a study or a file changes, and what a study that cannot be solved leaves behind."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+STUDY = """
+title: Reruns
+beams: {{small: {{length: 50 mm, height: 20 mm}}}}
+materials: {{steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}}}
+definitions:
+  paper: {{stiffness: [{{mesh_type: structured, material: steel, value: 170e6 N/m}}]}}
+grids:
+  one:
+    beam: small
+    mesh_type: structured
+    mesh_size: [{sizes}]
+    material: steel
+    load: {load}
+    force: {force}
+    definition: [paper, lattice]
+"""
+
+
+def study(sizes="10 mm, 5 mm", load="traction", force="20 kN"):
+    return STUDY.format(sizes=sizes, load=load, force=force)
+
+
+def dataset(run, name):
+    with xr.open_datatree(run.folder / f"results/{name}/dataset.nc", engine="h5netcdf") as tree:
+        return tree.load()
+
+
+def test_only_what_is_new_is_computed(run):
+    run.write("grow.yaml", study())
+    code, output = run.snakemake("grow.yaml", "--until", "collect")
+    assert code == 0, output
+    stored = "results/grow/[mcs]*s/*_*mm.*"
+    before = run.times(stored)
+    assert len(before) == 2 * 4  # mesh and notes, curves, solutions
+
+    run.write("grow.yaml", study("10 mm, 5 mm, 4 mm"))
+    code, output = run.snakemake("grow.yaml", "--until", "collect")
+    assert code == 0, output
+    after = run.times(stored)
+    assert {name: after[name] for name in before} == before
+    assert sorted(set(after) - set(before)) == [
+        f"small_structured_4mm.{ending}" for ending in ("h5", "json", "vtu")
+    ] or (len(after) == 3 * 4)
+    assert dataset(run, "grow").mesh_size.values.tolist() == [4e-3, 5e-3, 10e-3]
+
+    # Back to the old grid: nothing is solved, and the removed size is gone from the dataset.
+    run.write("grow.yaml", study())
+    code, output = run.snakemake("grow.yaml", "--until", "collect")
+    assert code == 0, output
+    assert run.times(stored) == after
+    assert dataset(run, "grow").mesh_size.values.tolist() == [5e-3, 10e-3]
+
+
+def test_a_deleted_result_is_made_again(run):
+    run.write("lost.yaml", study("10 mm"))
+    assert run.snakemake("lost.yaml")[0] == 0
+    lost = run.folder / "results/lost/meshes/small_structured_10mm.vtu"
+    lost.unlink()
+    code, output = run.snakemake("lost.yaml")
+    assert code == 0, output
+    assert lost.exists()
+
+
+def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
+    run.write("heavy.yaml", study("5 mm", "compression", "100 MN"))
+    code, output = run.snakemake("heavy.yaml")
+    assert code == 0, output
+    root = dataset(run, "heavy").to_dataset()
+    assert (root.status == 3).all() and root.displacement.isnull().all() and root.deformation_error.isnull().all()
+    assert (root.residual > 1e-10).all()
+    assert all("last residual" in message for message in root.message.values.ravel())
+    assert np.isfinite(root.reference_displacement).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("beam: small", "beem: small"), ["beem", "beam"]),
+        (("170e6 N/m", "170e6 N/mm"), ["170e6 N/mm", "N/m"]),
+        (("50 mm", "-50 mm"), ["length", "-50 mm"]),
+        (("20 kN", "20 mm"), ["force", "20 mm"]),
+        (("mesh_size: [5 mm]", "mesh_size: [50 mm]"), ["mesh_size", "50 mm"]),
+        (("mesh_size: [5 mm]", "mesh_size: []"), ["mesh_size"]),
+        (("mesh_type: structured\n    mesh", "mesh_type: hexagonal\n    mesh"), ["hexagonal", "structured"]),
+    ],
+    ids=["misspelt key", "stiffness 1000 times too large", "negative", "dimension", "mesh size", "empty", "mesh type"],
+)
+def test_bad_input_is_one_message_and_nothing_written(run, change, words):
+    text = study("5 mm")
+    assert change[0] in text
+    run.write("bad.yaml", text.replace(*change))
+    code, output = run.snakemake("bad.yaml")
+    assert code == 1
+    message = [line for line in output.splitlines() if "bad.yaml" in line]
+    assert message, output
+    for word in words:
+        assert word in output
+    assert "Traceback" not in output
+    assert not (run.folder / "results/bad").exists()
