@@ -3,7 +3,6 @@
 import inspect
 import json
 import os
-import re
 from pathlib import Path
 
 import click
@@ -63,7 +62,7 @@ def schema(write, folder):
         os.replace(unfinished, folder / name)
 
 
-# -- scenes --------------------------------------------------------------------------------------------------------------
+# -- scenes ------------------------------------------------------------------------------------------------------------
 
 
 def summary(study):
@@ -147,7 +146,7 @@ def _table(rows, left, right=()):
     return "\n".join(lines)
 
 
-# -- schema and manual ---------------------------------------------------------------------------------------------------
+# -- schema and manual -------------------------------------------------------------------------------------------------
 
 
 def schema_text():
@@ -186,12 +185,9 @@ def _key_tables():
 
     parts = []
     for place, model in SECTIONS.items():
-        title = f"### `{place}`" if place else "### The file"
-        lines = [
-            f"\n{title}\n",
-            re.sub(r"\n(?!\n)", " ", inspect.getdoc(model).replace("\n\n", "\n\n\n")).replace("\n ", "\n\n"),
-        ]
-        parts.append("\n".join([*lines, "", "| key | value | default | meaning |", "|---|---|---|---|"]))
+        paragraphs = [" ".join(paragraph.split()) for paragraph in inspect.getdoc(model).split("\n\n")]
+        parts += ["", f"### `{place}`" if place else "### The file", "", "\n\n".join(paragraphs), ""]
+        parts += ["| key | value | default | meaning |", "|---|---|---|---|"]
         for name, field in model.model_fields.items():
             parts.append(_key_row(field.alias or name, field))
     return "\n".join(parts) + "\n\n"

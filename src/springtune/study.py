@@ -406,8 +406,7 @@ def _one_of(what, names):
             raise _refuse(f"unknown {what} '{value}'; {_nearest(value, names)}")
         return value
 
-    words = f"a {what} ({' or '.join(names)})" if len(names) < 3 else f"a {what} ({', '.join(names)})"
-    return Annotated[str, _Scalar(read, {"enum": names}, words)]
+    return Annotated[str, _Scalar(read, {"enum": names}, " or ".join(f"'{name}'" for name in names))]
 
 
 def _read_flag(value):
@@ -424,7 +423,7 @@ Force = _quantity("force", "the load's name carries the sign: give a magnitude")
 Stiffness = _quantity("stiffness")
 Stress = _quantity("stress")
 PoissonRatio = _number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
-Ratio = _number("a number above 0, such as 0.4", 0, math.inf, above=True)
+Ratio = _number("a number above 0", 0, math.inf, above=True)
 Points = _number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
 MeshType = _one_of("mesh type", MESH_TYPES)
 Load = _one_of("load", DIRECTION)
@@ -432,6 +431,7 @@ Kinematics = _one_of("kinematics", KINEMATICS)
 DefinitionName = _one_of("definition", DEFINITIONS)
 Flag = Annotated[bool, _Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, _Scalar(str, {"type": "string", "minLength": 1}, "a text")]
+FileName = Annotated[str, _Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
 BeamName = Annotated[str, _Scalar(str, {"type": "string"}, "the name of a beam")]
 MaterialName = Annotated[str, _Scalar(str, {"type": "string"}, "the name of a material")]
 
@@ -488,7 +488,7 @@ class _Named:
 
     def __init__(self, what, for_files=True):
         self.what, self.for_files = what, for_files
-        self.words = f"the name of each {what}, and under it a section, see below"
+        self.words = f"a section for each {what}, by name; see below"
 
     def __get_pydantic_core_schema__(self, source, handler):
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
@@ -524,7 +524,7 @@ def expected_value(field):
             return note.words
     listed = get_origin(field.annotation) is list
     text = next((note.words for part in get_args(field.annotation) for note in get_args(part)[1:]), None)
-    return text or ("a list of sections, see below" if listed else "a section, see below")
+    return text or ("a list of sections; see below" if listed else "a section; see below")
 
 
 class Section(BaseModel):
@@ -662,18 +662,20 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="What the study is, in one line.")
-    beams: Annotated[dict[str, BeamConfig], _Named("beam")] = Field(description="Beams by name.")
-    materials: Annotated[dict[str, MaterialConfig], _Named("material")] = Field(description="Materials by name.")
+    beams: Annotated[dict[str, BeamConfig], _Named("beam")] = Field(description="Beams.")
+    materials: Annotated[dict[str, MaterialConfig], _Named("material")] = Field(description="Materials.")
     definitions: DefinitionsConfig = Field(
         default_factory=DefinitionsConfig, description="Parameters of the definitions that have any."
     )
     sensitivity: SensitivityConfig = Field(
         default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
     )
-    printed: Text | None = Field(
+    printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )
-    grids: Annotated[dict[str, GridConfig], _Named("grid", for_files=False)] = Field(description="Grids by name.")
+    grids: Annotated[dict[str, GridConfig], _Named("grid", for_files=False)] = Field(
+        description="Grids: what is asked."
+    )
 
 
 SECTIONS = {
@@ -991,7 +993,7 @@ def _check_files(meshes, scenes, references, problems):
     for path, what, names, remedy in (
         (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
         (("beams",), "meshes", [mesh.name for mesh in meshes], "rename a beam"),
-        (("materials",), "materials", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
+        (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
         (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
     ):
         name, count = Counter(name.casefold() for name in names).most_common(1)[0]

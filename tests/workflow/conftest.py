@@ -39,7 +39,7 @@ class Run:
 
     def times(self, pattern):
         """Time of the last change of each file."""
-        return {path.name: path.stat().st_mtime_ns for path in self.folder.glob(pattern)}
+        return {str(path.relative_to(self.folder)): path.stat().st_mtime_ns for path in self.folder.glob(pattern)}
 
 
 @pytest.fixture(scope="module")

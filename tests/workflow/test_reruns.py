@@ -44,9 +44,7 @@ def test_only_what_is_new_is_computed(run):
     assert code == 0, output
     after = run.times(stored)
     assert {name: after[name] for name in before} == before
-    assert sorted(set(after) - set(before)) == [
-        f"small_structured_4mm.{ending}" for ending in ("h5", "json", "vtu")
-    ] or (len(after) == 3 * 4)
+    assert len(after) == 3 * 4
     assert dataset(run, "grow").mesh_size.values.tolist() == [4e-3, 5e-3, 10e-3]
 
     # Back to the old grid: nothing is solved, and the removed size is gone from the dataset.

@@ -1,0 +1,154 @@
+"""The command line, the schema of studies and their manual."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from springtune.cli import BEGIN, END, MANUAL, SCHEMA, main, manual_text, schema_text
+from springtune.springs import DEFINITIONS
+from springtune.study import SECTIONS, load_study
+
+CONFIG = Path(__file__).parents[2] / "config"
+RENEW = "run `springtune schema --write`"
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def words(text):
+    """Lines of a text with their runs of blanks made one."""
+    return [" ".join(line.split()) for line in text.splitlines()]
+
+
+class TestScenes:
+    def test_counts_of_the_papers_study(self):
+        result = run("scenes", CONFIG / "paper.yaml")
+        assert result.exit_code == 0
+        lines = words(result.stdout)
+        assert "scenes 270" in lines
+        assert "meshes 18 each serves 20 scenes and curves on average" in lines
+        assert "references 9 from 6 solutions: small strain scales with force" in lines
+        assert any(line.startswith("curves 90 of 61 stiffnesses") for line in lines)
+        assert any(line.startswith("networks 36 ") for line in lines)
+        assert "printed 45 cells to compare with, 45 of them in this study" in lines
+        assert [line for line in lines if line.startswith("table ")] == [f"table {n} 54 54 9 3 18" for n in range(1, 6)]
+
+    def test_says_what_grids_share(self, tmp_path):
+        text = (CONFIG / "quick.yaml").read_text().replace("printed: paper_tables.csv\n", "")
+        path = tmp_path / "twice.yaml"
+        path.write_text(text.replace("grids:\n", "grids:\n" + text.split("grids:\n")[1].replace("steel:", "again:", 1), 1)
+                        .replace("\n  compression:", "\n  compression again:", 1).replace("\n  rubber:\n", "\n  more:\n", 1))  # fmt: skip
+        lines = words(run("scenes", path).stdout)
+        assert "scenes 32 64 asked, 32 of them more than once" in lines
+        assert "again 24 24 4 1 8" in lines
+        assert "steel 24 0 4 1 8" in lines
+
+    def test_bad_study_is_one_message_and_exit_code_1(self, tmp_path):
+        path = tmp_path / "bad.yaml"
+        path.write_text((CONFIG / "quick.yaml").read_text().replace("length:", "lenght:"))
+        result = run("scenes", path)
+        assert result.exit_code == 1
+        assert result.stdout == ""
+        assert result.stderr == (
+            f"{path}:8: beams.100x20.lenght: unknown key 'lenght'; did you mean 'length'? known: length, height, thickness\n"
+        )
+        assert [file.name for file in tmp_path.iterdir()] == ["bad.yaml"]
+
+    def test_imports_nothing_heavy(self):
+        code = (
+            "import sys; from springtune.cli import main\n"
+            "try: main(['scenes', sys.argv[1]])\n"
+            "except SystemExit: pass\n"
+            "print(sorted({'xarray', 'matplotlib', 'snakemake', 'scipy', 'pint', 'h5py'} & set(sys.modules)))"
+        )
+        done = subprocess.run([sys.executable, "-c", code, CONFIG / "paper.yaml"], capture_output=True, text=True)
+        assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
+def test_runs_as_a_module():
+    done = subprocess.run([sys.executable, "-m", "springtune", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "version" in done.stdout
+
+
+def test_definitions_lists_all_with_summaries():
+    lines = words(run("definitions").stdout)
+    assert lines == [" ".join(f"{name} {definition.summary}".split()) for name, definition in DEFINITIONS.items()]
+
+
+class TestSchema:
+    def test_printed_and_kept_in_step(self):
+        assert run("schema").stdout == schema_text()
+        assert (CONFIG / SCHEMA).read_text() == schema_text(), RENEW
+
+    def test_manual_is_kept_in_step(self):
+        text = (CONFIG / MANUAL).read_text()
+        assert manual_text(text) == text, RENEW
+
+    def test_write_renews_both_and_keeps_the_frame(self, tmp_path):
+        (tmp_path / MANUAL).write_text(f"before\n{BEGIN}stale\n{END}after\n")
+        assert run("schema", "--write", "--folder", tmp_path).exit_code == 0
+        text = (tmp_path / MANUAL).read_text()
+        assert text.startswith("before\n")
+        assert text.endswith("after\n")
+        assert "stale" not in text
+        assert "| `poisson_ratio` |" in text
+        assert json.loads((tmp_path / SCHEMA).read_text()) == json.loads(schema_text())
+        assert sorted(os.listdir(tmp_path)) == [MANUAL, SCHEMA]
+
+    @pytest.mark.parametrize("manual", [None, "no marks here"])
+    def test_write_refuses_a_manual_without_marks(self, tmp_path, manual):
+        if manual:
+            (tmp_path / MANUAL).write_text(manual)
+        result = run("schema", "--write", "--folder", tmp_path)
+        assert result.exit_code == 1
+        assert MANUAL in result.stderr
+        assert not (tmp_path / SCHEMA).exists()
+
+    @pytest.mark.parametrize("study", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
+    def test_studies_are_valid(self, study):
+        text = study.read_text()
+        assert text.startswith(f"# yaml-language-server: $schema={SCHEMA}\n")
+        jsonschema.Draft202012Validator.check_schema(json.loads(schema_text()))
+        jsonschema.validate(yaml.safe_load(text), json.loads(schema_text()), jsonschema.Draft202012Validator)
+        load_study(study)
+
+    @pytest.mark.parametrize(
+        ("old", "new"),
+        [
+            ("length:", "lenght:"),
+            ("100 mm", "100"),
+            ("poisson_ratio: 0.3", "poisson_ratio: 0.6"),
+            ("mesh_type: [structured, free]", "mesh_type: [structured, fre]"),
+            ("mesh_size: [2 mm, 5 mm]", "mesh_size: []"),
+            ("sensitivity: false", "sensitivity: maybe"),
+            ("  100x20: {", "  .x: {"),
+        ],
+    )
+    def test_editors_see_mistakes(self, old, new):
+        text = (CONFIG / "quick.yaml").read_text()
+        assert old in text
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(yaml.safe_load(text.replace(old, new, 1)), json.loads(schema_text()))
+
+    @pytest.mark.parametrize("model", SECTIONS.values())
+    def test_every_field_is_described(self, model):
+        assert model.__doc__
+        assert all(field.description for field in model.model_fields.values())
+
+    def test_every_section_is_in_the_manual(self):
+        models = {model.__name__ for model in SECTIONS.values()}
+        assert models == {*json.loads(schema_text())["$defs"], "StudyConfig"}
+
+    def test_example_of_the_manual_is_a_study(self, tmp_path):
+        example = (CONFIG / MANUAL).read_text().partition("```yaml\n")[2].partition("```")[0]
+        (tmp_path / "example.yaml").write_text(example)
+        assert len(load_study(tmp_path / "example.yaml").scenes) == 4

@@ -1,0 +1,663 @@
+"""Studies: expansion, names, order, and what bad input gets."""
+
+import csv
+import itertools
+import math
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from springtune.geometry import Beam
+from springtune.materials import Material
+from springtune.study import Curve, MeshSpec, Reference, Scene, StudyError, load_study
+
+CONFIG = Path(__file__).parents[2] / "config"
+LATTICE = math.sqrt(3) / 2
+
+SMALL = """\
+title: A small study
+beams:
+  long: {length: 200 mm, height: 30 mm}
+  short: {length: 100 mm, height: 20 mm, thickness: 2 mm}
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
+  rubber: {young_modulus: 1 MPa, poisson_ratio: 0.5}
+definitions:
+  paper:
+    stiffness:
+      - {mesh_type: structured, material: steel, value: 170e6 N/m}
+      - {mesh_type: free, material: steel, value: 185e6 N/m}
+  calibrated: {beam: long, load: traction}
+grids:
+  pull:
+    beam: [long, short]
+    mesh_type: [structured, free]
+    mesh_size: [2 mm, 5 mm]
+    material: steel
+    load: traction
+    force: {long: 300 kN, short: 20 kN}
+    definition: [paper, calibrated, lattice]
+    kinematics: [nonlinear, linear]
+  push:
+    beam: short
+    mesh_type: structured
+    mesh_size: 5 mm
+    material: steel
+    load: compression
+    force: 20 kN
+    definition: lattice
+    sensitivity: false
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Load a study from its text; the message of an error names the file as ``study.yaml``."""
+
+    def load(text, name="study.yaml"):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return load_study(path)
+
+    return load
+
+
+@pytest.fixture
+def refusal(load, tmp_path):
+    """Message that a text gets, without the folder."""
+
+    def refusal(text, name="study.yaml"):
+        with pytest.raises(StudyError) as caught:
+            load(text, name)
+        return str(caught.value).replace(f"{tmp_path}/", "")
+
+    return refusal
+
+
+def changed(*replacements):
+    text = SMALL
+    for old, new in replacements:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+# -- what a study asks for -----------------------------------------------------------------------------------------------
+
+
+class TestExpansion:
+    def test_counts(self, load):
+        study = load(SMALL)
+        assert len(study.meshes) == 8
+        assert len(study.scenes) == 8 * 3 * 2 + 1
+        assert len(study.curves) == 8 * 2
+        assert len(study.references) == 3
+        assert [(grid.name, len(grid.scenes), len(grid.curves)) for grid in study.grids] == [("pull", 48, 16), ("push", 1, 0)]  # fmt: skip
+
+    def test_values_are_si(self, load):
+        study = load(SMALL)
+        long, short = Beam("long", 0.2, 0.03, 0.001), Beam("short", 0.1, 0.02, 0.002)
+        steel = Material("steel", 210e9, 0.3)
+        assert study.scenes[0] == Scene(
+            MeshSpec(long, "structured", 0.002), steel, "traction", 300e3, "paper", "nonlinear"
+        )
+        assert study.references == (
+            Reference(long, steel, "traction", 300e3),
+            Reference(short, steel, "traction", 20e3),
+            Reference(short, steel, "compression", -20e3),
+        )
+        assert study.curves[-1] == Curve(MeshSpec(short, "free", 0.005), steel, "traction", 20e3, "linear")
+        assert study.stiffness_table == {("structured", "steel"): 170e6, ("free", "steel"): 185e6}
+        assert study.calibration == ("long", "traction")
+        assert study.printed == ()
+        assert study.printed_path is None
+
+    def test_about_itself(self, load, tmp_path):
+        study = load(SMALL, "my-study.yaml")
+        assert (study.name, study.title, study.text) == ("my-study", "A small study", SMALL)
+        assert study.path == tmp_path / "my-study.yaml"
+
+    def test_axes_hold_what_is_used_in_declared_order(self, load):
+        assert load(SMALL).axes == {
+            "beam": ("long", "short"),
+            "mesh_type": ("structured", "free"),
+            "mesh_size": (0.002, 0.005),
+            "material": ("steel",),
+            "load": ("traction", "compression"),
+            "definition": ("paper", "calibrated", "lattice"),
+            "kinematics": ("nonlinear", "linear"),
+        }
+
+    def test_names(self, load):
+        study = load(changed(("[2 mm, 5 mm]", "[0.5 mm, 5 mm]")))
+        assert study.meshes[0].name == "long_structured_0.5mm"
+        assert study.scenes[0].name == "long_structured_0.5mm_steel_traction_paper_nonlinear"
+        for items in (study.meshes, study.scenes):
+            assert len({item.name for item in items}) == len(items)
+
+    def test_stiffness_ratios(self, load):
+        assert len(load(SMALL).stiffness_ratios) == 61
+        ratios = load(changed(("grids:", "sensitivity: {from: 0.5, to: 1, points: 3}\ngrids:"))).stiffness_ratios
+        assert ratios == pytest.approx([0.5 * LATTICE, 0.75 * LATTICE, LATTICE], rel=1e-15)
+        assert all(type(ratio) is float for ratio in ratios)
+
+    def test_equal_lengths_in_other_units_are_one_mesh(self, load):
+        text = changed(("mesh_size: 5 mm", "mesh_size: 0.5 cm"))
+        assert len(load(text).meshes) == 8
+
+    def test_a_scene_of_two_grids_is_one_scene(self, load):
+        twice = SMALL + SMALL.partition("grids:\n")[2].replace("pull:", "pull2:").replace("push:", "push2:")
+        once, again = load(SMALL), load(twice)
+        for name in ("meshes", "scenes", "curves", "references", "axes"):
+            assert getattr(once, name) == getattr(again, name)
+        assert len(again.grids) == 4
+
+    def test_merge_keys(self, load):
+        text = SMALL.replace("  push:", "  push: &push") + "  push free:\n    <<: *push\n    mesh_type: free\n"
+        grid = load(text).grids[-1]
+        assert [scene.mesh.name for scene in grid.scenes] == ["short_free_5mm"]
+        assert not grid.curves
+
+    def test_names_are_texts_whatever_yaml_makes_of_them(self, load):
+        assert load(SMALL.replace("short", "1e3").replace("long", "no")).axes["beam"] == ("no", "1e3")
+
+
+class TestCalibrationCurves:
+    def test_are_made_without_sensitivity(self, load):
+        study = load(SMALL.replace("    kinematics: [nonlinear, linear]", "    sensitivity: false"))
+        assert [curve.mesh.name for curve in study.curves] == [
+            "long_structured_2mm", "long_structured_5mm", "long_free_2mm", "long_free_5mm"
+        ]  # fmt: skip
+        assert not study.grids[0].curves
+
+    def test_are_made_for_kinematics_of_other_grids(self, load):
+        text = changed(("kinematics: [nonlinear, linear]", "kinematics: nonlinear"))
+        text = text.replace("definition: lattice", "definition: calibrated\n    kinematics: linear")
+        curves = [curve for curve in load(text).curves if curve.kinematics == "linear"]
+        assert [curve.mesh.name for curve in curves] == ["long_structured_2mm", "long_structured_5mm"]
+
+    def test_none_without_need(self, load):
+        text = SMALL.replace("calibrated, ", "").replace(
+            "    kinematics: [nonlinear, linear]", "    sensitivity: false"
+        )
+        assert load(text).curves == ()
+
+    def test_impossible(self, refusal):
+        message = refusal(changed(("beam: [long, short]", "beam: short")))
+        assert message.splitlines()[0] == (
+            "study.yaml:13: definitions.calibrated: no grid has beam 'long' in traction on structured meshes of steel, "
+            "but scenes there are 'calibrated'; add it to a grid, or calibrate on another beam or load"
+        )
+        assert len(message.splitlines()) == 2
+
+
+AXES = {
+    "beam": ["long", "short"],
+    "mesh_type": ["structured", "free"],
+    "mesh_size": ["2 mm", "0.5 mm", "5 mm"],
+    "material": ["steel", "rubber"],
+    "load": ["traction", "compression"],
+    "definition": ["calibrated", "lattice"],
+    "kinematics": ["linear", "nonlinear"],
+}
+
+
+@st.composite
+def grids(draw):
+    grid = {name: draw(st.lists(st.sampled_from(values), min_size=1, unique=True)) for name, values in AXES.items()}
+    return grid | {"force": "1 N", "sensitivity": draw(st.booleans())}
+
+
+def study_of(path, asked):
+    config = yaml.safe_load(SMALL) | {"grids": {f"grid {number}": grid for number, grid in enumerate(asked)}}
+    # Calibration needs curves on its own beam, whatever the others are.
+    config["grids"]["calibration"] = {name: list(values) for name, values in AXES.items()} | {
+        "beam": "long", "load": "traction", "definition": "lattice", "force": "1 N"
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(config, sort_keys=False))
+    return load_study(path)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(grids(), min_size=1, max_size=3), st.randoms(use_true_random=False))
+def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, asked, random):
+    study = study_of(tmp_path / "study.yaml", asked)
+    expected = set()
+    for grid in asked:
+        sizes = [f"{size.split()[0]}mm" for size in grid["mesh_size"]]
+        axes = [grid["beam"], grid["mesh_type"], sizes]
+        axes += [grid[name] for name in ("material", "load", "definition", "kinematics")]
+        expected |= {"_".join(labels) for labels in itertools.product(*axes)}
+    names = [scene.name for scene in study.scenes]
+    calibrating = {scene.name for scene in study.grids[-1].scenes}
+    assert set(names) == expected | calibrating
+    for items in (study.meshes, study.scenes, study.curves, study.references):
+        assert len(set(items)) == len(items)
+    # Every calibrated scene has curves to calibrate it on.
+    curves = {(c.mesh.beam.name, c.load, c.mesh.mesh_type, c.material, c.kinematics) for c in study.curves}
+    for scene in study.scenes:
+        if scene.definition == "calibrated":
+            assert (*study.calibration, scene.mesh.mesh_type, scene.material, scene.kinematics) in curves
+
+    for grid in asked:
+        for values in grid.values():
+            if isinstance(values, list):
+                random.shuffle(values)
+    random.shuffle(asked)
+    shuffled = study_of(tmp_path / "study.yaml", asked)
+    for name in ("meshes", "scenes", "curves", "references", "axes"):
+        assert getattr(shuffled, name) == getattr(study, name)
+
+
+# -- the studies of the repository ---------------------------------------------------------------------------------------
+
+
+class TestPaper:
+    @pytest.fixture(scope="class")
+    def study(self):
+        return load_study(CONFIG / "paper.yaml")
+
+    def test_counts(self, study):
+        counted = [len(items) for items in (study.meshes, study.scenes, study.curves, study.references)]
+        assert counted == [18, 45 * 3 * 2, 45 * 2, 9 + 6 - 6]
+
+    def test_printed_cells_are_the_cells_of_the_grids(self, study):
+        cells = {(s.mesh.beam.name, s.mesh.mesh_type, s.mesh.mesh_size, s.material.name, s.load) for s in study.scenes}
+        printed = {(c.beam, c.mesh_type, c.mesh_size, c.material, c.load) for c in study.printed}
+        assert len(study.printed) == len(printed) == 45
+        assert printed == cells
+        for cell in study.printed:
+            table = next(grid for grid in study.grids if grid.name == f"table {cell.table}")
+            assert cell.beam in {scene.mesh.beam.name for scene in table.scenes}
+            assert study.stiffness_table[cell.mesh_type, cell.material] == cell.stiffness
+
+    def test_forces_are_the_printed_ones_but_for_the_misprint(self, study):
+        forces = {(r.beam.name, r.material.name, r.load): r.force for r in study.references}
+        for cell in study.printed:
+            used = forces[cell.beam, cell.material, cell.load]
+            assert math.copysign(1, used) == (1 if cell.load == "traction" else -1)
+            misprint = cell.table in (1, 2) and cell.beam == "100x20"
+            assert abs(used) == (20e3 if misprint else cell.force)
+
+    def test_a_remark_wherever_the_print_contradicts_itself(self, study):
+        """A printed displacement may be rounded or truncated, so it stands for -1/2 to 1 unit of its last digit."""
+        with open(study.printed_path) as file:
+            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+        modulus = {"steel": 210e9, "rubber": 1e6}
+        for row, cell in zip(rows, study.printed, strict=True):
+            network, reference = (_printed_range(row[key]) for key in ("displacement_mm", "reference_displacement_mm"))
+            errors = [n / r - 1 for n in network for r in reference]
+            smallest = 0 if min(errors) < 0 < max(errors) else min(map(abs, errors))
+            fits = smallest - 1e-4 <= cell.deformation_error <= max(map(abs, errors)) + 1e-4
+            length, height = (1e-3 * float(side) for side in cell.beam.split("x"))
+            by_hand = cell.force * length / (modulus[cell.material] * height * 1e-3)
+            fits &= abs(by_hand / cell.reference_displacement - 1) < 0.02
+            assert fits == (not cell.remark), row
+
+    def test_first_cell(self, study):
+        cell = study.printed[0]
+        assert (cell.table, cell.displacement, cell.reference_displacement) == (1, 9.57e-3, 9.49e-3)
+        assert cell.deformation_error == 0.0078
+
+    def test_calibration_and_thickness(self, study):
+        assert study.calibration == ("200x30", "traction")
+        assert {mesh.beam.thickness for mesh in study.meshes} == {1e-3}
+        assert study.stiffness_ratios[0] == pytest.approx(0.4 * LATTICE)
+        assert study.stiffness_ratios[-1] == pytest.approx(1.6 * LATTICE)
+
+
+def _printed_range(text):
+    unit = 10.0 ** -len(text.partition(".")[2])
+    return float(text) - 0.5 * unit, float(text) + unit
+
+
+def test_quick_is_small_but_has_everything():
+    study = load_study(CONFIG / "quick.yaml")
+    assert len(study.scenes) < 50
+    assert min(mesh.mesh_size for mesh in study.meshes) >= 0.002
+    assert {mesh.beam.name for mesh in study.meshes} == {"100x20"}
+    whole = load_study(CONFIG / "paper.yaml").axes
+    for dimension in ("mesh_type", "material", "load", "definition", "kinematics"):
+        assert study.axes[dimension] == whole[dimension]
+
+
+# -- bad input -----------------------------------------------------------------------------------------------------------
+
+LONG = "{length: 200 mm, height: 30 mm}"
+PULL_FORCE = "force: {long: 300 kN, short: 20 kN}"
+
+REFUSED = {
+    "misspelt key": (
+        ("length: 200", "lenght: 200"),
+        "study.yaml:3: beams.long.lenght: unknown key 'lenght'; did you mean 'length'? known: length, height, thickness",
+    ),
+    "misspelt key of the file": (("grids:", "grid:"), "study.yaml:14: grid: unknown key 'grid'; did you mean 'grids'?"),
+    "missing key": ((LONG, "{length: 200 mm}"), "study.yaml:3: beams.long.height: 'height' is missing; give a length"),
+    "key without value": (("length: 200 mm", "length: "), "study.yaml:3: beams.long.length: 'length' is missing;"),
+    "value instead of a section": ((LONG, "200 mm"), "study.yaml:3: beams.long: '200 mm' instead of keys and values;"),
+    "list instead of a value": (("200 mm", "[200 mm]"), "study.yaml:3: beams.long.length: a list instead of a length"),
+    "wrong dimension": (
+        ("200 mm", "200 mN"),
+        "study.yaml:3: beams.long.length: '200 mN' is a force; give a length such as '200 mm'",
+    ),
+    "unknown unit": (("200 mm", "200 mmm"), "beams.long.length: '200 mmm': unknown unit 'mmm', did you mean 'mm'?"),
+    "no unit": (("200 mm", "200"), "beams.long.length: '200' has no unit; give a length such as '200 mm'"),
+    "negative length": (("200 mm", "-200 mm"), "beams.long.length: '-200 mm' is not above zero; give"),
+    "zero length": (("200 mm", "0 mm"), "beams.long.length: '0 mm' is not above zero; give"),
+    "length not finite": (
+        ("200 mm", "inf mm"),
+        "beams.long.length: 'inf mm' does not begin with a finite number; give",
+    ),
+    "huge length": (("200 mm", "1e999 mm"), "beams.long.length: '1e999 mm' is too large a number; give"),
+    "stiffness in N/mm": (
+        ("170e6 N/m", "170e6 N/mm"),
+        "study.yaml:11: definitions.paper.stiffness[0].value: '170e6 N/mm' cannot be meant: sqrt(3)/2 E t of steel, "
+        "1 mm thick, is 1.819e+08 N/m; give a stiffness near that, in N/m",
+    ),
+    "stiffness in Pa": (
+        ("170e6 N/m", "170e6 Pa"),
+        "definitions.paper.stiffness[0].value: '170e6 Pa' is a stress; give",
+    ),
+    "stiffness twice": (
+        ("mesh_type: free,", "mesh_type: structured,"),
+        "a second stiffness for structured meshes of steel;",
+    ),
+    "no list of stiffnesses": (("    stiffness:\n", "    stiffness: 5\n    #"), None),
+    "stiffness of unknown material": (
+        ("free, material: steel", "free, material: stel"),
+        "unknown material 'stel'; did you",
+    ),
+    "no stiffness": (
+        ("      - {mesh_type: free, material: steel, value: 185e6 N/m}\n", ""),
+        "study.yaml:20: grids.pull.definition: 'paper' has no stiffness for free meshes of steel; add {mesh_type: free, "
+        "material: steel, value: <stiffness> N/m} to definitions.paper.stiffness",
+    ),
+    "no calibration": (
+        ("  calibrated: {beam: long, load: traction}\n", ""),
+        "study.yaml:20: grids.pull.definition: 'calibrated' needs to know on what; add definitions.calibrated",
+    ),
+    "calibration on unknown beam": (
+        ("{beam: long,", "{beam: lang,"),
+        "definitions.calibrated.beam: unknown beam 'lang';",
+    ),
+    "Poisson's ratio above 0.5": (
+        ("poisson_ratio: 0.3", "poisson_ratio: 0.6"),
+        "study.yaml:6: materials.steel.poisson_ratio: '0.6' is out of range; give a number from 0 to 0.5, such as 0.3",
+    ),
+    "Poisson's ratio below 0": (("poisson_ratio: 0.3", "poisson_ratio: -0.1"), "'-0.1' is out of range; give"),
+    "Poisson's ratio not a number": (("poisson_ratio: 0.3", "poisson_ratio: .nan"), "'.nan' is not a number; give"),
+    "Poisson's ratio nan": (("poisson_ratio: 0.3", "poisson_ratio: nan"), "'nan' is out of range; give"),
+    "negative force": (
+        (PULL_FORCE, "force: -20 kN"),
+        "study.yaml:20: grids.pull.force: '-20 kN' is not above zero; the load's name carries the sign: give a magnitude",
+    ),
+    "negative force of a beam": (
+        ("short: 20 kN", "short: -20 kN"),
+        "study.yaml:20: grids.pull.force.short: '-20 kN' is not",
+    ),
+    "force of unknown beam": (
+        ("short: 20 kN", "shirt: 20 kN"),
+        "study.yaml:20: grids.pull.force.shirt: unknown beam 'shirt'",
+    ),
+    "no force of a beam": (
+        (", short: 20 kN", ""),
+        "study.yaml:20: grids.pull.force: no force for beam 'short'; add 'short:",
+    ),
+    "no forces": (
+        (PULL_FORCE, "force: {}"),
+        "study.yaml:20: grids.pull.force: no force at all; give one for each beam",
+    ),
+    "list of forces": (
+        (PULL_FORCE, "force: [1 N]"),
+        "study.yaml:20: grids.pull.force: a list instead of a force such as",
+    ),
+    "two forces": (
+        ("load: compression\n    force: 20 kN", "load: traction\n    force: 30 kN"),
+        "study.yaml:29: grids.push.force: 30000 N on beam 'short' of steel in traction, but grid 'pull' has 20000 N; give",
+    ),
+    "mesh size larger than the beam": (
+        ("[2 mm, 5 mm]", "[2 mm, 25 mm]"),
+        "study.yaml:17: grids.pull.mesh_size[1]: '25 mm' is larger than beam 'short'; give at most its smaller side, 20 mm",
+    ),
+    "tiny mesh size": (
+        ("[2 mm, 5 mm]", "2 um"),
+        "study.yaml:17: grids.pull.mesh_size: '2 um' gives beam 'long' 2e+09 part",
+    ),
+    "mesh size twice": (
+        ("[2 mm, 5 mm]", "[2 mm, 0.2 cm]"),
+        "grids.pull.mesh_size[1]: '0.2 cm' is listed twice; remove one",
+    ),
+    "mesh sizes of one name": (
+        ("[2 mm, 5 mm]", "[2 mm, 2.0000001 mm]"),
+        "2 different mesh sizes are all named '2 mm'; merge",
+    ),
+    "mesh sizes in a mapping": (
+        ("[2 mm, 5 mm]", "{a: 2 mm}"),
+        "grids.pull.mesh_size: a mapping instead of a value or a list",
+    ),
+    "unknown mesh type": (
+        ("[structured, free]", "[structured, fre]"),
+        "grids.pull.mesh_type[1]: unknown mesh type 'fre'; did",
+    ),
+    "unknown beam": (
+        ("beam: short", "beam: shirt"),
+        "grids.push.beam: unknown beam 'shirt'; did you mean 'short'? known: long",
+    ),
+    "unknown material": (
+        ("    material: steel", "    material: stel"),
+        "grids.pull.material: unknown material 'stel'; did you",
+    ),
+    "unknown load": (
+        ("load: compression", "load: compresion"),
+        "grids.push.load: unknown load 'compresion'; did you mean 'com",
+    ),
+    "unknown definition": (
+        ("definition: lattice", "definition: latice"),
+        "unknown definition 'latice'; did you mean 'lattice'?",
+    ),
+    "unknown kinematics": (
+        ("[nonlinear, linear]", "cubic"),
+        "grids.pull.kinematics: unknown kinematics 'cubic'; known: nonl",
+    ),
+    "neither true nor false": (
+        ("sensitivity: false", "sensitivity: 7"),
+        "grids.push.sensitivity: '7' is neither true nor false",
+    ),
+    "empty list": (
+        ("[2 mm, 5 mm]", "[]"),
+        "study.yaml:17: grids.pull.mesh_size: an empty list leaves the grid empty; give at",
+    ),
+    "empty item": (
+        ("[2 mm, 5 mm]", "[~]"),
+        "study.yaml:17: grids.pull.mesh_size[0]: nothing instead of a length such as",
+    ),
+    "empty grid": (
+        ("  push:\n", "  nothing: {}\n  push:\n"),
+        "study.yaml:23: grids.nothing.beam: 'beam' is missing; give",
+    ),
+    "duplicate grid": (
+        ("  push:", "  pull:"),
+        "study.yaml:23: grids.pull: 'pull' is given twice, first in line 15; rename or",
+    ),
+    "duplicate beam": (
+        ("  short: {", "  long: {"),
+        "study.yaml:4: beams.long: 'long' is given twice, first in line 3; rename",
+    ),
+    "names that differ in case": (
+        ("  rubber: {", "  Steel: {"),
+        "study.yaml:7: materials.Steel: 'Steel' and 'steel' differ in",
+    ),
+    "name with a slash": (
+        ("  rubber: {", "  a/b: {"),
+        "study.yaml:7: materials.a/b: 'a/b' cannot name a material; use letters",
+    ),
+    "name with a leading dot": (("  rubber: {", "  .r: {"), "'.r' cannot name a material; use letters"),
+    "one point": (
+        ("grids:", "sensitivity: {points: 1}\ngrids:"),
+        "sensitivity.points: '1' is out of range; give a whole",
+    ),
+    "half a point": (
+        ("grids:", "sensitivity: {points: 2.5}\ngrids:"),
+        "sensitivity.points: '2.5' is not a whole number; give",
+    ),
+    "empty range": (
+        ("grids:", "sensitivity: {from: 1.6}\ngrids:"),
+        "sensitivity.from: 1.6 is not below 'to', 1.6; give",
+    ),
+    "infinite range": (("grids:", "sensitivity: {to: inf}\ngrids:"), "sensitivity.to: 'inf' is out of range; give"),
+    "range from zero": (("grids:", "sensitivity: {from: 0}\ngrids:"), "sensitivity.from: '0' is out of range; give"),
+    "no printed file": (
+        ("grids:", "printed: no.csv\ngrids:"),
+        "study.yaml:14: printed: 'no.csv' cannot be read: No such file",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused(refusal, case):
+    replacement, expected = REFUSED[case]
+    message = refusal(changed(replacement))
+    assert message.startswith("study.yaml:")
+    assert (expected or "stiffness") in message
+
+
+BROKEN = {
+    "empty file": ("", "study.yaml: the file is empty; give the keys title, beams,"),
+    "list": ("- a\n", "study.yaml: a list instead of keys and values; give the keys title,"),
+    "text": ("hello", "study.yaml: 'hello' instead of keys and values; give the keys title,"),
+    "no grids": (
+        SMALL.partition("grids:")[0] + "grids: {}\n",
+        "study.yaml:14: grids: no grid at all; give at least one",
+    ),
+    "grids without value": (
+        SMALL.partition("grids:")[0] + "grids:\n",
+        "study.yaml:14: grids: 'grids' is missing; give",
+    ),
+    "open bracket": ("a: [b\n", "study.yaml:2: not YAML: expected"),
+    "two colons": ("a: b: c\n", "study.yaml:1: not YAML: mapping values are not allowed here; check"),
+    "unknown alias": ("a: *b\n", "study.yaml:1: not YAML: found undefined alias"),
+    "endless alias": ("&a [*a]\n", "study.yaml: not a study: nested too deeply;"),
+    "deep nesting": ("[" * 3000, "study.yaml: not a study: nested too deeply;"),
+    "control characters": ("a: \x00b\n", "study.yaml: not YAML: special characters are not allowed"),
+    "two documents": ("a: 1\n---\nb: 1\n", "study.yaml:2: not YAML: but found another document"),
+    "list as key": ("? [a]\n: b\n", "study.yaml:1: a list or mapping cannot be a key"),
+    "merge of a text": ("<<: a\n", "study.yaml:1: '<<' merges mappings only"),
+    "not text": (b"\xff\xfe\x00", "study.yaml: cannot be read: it is not UTF-8 text; give"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_file(refusal, case):
+    text, expected = BROKEN[case]
+    assert refusal(text).startswith(expected)
+
+
+def test_missing_file_and_folder(tmp_path):
+    for path in (tmp_path / "no.yaml", tmp_path):
+        with pytest.raises(StudyError, match="cannot be read: .*; give the path of a study"):
+            load_study(path)
+
+
+def test_name_of_the_file(refusal):
+    assert "'my study' cannot name a study; rename the file" in refusal(SMALL, "my study.yaml")
+
+
+def test_colliding_file_names(refusal):
+    text = changed(("  short: {", "  long_steel: {"), ("  rubber: {", "  steel_steel: {"))
+    text = text.replace("short", "long_steel").replace("    material: steel\n", "    material: [steel, steel_steel]\n")
+    text = text.replace("[paper, calibrated, lattice]", "lattice")
+    assert "2 different references are all named 'long_steel_steel'; rename a beam or a material" in refusal(text)
+
+
+def test_several_problems_are_one_message(refusal):
+    lines = refusal(SMALL.replace(" mm", " mN")).splitlines()
+    assert len(lines) == 6
+    assert all(line.startswith("study.yaml:") for line in lines[:5])
+    assert [int(line.split(":")[1]) for line in lines[:5]] == [3, 3, 4, 4, 4]
+    assert lines[5] == "... and 3 more"
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_any_value_anywhere_is_read_or_refused(load, data):
+    """No other error than a StudyError, whatever stands in place of one value of a study."""
+    config = yaml.safe_load(SMALL)
+    place = config
+    while True:
+        key = data.draw(st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place))))
+        if not isinstance(place[key], dict | list) or data.draw(st.booleans()):
+            break
+        place = place[key]
+    leaves = (
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9) | st.sampled_from(["1 mm", "1 N"])
+    )
+    place[key] = data.draw(st.recursive(leaves, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)))  # fmt: skip
+    try:
+        load(yaml.safe_dump(config))
+    except StudyError as error:
+        assert str(error)
+
+
+# -- printed values ------------------------------------------------------------------------------------------------------
+
+HEADER = (
+    "table,beam,mesh_type,mesh_size_mm,material,load,force_N,stiffness_N_per_m,"
+    "reference_displacement_mm,displacement_mm,deformation_error_percent,remark"
+)
+CELL = "1,long,free,5,steel,traction,300000,185e6,9.5,8.13,14.41,"
+
+
+class TestPrinted:
+    @pytest.fixture
+    def with_printed(self, tmp_path):
+        def write(*lines):
+            (tmp_path / "printed.csv").write_text("\n".join(lines) + "\n")
+            return changed(("grids:", "printed: printed.csv\ngrids:"))
+
+        return write
+
+    def test_read(self, load, with_printed, tmp_path):
+        study = load(with_printed("# a comment", "", HEADER, "# another", CELL + '"so, why"'))
+        (cell,) = study.printed
+        assert study.printed_path == tmp_path / "printed.csv"
+        assert (cell.table, cell.mesh_size, cell.displacement, cell.remark) == (1, 0.005, 8.13e-3, "so, why")
+        assert cell.deformation_error == 0.1441
+
+    @pytest.mark.parametrize(
+        ("lines", "says"),
+        [
+            ([], "printed.csv: no printed values; give a line table,beam,"),
+            ([HEADER], "printed.csv: no printed values; give"),
+            (["a,b", CELL], "printed.csv:1: has columns a,b; give table,beam,"),
+            (["# x", HEADER, CELL, CELL], "printed.csv:4: is the cell of line 3 again; remove one"),
+            ([HEADER, "1,long"], "printed.csv:2: 2 values for 12 columns; add or remove some"),
+            (
+                [HEADER, CELL.replace("free", "fre")],
+                "printed.csv:2: mesh_type: unknown mesh type 'fre'; did you mean 'free'?",
+            ),
+            ([HEADER, CELL.replace("traction", "pull")], "printed.csv:2: load: unknown load 'pull'; known:"),
+            ([HEADER, CELL.replace("8.13", "8,13")], "printed.csv:2: 13 values for 12 columns;"),
+            (
+                [HEADER, CELL.replace("8.13", "x")],
+                "printed.csv:2: displacement_mm: 'x' is not a number of 0 or more; give",
+            ),
+            ([HEADER, CELL.replace("8.13", "nan")], "printed.csv:2: displacement_mm: 'nan' is not a number"),
+            ([HEADER, CELL.replace("8.13", "-8.13")], "printed.csv:2: displacement_mm: '-8.13' is not a number"),
+        ],
+    )
+    def test_refused(self, refusal, with_printed, lines, says):
+        assert says in refusal(with_printed(*lines))
+
+    def test_not_text(self, refusal, with_printed, tmp_path):
+        text = with_printed()
+        (tmp_path / "printed.csv").write_bytes(b"\xff\xfe")
+        assert "printed: 'printed.csv' cannot be read: not UTF-8 text; give" in refusal(text)
+
+
+def test_remarks_of_the_paper_are_few():
+    counted = Counter(bool(cell.remark) for cell in load_study(CONFIG / "paper.yaml").printed)
+    assert counted == {True: 12, False: 33}
