@@ -86,7 +86,7 @@ def changed(*replacements):
     return text
 
 
-# -- what a study asks for -----------------------------------------------------------------------------------------------
+# -- what a study asks for ---------------------------------------------------------------------------------------------
 
 
 class TestExpansion:
@@ -96,7 +96,8 @@ class TestExpansion:
         assert len(study.scenes) == 8 * 3 * 2 + 1
         assert len(study.curves) == 8 * 2
         assert len(study.references) == 3
-        assert [(grid.name, len(grid.scenes), len(grid.curves)) for grid in study.grids] == [("pull", 48, 16), ("push", 1, 0)]  # fmt: skip
+        counts = [(grid.name, len(grid.scenes), len(grid.curves)) for grid in study.grids]
+        assert counts == [("pull", 48, 16), ("push", 1, 0)]
 
     def test_values_are_si(self, load):
         study = load(SMALL)
@@ -253,14 +254,15 @@ def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, ask
         assert getattr(shuffled, name) == getattr(study, name)
 
 
-# -- the studies of the repository ---------------------------------------------------------------------------------------
+# -- the studies of the repository -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(CONFIG / "paper.yaml")
 
 
 class TestPaper:
-    @pytest.fixture(scope="class")
-    def study(self):
-        return load_study(CONFIG / "paper.yaml")
-
     def test_counts(self, study):
         counted = [len(items) for items in (study.meshes, study.scenes, study.curves, study.references)]
         assert counted == [18, 45 * 3 * 2, 45 * 2, 9 + 6 - 6]
@@ -325,7 +327,7 @@ def test_quick_is_small_but_has_everything():
         assert study.axes[dimension] == whole[dimension]
 
 
-# -- bad input -----------------------------------------------------------------------------------------------------------
+# -- bad input ---------------------------------------------------------------------------------------------------------
 
 LONG = "{length: 200 mm, height: 30 mm}"
 PULL_FORCE = "force: {long: 300 kN, short: 20 kN}"
@@ -333,7 +335,7 @@ PULL_FORCE = "force: {long: 300 kN, short: 20 kN}"
 REFUSED = {
     "misspelt key": (
         ("length: 200", "lenght: 200"),
-        "study.yaml:3: beams.long.lenght: unknown key 'lenght'; did you mean 'length'? known: length, height, thickness",
+        "study.yaml:3: beams.long.lenght: unknown key 'lenght'; did you mean 'length'? known: length, height",
     ),
     "misspelt key of the file": (("grids:", "grid:"), "study.yaml:14: grid: unknown key 'grid'; did you mean 'grids'?"),
     "missing key": ((LONG, "{length: 200 mm}"), "study.yaml:3: beams.long.height: 'height' is missing; give a length"),
@@ -366,19 +368,18 @@ REFUSED = {
         ("mesh_type: free,", "mesh_type: structured,"),
         "a second stiffness for structured meshes of steel;",
     ),
-    "no list of stiffnesses": (("    stiffness:\n", "    stiffness: 5\n    #"), None),
     "stiffness of unknown material": (
         ("free, material: steel", "free, material: stel"),
         "unknown material 'stel'; did you",
     ),
     "no stiffness": (
         ("      - {mesh_type: free, material: steel, value: 185e6 N/m}\n", ""),
-        "study.yaml:20: grids.pull.definition: 'paper' has no stiffness for free meshes of steel; add {mesh_type: free, "
-        "material: steel, value: <stiffness> N/m} to definitions.paper.stiffness",
+        "study.yaml:21: grids.pull.definition: 'paper' has no stiffness for free meshes of steel; add "
+        "{mesh_type: free, material: steel, value: <stiffness> N/m} to definitions.paper.stiffness",
     ),
     "no calibration": (
         ("  calibrated: {beam: long, load: traction}\n", ""),
-        "study.yaml:20: grids.pull.definition: 'calibrated' needs to know on what; add definitions.calibrated",
+        "study.yaml:21: grids.pull.definition: 'calibrated' needs to know on what; add definitions.calibrated",
     ),
     "calibration on unknown beam": (
         ("{beam: long,", "{beam: lang,"),
@@ -393,39 +394,39 @@ REFUSED = {
     "Poisson's ratio nan": (("poisson_ratio: 0.3", "poisson_ratio: nan"), "'nan' is out of range; give"),
     "negative force": (
         (PULL_FORCE, "force: -20 kN"),
-        "study.yaml:20: grids.pull.force: '-20 kN' is not above zero; the load's name carries the sign: give a magnitude",
+        "study.yaml:21: grids.pull.force: '-20 kN' is not above zero; the load's name carries the sign: give",
     ),
     "negative force of a beam": (
         ("short: 20 kN", "short: -20 kN"),
-        "study.yaml:20: grids.pull.force.short: '-20 kN' is not",
+        "study.yaml:21: grids.pull.force.short: '-20 kN' is not",
     ),
     "force of unknown beam": (
         ("short: 20 kN", "shirt: 20 kN"),
-        "study.yaml:20: grids.pull.force.shirt: unknown beam 'shirt'",
+        "study.yaml:21: grids.pull.force.shirt: unknown beam 'shirt'",
     ),
     "no force of a beam": (
         (", short: 20 kN", ""),
-        "study.yaml:20: grids.pull.force: no force for beam 'short'; add 'short:",
+        "study.yaml:21: grids.pull.force: no force for beam 'short'; add 'short:",
     ),
     "no forces": (
         (PULL_FORCE, "force: {}"),
-        "study.yaml:20: grids.pull.force: no force at all; give one for each beam",
+        "study.yaml:21: grids.pull.force: no force at all; give one for each beam",
     ),
     "list of forces": (
         (PULL_FORCE, "force: [1 N]"),
-        "study.yaml:20: grids.pull.force: a list instead of a force such as",
+        "study.yaml:21: grids.pull.force: a list instead of a force such as",
     ),
     "two forces": (
         ("load: compression\n    force: 20 kN", "load: traction\n    force: 30 kN"),
-        "study.yaml:29: grids.push.force: 30000 N on beam 'short' of steel in traction, but grid 'pull' has 20000 N; give",
+        "study.yaml:30: grids.push.force: 30000 N on beam 'short' of steel in traction, but grid 'pull' has 20000 N;",
     ),
     "mesh size larger than the beam": (
         ("[2 mm, 5 mm]", "[2 mm, 25 mm]"),
-        "study.yaml:17: grids.pull.mesh_size[1]: '25 mm' is larger than beam 'short'; give at most its smaller side, 20 mm",
+        "study.yaml:18: grids.pull.mesh_size[1]: '25 mm' is larger than beam 'short'; give at most its smaller",
     ),
     "tiny mesh size": (
         ("[2 mm, 5 mm]", "2 um"),
-        "study.yaml:17: grids.pull.mesh_size: '2 um' gives beam 'long' 2e+09 part",
+        "study.yaml:18: grids.pull.mesh_size: '2 um' gives beam 'long' 2e+09 part",
     ),
     "mesh size twice": (
         ("[2 mm, 5 mm]", "[2 mm, 0.2 cm]"),
@@ -469,19 +470,19 @@ REFUSED = {
     ),
     "empty list": (
         ("[2 mm, 5 mm]", "[]"),
-        "study.yaml:17: grids.pull.mesh_size: an empty list leaves the grid empty; give at",
+        "study.yaml:18: grids.pull.mesh_size: an empty list leaves the grid empty; give at",
     ),
     "empty item": (
         ("[2 mm, 5 mm]", "[~]"),
-        "study.yaml:17: grids.pull.mesh_size[0]: nothing instead of a length such as",
+        "study.yaml:18: grids.pull.mesh_size[0]: nothing instead of a length such as",
     ),
     "empty grid": (
         ("  push:\n", "  nothing: {}\n  push:\n"),
-        "study.yaml:23: grids.nothing.beam: 'beam' is missing; give",
+        "study.yaml:24: grids.nothing.beam: 'beam' is missing; give",
     ),
     "duplicate grid": (
         ("  push:", "  pull:"),
-        "study.yaml:23: grids.pull: 'pull' is given twice, first in line 15; rename or",
+        "study.yaml:24: grids.pull: 'pull' is given twice, first in line 15; rename or",
     ),
     "duplicate beam": (
         ("  short: {", "  long: {"),
@@ -522,7 +523,7 @@ def test_refused(refusal, case):
     replacement, expected = REFUSED[case]
     message = refusal(changed(replacement))
     assert message.startswith("study.yaml:")
-    assert (expected or "stiffness") in message
+    assert expected in message
 
 
 BROKEN = {
@@ -581,6 +582,14 @@ def test_several_problems_are_one_message(refusal):
     assert lines[5] == "... and 3 more"
 
 
+LEAVES = (
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9) | st.sampled_from(["1 mm", "1 N"])
+)
+ANYTHING = st.recursive(
+    LEAVES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
+)
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_value_anywhere_is_read_or_refused(load, data):
@@ -592,17 +601,14 @@ def test_any_value_anywhere_is_read_or_refused(load, data):
         if not isinstance(place[key], dict | list) or data.draw(st.booleans()):
             break
         place = place[key]
-    leaves = (
-        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9) | st.sampled_from(["1 mm", "1 N"])
-    )
-    place[key] = data.draw(st.recursive(leaves, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)))  # fmt: skip
+    place[key] = data.draw(ANYTHING)
     try:
         load(yaml.safe_dump(config))
     except StudyError as error:
         assert str(error)
 
 
-# -- printed values ------------------------------------------------------------------------------------------------------
+# -- printed values ----------------------------------------------------------------------------------------------------
 
 HEADER = (
     "table,beam,mesh_type,mesh_size_mm,material,load,force_N,stiffness_N_per_m,"
