@@ -64,8 +64,10 @@ def _draw(curves, root, selection, folder, stem):
         printed = np.unique(root.paper_stiffness.values[np.isfinite(root.paper_stiffness.values)])
         for value in printed:
             axes.axvline(value / unit, color="0.45", linewidth=0.8, linestyle=(0, (2, 2)), zorder=1)
-            axes.annotate("paper", (value / unit, 0.985), xycoords=("data", "axes fraction"), fontsize=7.5, color="0.35",
-                          xytext=(2, 0), textcoords="offset points", va="top")  # fmt: skip
+            place = {"xy": (value / unit, 0.985), "xycoords": ("data", "axes fraction")}
+            axes.annotate(
+                "paper", **place, xytext=(2, 0), textcoords="offset points", va="top", color="0.35", fontsize=7.5
+            )
         axes.plot([], [], marker="o", color="0.3", linestyle="", label="minimum")
         axes.plot([], [], marker="|", markersize=10, markeredgewidth=1.6, color="0.3", linestyle="", label="predicted")
         if unstable_shown:

@@ -11,16 +11,16 @@ ROW_HEIGHT = math.sqrt(3) / 2
 
 
 def structured(length, height, size):
-    """Mesh a box with rows of near-equilateral triangles along x.
+    r"""Mesh a box with rows of near-equilateral triangles along x.
 
     The number of cells along x and of rows are the whole numbers nearest to the exact lattice; both directions are
     then stretched to fit. Every other line of points is shifted by half a cell and closed with a point on either end,
     so that the ends are straight::
 
         +---+---+---+      4 points, as the lowest line
-        |\\ / \\ / \\ /|
+        |\ / \ / \ /|
         +-+---+---+-+      shifted by half an edge, closed at both ends: 5 points
-        |/ \\ / \\ / \\|
+        |/ \ / \ / \|
         +---+---+---+
 
     Parameters

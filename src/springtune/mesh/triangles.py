@@ -8,13 +8,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """A conforming mesh of counter-clockwise triangles.
+    r"""A conforming mesh of counter-clockwise triangles.
 
     ::
 
         3 ------- 4
-         \\  B   / \\        edges    each pair of particles once, smaller index first
-          \\   /  A \\       triangles_per_edge    2 inside (the edge between A and B), 1 on the outline
+         \  B   / \        edges    each pair of particles once, smaller index first
+          \   /  A \       triangles_per_edge    2 inside (the edge between A and B), 1 on the outline
            0 ------- 1
 
     Parameters
