@@ -1,6 +1,7 @@
 # make study                             the paper's study: results/paper
 # make study STUDY=config/quick.yaml     another one
-# make test                              the tests; `make slow` runs the slow ones
+# make test                              the tests; `make slow` runs the slow ones, and draws
+#                                        new examples for the others
 STUDY ?= config/paper.yaml
 VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
@@ -16,6 +17,7 @@ test: $(VENV)/.test
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow
+	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 lint: $(VENV)/.test
 	ruff check

@@ -2,5 +2,12 @@
 
 import os
 
+from hypothesis import settings
+
 # Tests run in several processes; threads of theirs would only fight for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# `make test` draws the same examples every time, so that it says the same of the same commit; `make slow` draws anew.
+settings.register_profile("same", derandomize=True)
+settings.register_profile("anew", max_examples=400)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))

@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 
 def deformation_error(displacement, reference):
@@ -47,6 +48,13 @@ def best_stiffness(stiffness, displacement, reference):
     if known.sum() < 2 or not np.isfinite(reference):
         return np.nan
     softness, error = 1.0 / stiffness[known][::-1], displacement[known][::-1] - reference
-    roots = CubicSpline(softness, error).roots(extrapolate=False)
-    roots = roots[np.isfinite(roots)]
-    return float(1.0 / roots.min()) if len(roots) else np.nan
+    # Bracketed by the samples: the roots of the pieces lose one that rounding puts on the seam of two pieces.
+    met = np.flatnonzero(np.sign(error[:-1]) * np.sign(error[1:]) <= 0)
+    if not len(met):
+        return np.nan
+    ends = softness[met[0] : met[0] + 2]
+    curve = CubicSpline(softness, error)
+    values = curve(ends)
+    if values[0] * values[1] >= 0:  # an end is a root but for rounding
+        return float(1.0 / ends[np.argmin(np.abs(values))])
+    return float(1.0 / brentq(curve, *ends, xtol=1e-15 * ends[0], rtol=1e-14))
