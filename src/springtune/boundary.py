@@ -18,7 +18,7 @@ def end_weights(mesh, length):
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : Mesh
     length : float
         Where the right end is [m].
 

@@ -5,6 +5,8 @@ with ``k_e (l - L_e) d / l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l
 
 Stiffnesses enter a network as multiples of one reference stiffness and loads as force over that stiffness [m]: a
 network of uniform stiffness k under a force F deforms by F/k alone, so one solution serves all pairs of equal F/k.
+
+A network may have energies besides its springs, see `springtune.energies`; what has none pays nothing for them.
 """
 
 from functools import cached_property
@@ -13,26 +15,31 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from .mesh.triangles import signed_areas
-
 
 class Network:
     """Particles joined by springs, some of their directions held.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : Mesh
         Its points are the particles, its edges the springs.
     held : ndarray of bool, shape (n_points, 2)
         True where a particle cannot move in x or y.
     stiffness : ndarray of float, shape (n_springs,)
         Stiffness of each spring as a multiple of the reference stiffness [1].
+    energies : sequence of Energy, optional
+        Energies besides the springs'.
+    like : Network, optional
+        A network with the same mesh and the same directions held, whose numbering this one takes over.
     """
 
-    def __init__(self, mesh, held, stiffness):
+    def __init__(self, mesh, held, stiffness, energies=(), like=None):
         self.mesh = mesh
         self.held = held
         self.stiffness = stiffness
+        self.energies = tuple(energies)
+        if like is not None:
+            self._pattern = like._pattern
         self.first, self.second = mesh.edges.T
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths
@@ -62,7 +69,7 @@ class Network:
 
     def gather(self, forces):
         """Unknowns' share of spring forces, shape (n_springs, 2), that pull the first end towards the second."""
-        return self._pattern.gather(forces)
+        return self.reduce(self._pattern.sum_springs(forces))
 
     # -- mechanics --------------------------------------------------------------------------------------------------
 
@@ -78,21 +85,38 @@ class Network:
         squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
         with np.errstate(divide="ignore", invalid="ignore"):
             pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
-        return -self.gather(pull[:, None] * vectors)
+        resistance = -self.gather(pull[:, None] * vectors)
+        for energy in self.energies:
+            resistance += self.reduce(self._pattern.sum_cells(energy.corners, energy.forces(displacements)))
+        return resistance
 
     def linear_resistance(self, displacements):
-        """As `resistance`, of springs whose elongation is linear in the displacements."""
+        """As `resistance`, of a network that is linear in the displacements."""
+        return self.reduce(self.linear_forces(displacements))
+
+    def linear_forces(self, displacements):
+        """Forces with which a linear network resists, of held directions, too, shape (n_points, 2)."""
         normals = self.rest_vectors / self.rest_lengths[:, None]
         pull = self.stiffness * np.einsum("ij,ij->i", normals, self.stretch(displacements))
-        return -self.gather(pull[:, None] * normals)
+        resistance = -self._pattern.sum_springs(pull[:, None] * normals)
+        for energy, matrices in zip(self.energies, self._rest_tangents):
+            count, corners = energy.corners.shape
+            forces = np.einsum("nij,nj->ni", matrices, displacements[energy.corners].reshape(count, -1))
+            resistance += self._pattern.sum_cells(energy.corners, forces.reshape(count, corners, 2))
+        return resistance
+
+    @cached_property
+    def _rest_tangents(self):
+        return [energy.tangent() for energy in self.energies]
 
     def energy(self, displacements):
-        """Energy of the springs over the reference stiffness [m2]."""
+        """Energy of the network over the reference stiffness [m2]."""
         relative = self.stretch(displacements)
         vectors = self.rest_vectors + relative
         lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
         elongations = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative) / (lengths + self.rest_lengths)
-        return 0.5 * float(self.stiffness @ elongations**2)
+        springs = 0.5 * float(self.stiffness @ elongations**2)
+        return springs + sum(energy.value(displacements) for energy in self.energies)
 
     def tangent(self, displacements=None):
         """Derivative of the resistance by the unknowns [1], a sparse symmetric matrix.
@@ -114,7 +138,16 @@ class Network:
         xx = across + along * vectors[:, 0] ** 2
         xy = along * vectors[:, 0] * vectors[:, 1]
         yy = across + along * vectors[:, 1] ** 2
-        return self._pattern.assemble(xx, xy, yy)
+        data = self._pattern.spring_entries(xx, xy, yy)
+        for number, energy in enumerate(self.energies):
+            matrices = self._rest_tangents[number] if displacements is None else energy.tangent(displacements)
+            data += self._pattern.cell_entries(energy.corners, matrices)
+        return self._pattern.matrix(data)
+
+    @cached_property
+    def rest_factor(self):
+        """Tangent factorised at rest."""
+        return self.factorize()
 
     def factorize(self, displacements=None):
         """Factorised tangent.
@@ -136,8 +169,8 @@ class Network:
         return Factor(lu)
 
     def inverted(self, displacements):
-        """Whether any triangle of the mesh is turned inside out."""
-        return bool((signed_areas(self.mesh.points + displacements, self.mesh.triangles) <= 0).any())
+        """Whether any cell of the mesh is turned inside out."""
+        return self.mesh.inverted(self.mesh.points + displacements)
 
 
 class SingularError(ArithmeticError):
@@ -161,7 +194,10 @@ class Factor:
 
 
 class _Pattern:
-    """Numbering of the unknowns and sparsity of the tangent: what depends on topology alone."""
+    """Numbering of the unknowns and sparsity of the tangent: what depends on topology alone.
+
+    All particles of a cell are joined by springs, so the springs' entries are all there are.
+    """
 
     def __init__(self, springs, held):
         self.springs = springs
@@ -170,14 +206,22 @@ class _Pattern:
         self.size = len(self.places)
         number = np.full(held.size, -1)
         number[self.places] = np.arange(self.size)
+        self.number = number.reshape(-1, 2)
         # Each spring has 4 x 4 entries: its two ends, each with two directions.
-        local = number.reshape(-1, 2)[springs].reshape(-1, 4)
-        rows, columns = np.repeat(local, 4, axis=1).ravel(), np.tile(local, (1, 4)).ravel()
-        self.kept = np.flatnonzero((rows >= 0) & (columns >= 0))
-        codes, self.slots = np.unique(columns[self.kept] * self.size + rows[self.kept], return_inverse=True)
-        columns, rows = np.divmod(codes, self.size)
+        self.kept, codes = self._codes(springs)
+        self.codes, self.slots = np.unique(codes, return_inverse=True)
+        columns, rows = np.divmod(self.codes, self.size)
         self.indices = rows.astype(np.int32)
         self.pointers = np.searchsorted(columns, np.arange(self.size + 1)).astype(np.int32)
+        self.cells = {}
+
+    def _codes(self, particles):
+        """Which entries of the matrices of groups of particles are kept, and one number for the place of each."""
+        local = self.number[particles].reshape(len(particles), -1)
+        width = local.shape[1]
+        rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()
+        kept = np.flatnonzero((rows >= 0) & (columns >= 0))
+        return kept, columns[kept] * self.size + rows[kept]
 
     def expand(self, unknowns):
         full = np.zeros(self.shape)
@@ -187,19 +231,34 @@ class _Pattern:
     def reduce(self, vectors):
         return vectors.ravel()[self.places]
 
-    def gather(self, forces):
+    def sum_springs(self, forces):
         first, second = self.springs.T
         count = self.shape[0]
         total = np.empty(self.shape)
         for axis in range(2):
             weights = forces[:, axis]
             total[:, axis] = np.bincount(first, weights, count) - np.bincount(second, weights, count)
-        return self.reduce(total)
+        return total
 
-    def assemble(self, xx, xy, yy):
+    def sum_cells(self, corners, forces):
+        places = corners.ravel()
+        total = [np.bincount(places, forces[:, :, axis].ravel(), self.shape[0]) for axis in range(2)]
+        return np.stack(total, axis=1)
+
+    def spring_entries(self, xx, xy, yy):
         block = np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2)
         entries = np.empty((len(xx), 2, 2, 2, 2))  # spring, end, direction, end, direction
         entries[:, 0, :, 0, :] = entries[:, 1, :, 1, :] = block
         entries[:, 0, :, 1, :] = entries[:, 1, :, 0, :] = -block
-        data = np.bincount(self.slots, entries.ravel()[self.kept], len(self.indices))
+        return np.bincount(self.slots, entries.ravel()[self.kept], len(self.indices))
+
+    def cell_entries(self, corners, matrices):
+        name = corners.shape[1]  # a mesh has its triangles and its quadrilaterals
+        if name not in self.cells:
+            kept, codes = self._codes(corners)
+            self.cells[name] = kept, np.searchsorted(self.codes, codes)
+        kept, slots = self.cells[name]
+        return np.bincount(slots, matrices.ravel()[kept], len(self.indices))
+
+    def matrix(self, data):
         return csc_array((data, self.indices, self.pointers), shape=(self.size, self.size))

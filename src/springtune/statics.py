@@ -66,10 +66,10 @@ class StaticProblem:
         self.load = network.reduce(pattern)
         self.load_norm = float(np.linalg.norm(self.load))
 
-    @cached_property
+    @property
     def rest_factor(self):
-        """Tangent factorised at rest."""
-        return self.network.factorize()
+        """Tangent factorised at rest, shared by all loads of the network."""
+        return self.network.rest_factor
 
     @cached_property
     def slope(self):
@@ -121,7 +121,10 @@ class StaticProblem:
         Equilibrium
         """
         iterations = 0
-        for start in (self.start.predict, lambda s: s * self.slope):
+        starts = [lambda s: s * self.slope]
+        if not self.network.energies:  # the series is of springs
+            starts.insert(0, lambda s: self.start.predict(s))
+        for start in starts:
             found = self.newton(s, start(s))
             iterations += found.iterations
             if found.converged:

@@ -95,7 +95,7 @@ def test_force_beyond_what_the_network_carries_is_not_converged(mesh_type):
 
 def test_straight_equilibrium_beyond_the_euler_load_is_seen_to_be_unstable():
     """200x30 clamped-free: 29.1 kN by Euler; the lattice gives E exactly, so 1.2 of it is unstable and 0.8 is not."""
-    relative = lambda mesh: 0.5 * mesh.triangles_per_edge  # noqa: E731
+    relative = lambda mesh: 0.5 * mesh.cells_per_edge  # noqa: E731
     problem, _ = beam_problem("structured", 0.2, 0.03, 5e-3, relative)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.03**3 / 12 / (4 * 0.2**2)
     assert euler == pytest.approx(29.1e3, rel=5e-3)

@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay
 
 from springtune.mesh import (
     MESH_TYPES,
-    TriangleMesh,
+    Mesh,
     free,
     lattice,
     quality,
@@ -39,8 +39,8 @@ def test_any_box_is_covered_once(mesh_type, length, height, size):
     assert areas.sum() == pytest.approx(length * height, rel=1e-12)
     # Euler's formula of a disc, and each edge at one or two triangles.
     assert len(mesh.points) - len(mesh.edges) + len(mesh.triangles) == 1
-    assert set(np.unique(mesh.triangles_per_edge)) <= {1, 2}
-    outline = sum(mesh.edge_lengths[mesh.triangles_per_edge == 1])
+    assert set(np.unique(mesh.cells_per_edge)) <= {1, 2}
+    outline = sum(mesh.edge_lengths[mesh.cells_per_edge == 1])
     assert outline == pytest.approx(2 * (length + height), rel=1e-12)
     for axis, end in ((0, length), (1, height)):
         for value in (0.0, end):
@@ -75,7 +75,7 @@ def test_lattice_is_equilateral_throughout():
 @pytest.mark.parametrize("size", [5e-3, 2e-3])
 def test_free_has_the_imposed_size_on_its_outline_and_is_delaunay(size):
     mesh = free(0.1, 0.02, size)
-    outline = mesh.edge_lengths[mesh.triangles_per_edge == 1]
+    outline = mesh.edge_lengths[mesh.cells_per_edge == 1]
     assert np.allclose(outline, size, rtol=1e-9)
     other = Delaunay(mesh.points).simplices
     ours, theirs = ({tuple(sorted(corners)) for corners in triangles.tolist()} for triangles in (mesh.triangles, other))
@@ -95,7 +95,7 @@ def test_free_is_the_same_mesh_in_another_process():
 
 
 def test_quality_of_a_right_isosceles_triangle():
-    mesh = TriangleMesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
+    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
     lengths = np.array([1.0, 1.0, np.sqrt(2)])
     expected = {"minimum_angle": 45.0, "edge_length_spread": lengths.std() / lengths.mean()}
     assert quality(mesh) == pytest.approx(expected)

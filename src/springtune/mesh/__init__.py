@@ -1,20 +1,44 @@
 """Meshes of a beam: their types, their quality and their files."""
 
-from .files import read_mesh, write_mesh
-from .free import free
-from .structured import lattice, structured
-from .triangles import TriangleMesh, quality, signed_areas
+from functools import partial
 
-MESH_TYPES = {"structured": structured, "free": free}
+from .cells import Mesh, corner_angles, quality, signed_areas
+from .files import MeshError, read_beam_mesh, read_mesh, write_mesh
+from .free import free
+from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
+from .squares import alternating, braced, right
+
+MESH_TYPES = {
+    "structured": structured,
+    "free": free,
+    "right": right,
+    "alternating": alternating,
+    "braced": braced,
+    "isosceles-0.3": partial(isosceles, poisson_ratio=0.3),
+    "isosceles-0.5": partial(isosceles, poisson_ratio=0.5),
+}
 """Mesh type -> function (length, height, size) that makes it."""
+
+QUADS = ("braced",)
+"""Mesh types of quadrilaterals; the others are of triangles."""
 
 __all__ = [
     "MESH_TYPES",
-    "TriangleMesh",
+    "QUADS",
+    "ROW_HEIGHT",
+    "Mesh",
+    "MeshError",
+    "alternating",
+    "braced",
+    "corner_angles",
     "free",
+    "isosceles",
     "lattice",
     "quality",
+    "read_beam_mesh",
     "read_mesh",
+    "right",
+    "row_height",
     "signed_areas",
     "structured",
     "write_mesh",

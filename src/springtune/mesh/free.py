@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .triangles import TriangleMesh, signed_areas
+from .cells import Mesh, signed_areas
 
 
 def free(length, height, size):
@@ -20,7 +20,7 @@ def free(length, height, size):
 
     Returns
     -------
-    TriangleMesh
+    Mesh
     """
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
 
@@ -40,4 +40,4 @@ def free(length, height, size):
     points *= np.array([length, height]) / box
     inverted = signed_areas(points, triangles) < 0
     triangles[inverted] = triangles[inverted][:, ::-1]
-    return TriangleMesh(points, triangles)
+    return Mesh(points, triangles)

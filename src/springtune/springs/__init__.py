@@ -1,14 +1,16 @@
 """Definitions: rules that give every spring of a mesh its stiffness. One module each.
 
-A definition's module has ``springs(mesh, material, thickness, stiffness)`` and returns the reference stiffness [N/m]
-and each spring's multiple of it, shape (n_edges,). `stiffness` is the uniform stiffness that a study or a calibration
-hands to those definitions that do not derive one, and None for all others.
+A definition is a function ``springs(mesh, material, thickness)`` that returns `Springs`; where it is told a uniform
+stiffness or cases to match, these come as a fourth argument. It raises `DefinitionError` where it cannot live on a mesh
+or with a material.
 """
 
+import importlib
 from dataclasses import dataclass
-from types import ModuleType
 
-from . import calibrated, lattice, paper
+from .base import DefinitionError, Springs
+
+__all__ = ["DEFINITIONS", "Definition", "DefinitionError", "Springs"]
 
 
 @dataclass(frozen=True)
@@ -19,32 +21,65 @@ class Definition:
     ----------
     name : str
         Label in a study and in the dataset.
-    module : module
-        Where its formula stands.
+    place : str
+        Module and function where its formula stands.
     uniform : bool
         Whether all springs have one stiffness, so that it is a number to report.
+    cells : tuple of int
+        Numbers of corners of the cells that it can have.
+    needs : str
+        What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
     """
 
     name: str
-    module: ModuleType
-    uniform: bool
+    place: str
+    uniform: bool = False
+    cells: tuple = (3, 4)
+    needs: str = ""
+
+    @property
+    def function(self):
+        """The function; its module is imported when first asked for."""
+        module, _, name = self.place.partition(":")
+        return getattr(importlib.import_module(f".{module}", __name__), name or "springs")
 
     @property
     def summary(self):
-        """First line of the module's docstring."""
-        return self.module.__doc__.partition("\n")[0]
+        """First line of the function's docstring, references to other docstrings left out."""
+        return self.function.__doc__.partition("\n")[0].partition("; see `")[0].rstrip(".")
 
-    def springs(self, mesh, material, thickness, stiffness=None):
-        """Reference stiffness [N/m] and each spring's multiple of it [1]; see the module."""
-        return self.module.springs(mesh, material, thickness, stiffness)
+    def springs(self, mesh, material, thickness, given=None):
+        """Springs of a mesh; `given` is what the definition `needs`, [N/m] or a list of cases."""
+        arguments = (given,) if self.needs else ()
+        return self.function(mesh, material, thickness, *arguments)
 
 
 DEFINITIONS = {
     definition.name: definition
     for definition in (
-        Definition("paper", paper, uniform=True),
-        Definition("calibrated", calibrated, uniform=True),
-        Definition("lattice", lattice, uniform=False),
+        Definition("paper", "paper", uniform=True, needs="stiffness"),
+        Definition("calibrated", "calibrated", uniform=True, needs="stiffness"),
+        Definition("uniform", "uniform", uniform=True),
+        Definition("density", "density", uniform=True),
+        Definition("oriented", "oriented", uniform=True),
+        Definition("lattice", "lattice"),
+        Definition("lloyd", "lloyd"),
+        Definition("van-gelder", "van_gelder", cells=(3,)),
+        Definition("van-gelder-general", "van_gelder:general", cells=(3,)),
+        Definition("baudet", "baudet", cells=(4,)),
+        Definition("baudet-corrected", "baudet:corrected", cells=(4,)),
+        Definition("flechon", "baudet:incompressible", cells=(4,)),
+        Definition("axis-exact", "axis_exact"),
+        Definition("element-fit", "element_fit"),
+        Definition("annealed", "annealed", needs="cases"),
+        Definition("evolved", "evolved", needs="cases"),
+        Definition("adjoint", "adjoint"),
+        Definition("delingette-tensile", "delingette:tensile", cells=(3,)),
+        Definition("patch", "patch"),
+        Definition("patch-area", "patch:with_area"),
+        Definition("area", "area"),
+        Definition("angular", "angular", cells=(3,)),
+        Definition("delingette", "delingette", cells=(3,)),
     )
 }
 """Definitions by name."""

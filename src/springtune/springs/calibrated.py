@@ -6,7 +6,7 @@ mean over the mesh sizes serves every beam, size and load of that mesh type and 
 
 import math
 
-from .lattice import uniform
+from . import paper
 
 
 def calibrate(best_stiffnesses):
@@ -34,5 +34,8 @@ def calibrate(best_stiffnesses):
 
 
 def springs(mesh, material, thickness, stiffness):
-    """Uniform springs of the calibrated stiffness; parameters and returns as in `springtune.springs.paper`."""
-    return stiffness, uniform(mesh)
+    """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
+
+    Parameters and returns as in `springtune.springs.paper`.
+    """
+    return paper.springs(mesh, material, thickness, stiffness)

@@ -2,40 +2,62 @@
 
 An equilateral network of springs k has ``E t = 2 k / sqrt(3)`` and nu = 1/3 whatever k is (Cauchy relations of a
 network of central springs). Each triangle contributes ``sqrt(3)/4 E t`` to its edges: an edge inside gets
-``sqrt(3)/2 E t``, one on the outline, which belongs to one triangle, half of it. This is the triangle of Lloyd, Szekely
-and Harders (IEEE TVCG 13(5):1081, 2007), for which their match with finite elements requires nu = 1/3.
+``sqrt(3)/2 E t``, one on the outline, which belongs to one triangle, half of it.
 
-With full stiffness on the outline a beam of height H with edges a is too stiff by ``1 + sqrt(3)/2 a/H`` in tension.
+A rectangle with both diagonals, sides l and h, contributes ``3 E t (3 h^2 - l^2) / (16 l h)`` to those of length l,
+likewise to those of length h, and ``3 E t (l^2 + h^2) / (16 l h)`` to its diagonals: 3/8 E t each on a square. That is
+exact at nu = 1/3 (Baudet's rectangle, see `springtune.springs.baudet`, at that ratio).
 
-Assumptions: near-equilateral triangles; exact on equilateral rows.
+With full stiffness on the outline a beam of height H with edges a is too stiff by ``1 + sqrt(3)/2 a/H`` in tension and,
+to leading order, by ``1 + 3 sqrt(3)/2 a/H`` in bending.
+
+Assumptions: near-equilateral triangles, or rectangles; exact on equilateral rows and on rectangles.
 """
 
 import math
 
 import numpy as np
 
+from .base import Springs, not_negative, rectangles_only
+
 COEFFICIENT = math.sqrt(3) / 2
 """Stiffness of an edge inside over E t [1]."""
 
 
-def springs(mesh, material, thickness, stiffness=None):
-    """Springs of the lattice.
+def springs(mesh, material, thickness):
+    """Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : Mesh
     material : Material
     thickness : float
         Thickness t of the sheet [m].
-    stiffness : None
-        Not used: the stiffness is derived.
 
     Returns
     -------
-    float, ndarray
-        Stiffness of an edge inside [N/m] and multiples of it [1], shape (n_edges,).
+    Springs
+
+    Raises
+    ------
+    DefinitionError
+        If the mesh has quadrilaterals other than rectangles, or rectangles slender enough for a negative stiffness.
     """
-    return COEFFICIENT * material.young_modulus * thickness, 0.5 * mesh.triangles_per_edge
+    return Springs(COEFFICIENT * material.young_modulus * thickness, half_weight(mesh))
+
+
+def half_weight(mesh):
+    """Stiffness of each edge over that of an edge inside an equilateral lattice [1], shape (n_edges,)."""
+    parts = {}
+    if len(mesh.triangles):
+        parts[3] = np.full((len(mesh.triangles), 3), 0.5)
+    if len(mesh.quads):
+        along, across = rectangles_only(mesh)
+        scale = 3 / (16 * COEFFICIENT * along * across)
+        first, second = (not_negative(scale * (3 * b**2 - a**2)) for a, b in ((along, across), (across, along)))
+        diagonal = scale * (along**2 + across**2)
+        parts[4] = np.stack([first, second, first, second, diagonal, diagonal], axis=1)
+    return mesh.sum_to_edges(parts)
 
 
 def uniform(mesh):
@@ -43,10 +65,11 @@ def uniform(mesh):
     return np.ones(len(mesh.edges))
 
 
-def predicted_stiffness(material, beam, mesh_size):
-    """Uniform stiffness that gives a beam its axial stiffness, outline included.
+def predicted_stiffness(material, beam, mesh_size, load="traction"):
+    """Uniform stiffness that gives a beam its stiffness under a load, outline included.
 
-    ``k = sqrt(3)/2 E t / (1 + sqrt(3)/2 a/H)``, from the excess of the full outline.
+    ``k = sqrt(3)/2 E t / (1 + c sqrt(3)/2 a/H)``, from the excess of the full outline: c = 1 in tension and
+    compression, 3 in bending, where outer fibres count most.
 
     Parameters
     ----------
@@ -54,10 +77,13 @@ def predicted_stiffness(material, beam, mesh_size):
     beam : Beam
     mesh_size : float
         Edge length a [m].
+    load : str, optional
+        Key of `springtune.loads.LOADS`.
 
     Returns
     -------
     float
-        Stiffness [N/m].
+        Stiffness [N/m]; NaN for loads without a closed form.
     """
-    return COEFFICIENT * material.young_modulus * beam.thickness / (1.0 + COEFFICIENT * mesh_size / beam.height)
+    excess = {"traction": 1.0, "compression": 1.0, "bending": 3.0}.get(load, math.nan) * COEFFICIENT
+    return COEFFICIENT * material.young_modulus * beam.thickness / (1.0 + excess * mesh_size / beam.height)

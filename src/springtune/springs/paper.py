@@ -4,15 +4,16 @@ The paper chose one stiffness by hand from the sensitivity curve of its 200x30 b
 185e6 N/m on free meshes for steel, 800 N/m for rubber. Springs on the outline have the same stiffness as those inside.
 """
 
+from .base import Springs
 from .lattice import uniform
 
 
 def springs(mesh, material, thickness, stiffness):
-    """Uniform springs of the given stiffness.
+    """Uniform stiffness as printed: the value that the study states for a mesh type and material.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : Mesh
     material : Material
         Not used: the stiffness is stated, not derived.
     thickness : float
@@ -22,7 +23,6 @@ def springs(mesh, material, thickness, stiffness):
 
     Returns
     -------
-    float, ndarray
-        Reference stiffness [N/m] and multiples of it [1], shape (n_edges,).
+    Springs
     """
-    return stiffness, uniform(mesh)
+    return Springs(stiffness, uniform(mesh))

@@ -57,7 +57,7 @@ class Solver:
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : Mesh
     length, thickness : float
         Of the beam [m].
     """

@@ -1,0 +1,176 @@
+"""A mesh of triangles and quadrilaterals, and what a network needs to know of it."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+SIDES = {3: ((1, 2), (2, 0), (0, 1)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
+"""Corners of each side of a cell; side i of a triangle is opposite its corner i."""
+
+DIAGONALS = {3: (), 4: ((0, 2), (1, 3))}
+"""Corners that are joined across a cell."""
+
+
+def no_cells(corners):
+    """Corner indices of no cells, shape (0, corners)."""
+    return np.zeros((0, corners), dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    r"""A conforming mesh of counter-clockwise cells; each edge carries one spring.
+
+    ::
+
+        3 ------- 4 ------- 6
+         \  B   / \ \     / |     edges    each pair of joined particles once, smaller index first: the sides of all
+          \   /  A \   X    |              cells, and both diagonals of each quadrilateral
+           0 ------- 1 ---- 5     cells_per_edge    2 inside (between A and B), 1 on the outline and on diagonals
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        Coordinates [m].
+    triangles : ndarray of int, shape (n_triangles, 3)
+        Corner indices, counter-clockwise.
+    quads : ndarray of int, shape (n_quads, 4), optional
+        Corner indices, counter-clockwise.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    quads: np.ndarray = field(default_factory=lambda: no_cells(4))
+
+    @property
+    def cells(self):
+        """Corner indices of the cells by number of corners, those kinds that the mesh has."""
+        return {corners.shape[1]: corners for corners in (self.triangles, self.quads) if len(corners)}
+
+    @cached_property
+    def _edges(self):
+        pairs = [
+            corners[:, joined] for count, corners in self.cells.items() for joined in SIDES[count] + DIAGONALS[count]
+        ]
+        sizes = np.cumsum([0, *map(len, pairs)])
+        pairs = np.sort(np.concatenate(pairs), axis=1)
+        # One integer per edge sorts ten times faster than rows do.
+        codes, places, counts = np.unique(
+            pairs[:, 0] * len(self.points) + pairs[:, 1], return_inverse=True, return_counts=True
+        )
+        edges = np.stack(np.divmod(codes, len(self.points)), axis=1)
+        parts = iter(np.split(places, sizes[1:-1]))
+        of_cells = {
+            count: np.stack([next(parts) for _ in SIDES[count] + DIAGONALS[count]], axis=1) for count in self.cells
+        }
+        return edges, counts, of_cells
+
+    @property
+    def edges(self):
+        """Edges, shape (n_edges, 2), sorted, each once."""
+        return self._edges[0]
+
+    @property
+    def cells_per_edge(self):
+        """Number of cells at each edge, shape (n_edges,): 2 inside, 1 on the outline and on diagonals."""
+        return self._edges[1]
+
+    @property
+    def cell_edges(self):
+        """Edges of each cell by number of corners: sides as in `SIDES`, then diagonals, shape (n_cells, 3 or 6)."""
+        return self._edges[2]
+
+    @cached_property
+    def on_outline(self):
+        """Whether each edge is a side of the outline, shape (n_edges,)."""
+        outline = self.cells_per_edge == 1
+        if len(self.quads):
+            outline[self.cell_edges[4][:, 4:]] = False
+        return outline
+
+    @cached_property
+    def edge_lengths(self):
+        """Length of each edge [m], shape (n_edges,)."""
+        ends = self.points[self.edges]
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+    @cached_property
+    def area(self):
+        """Area of all cells [m2]."""
+        return float(sum(signed_areas(self.points, corners).sum() for corners in self.cells.values()))
+
+    def sum_to_edges(self, values):
+        """Sum of values given on the edges of each cell.
+
+        Parameters
+        ----------
+        values : dict of int to ndarray, shape (n_cells, 3 or 6)
+            As `cell_edges`, by number of corners.
+
+        Returns
+        -------
+        ndarray of float, shape (n_edges,)
+        """
+        total = np.zeros(len(self.edges))
+        for count, part in values.items():
+            total += np.bincount(self.cell_edges[count].ravel(), np.ravel(part), len(total))
+        return total
+
+    def outline_edges(self, coordinate, value):
+        """Outline edges that lie on a line ``x = value`` or ``y = value``.
+
+        Parameters
+        ----------
+        coordinate : int
+            0 for x, 1 for y.
+        value : float
+            Where the line is [m].
+
+        Returns
+        -------
+        ndarray of int, shape (n, 2)
+        """
+        outline = self.edges[self.on_outline]
+        tolerance = 1e-9 * np.ptp(self.points[:, coordinate])
+        return outline[(np.abs(self.points[outline, coordinate] - value) <= tolerance).all(axis=1)]
+
+    def inverted(self, points):
+        """Whether any corner of any cell is turned inside out at other positions of the particles [m]."""
+        for count, corners in self.cells.items():
+            for i in range(1 if count == 3 else count):
+                if (signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) <= 0).any():
+                    return True
+        return False
+
+
+def signed_areas(points, corners):
+    """Signed area of each cell [m2], shape (n_cells,); negative where it is inverted."""
+    # About the first corner: coordinates far from the origin would cost digits.
+    x, y = (points[corners] - points[corners[:, :1]]).transpose(2, 0, 1)
+    return 0.5 * sum(x[:, i] * y[:, i + 1] - x[:, i + 1] * y[:, i] for i in range(1, corners.shape[1] - 1))
+
+
+def corner_angles(points, corners):
+    """Angle at each corner of each cell [rad], shape (n_cells, n_corners)."""
+    here = points[corners]
+    first, second = np.roll(here, -1, axis=1) - here, np.roll(here, 1, axis=1) - here
+    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return np.arctan2(np.abs(cross), (first * second).sum(axis=2))
+
+
+def quality(mesh):
+    """Quality figures of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    dict
+        ``minimum_angle`` : smallest angle of all cells [degree];
+        ``edge_length_spread`` : standard deviation of the edge lengths over their mean [1].
+    """
+    smallest = min(corner_angles(mesh.points, corners).min() for corners in mesh.cells.values())
+    lengths = mesh.edge_lengths
+    return {"minimum_angle": float(np.degrees(smallest)), "edge_length_spread": float(lengths.std() / lengths.mean())}

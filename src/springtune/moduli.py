@@ -1,0 +1,135 @@
+"""Effective moduli of networks: patch tests with an even strain.
+
+::
+
+          o------o------o------o          u_x given on both ends, u_y free but for one particle: E and nu
+        ->|    sheet           |->
+          o------o------o------o          both given on the whole outline, as for even shear: G
+
+Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1].
+"""
+
+import numpy as np
+
+from .mesh import ROW_HEIGHT, lattice, row_height
+from .network import Network
+
+
+def patch_mesh(made, mesh_type, length, height, size):
+    """Mesh of a patch test.
+
+    Rows of triangles come as the exact lattice, not stretched to the box and with staggered ends; what they are fitted
+    for is another matter.
+
+    Parameters
+    ----------
+    made : callable
+        Makes the mesh of a box from length, height and size.
+    mesh_type : str
+        Key of `springtune.mesh.MESH_TYPES`, or the name of a mesh from files.
+    length, height : float
+        Extent of the box [m].
+    size : float
+        Length of an edge [m].
+
+    Returns
+    -------
+    Mesh
+    """
+    heights = {"structured": ROW_HEIGHT * size}
+    for name in ("isosceles-0.3", "isosceles-0.5"):
+        heights[name] = row_height(size, float(name.partition("-")[2]))
+    if mesh_type not in heights:
+        return made(length, height, size)
+    cells, rows = max(1, round(length / size)), max(1, round(height / heights[mesh_type]))
+    return lattice(cells, rows, size, heights[mesh_type])
+
+
+def ends(mesh):
+    """Particles of the left and of the right end, straight or staggered: of outline edges that lie on neither face."""
+    y = mesh.points[:, 1]
+    tolerance = 1e-9 * np.ptp(y)
+    edges = mesh.edges[mesh.on_outline]
+    faces = [(np.abs(y[edges] - value) <= tolerance).all(axis=1) for value in (y.min(), y.max())]
+    edges = edges[~faces[0] & ~faces[1]]
+    middles = mesh.points[edges, 0].mean(axis=1)
+    left = middles < 0.5 * (middles.min() + middles.max())
+    return np.unique(edges[left]), np.unique(edges[~left])
+
+
+def mean_gradient(mesh, displacements):
+    """Mean displacement gradient over the area [1], shape (2, 2): derivative of row by column."""
+    total = np.zeros((2, 2))
+    for corners in mesh.cells.values():
+        # By the divergence theorem, side by side around each cell.
+        here, moved = mesh.points[corners], displacements[corners]
+        side = np.roll(here, -1, axis=1) - here
+        normal = np.stack([side[..., 1], -side[..., 0]], axis=2)
+        middle = 0.5 * (np.roll(moved, -1, axis=1) + moved)
+        total += np.einsum("nia,nib->ab", middle, normal)
+    return total / mesh.area
+
+
+def axial_moduli(mesh, springs):
+    """Young's modulus along x and Poisson's ratio, between rollers.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    springs : Springs
+
+    Returns
+    -------
+    young_modulus : float
+        E t over the reference stiffness [1].
+    poisson_ratio : float
+        Mean transverse over mean axial strain, sign changed [1].
+    """
+    left, right = ends(mesh)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[left, 0] = held[right, 0] = True
+    held[left[0], 1] = True
+    network = Network(mesh, held, springs.relative, springs.energies)
+    given = np.zeros(mesh.points.shape)
+    given[held[:, 0], 0] = mesh.points[held[:, 0], 0]
+    moved = given + network.expand(network.rest_factor.solve(-network.linear_resistance(given)))
+    force = network.linear_forces(moved)[right, 0].sum()
+    height = mesh.area / (mesh.points[right, 0].mean() - mesh.points[left, 0].mean())
+    stress = force / height
+    if springs.lateral:
+        pushed = network.expand(network.rest_factor.solve(network.reduce(lateral_forces(mesh))))
+        own = network.linear_forces(pushed)[right, 0].sum() * springs.lateral
+        stress = force / (height - own)
+        moved += stress * springs.lateral * pushed
+    strain = mean_gradient(mesh, moved)
+    return stress / strain[0, 0], -strain[1, 1] / strain[0, 0]
+
+
+def shear_modulus(mesh, springs):
+    """Shear modulus under even shear of the whole outline.
+
+    Returns
+    -------
+    float
+        G t over the reference stiffness [1].
+    """
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[mesh.edges[mesh.on_outline]] = True
+    network = Network(mesh, held, springs.relative, springs.energies)
+    given = np.zeros(mesh.points.shape)
+    given[:, 0] = mesh.points[:, 1]
+    moved = given
+    if network.unknowns:
+        moved = given - network.expand(network.rest_factor.solve(network.linear_resistance(given)))
+    return float((network.linear_forces(moved) * given).sum()) / mesh.area
+
+
+def lateral_forces(mesh):
+    """Forces of a unit stress [N/m] that pulls outwards on the lower and the upper face, shape (n_points, 2)."""
+    forces = np.zeros(mesh.points.shape)
+    y = mesh.points[:, 1]
+    for value, sign in ((y.min(), -1.0), (y.max(), 1.0)):
+        edges = mesh.outline_edges(1, value)
+        share = np.abs(mesh.points[edges[:, 1], 0] - mesh.points[edges[:, 0], 0])
+        np.add.at(forces[:, 1], edges, sign * 0.5 * share[:, None])
+    return forces

@@ -1,0 +1,36 @@
+r"""Springs and angular springs: the angles of each triangle carry what the springs cannot.
+
+On an equilateral lattice of edge a
+
+.. math:: W = \sum_{edges} \tfrac{1}{2} k (l - L)^2 + \sum_{angles} \tfrac{1}{2} \beta (\theta - \theta_0)^2, \quad
+          k = \frac{E t}{\sqrt{3} (1 - \nu)}, \quad
+          \beta = \frac{a^2 E t (1 - 3 \nu)}{6 \sqrt{3} (1 - \nu^2)}
+
+has the bulk modulus ``sqrt(3) k / 2`` and the shear modulus ``sqrt(3) k / 4 + 3 sqrt(3) beta / (2 a^2)``: exact for
+every nu. beta is negative above 1/3, where the network stays stable. Edges on the outline have half of k; a^2 is that
+of the equilateral triangle of the same area. After Keating and Kirkwood, as reviewed by Ostoja-Starzewski (Appl. Mech.
+Rev. 55:35, 2002); derived and checked here. Assumptions: near-equilateral triangles.
+"""
+
+import math
+
+import numpy as np
+
+from ..energies import AngleEnergy
+from ..mesh import signed_areas
+from .base import Springs, triangles_only
+from .lattice import half_weight
+
+
+def springs(mesh, material, thickness):
+    """Springs for the bulk modulus and angular springs for the rest (Keating): any nu on lattices, no tuning.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    """
+    triangles_only(mesh)
+    nu = material.poisson_ratio
+    reference = material.young_modulus * thickness / (math.sqrt(3) * (1 - nu))
+    squares = 4 / math.sqrt(3) * signed_areas(mesh.points, mesh.triangles)
+    modulus = squares * (1 - 3 * nu) / (6 * (1 + nu))
+    energies = (AngleEnergy(mesh.points, mesh.triangles, modulus),) if np.abs(1 - 3 * nu) > 1e-15 else ()
+    return Springs(reference, half_weight(mesh), energies)

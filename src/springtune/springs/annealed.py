@@ -1,0 +1,42 @@
+"""Stiffness of each spring by simulated annealing on the displacements of a scene's reference.
+
+As Deussen, Kobbelt and Tuecke (1995) tuned springs: random changes of all stiffnesses, worse ones accepted with falling
+probability. The search is scipy's generalised annealing without its local search, from a fixed seed.
+"""
+
+import math
+
+import numpy as np
+from scipy.optimize import dual_annealing
+
+from .base import Springs
+from .identification import SPAN, Misfit
+
+MAX_EVALUATIONS = 300
+
+
+def springs(mesh, material, thickness, cases, evaluations=MAX_EVALUATIONS):
+    """Stiffness of each spring by simulated annealing on a scene's reference displacements.
+
+    Parameters
+    ----------
+    mesh, material, thickness
+        As in `springtune.springs.lattice.springs`.
+    cases : sequence of Case
+        What to match.
+    evaluations : int, optional
+        Solves that the search may take.
+
+    Returns
+    -------
+    Springs
+    """
+    misfit = Misfit(mesh, material, thickness, cases)
+    limit = math.log(SPAN)
+    found = dual_annealing(
+        misfit, [(-limit, limit)] * len(mesh.edges), maxfun=evaluations - 1, maxiter=evaluations, seed=1,
+        no_local_search=True, x0=np.zeros(len(mesh.edges)),
+        # Steps of a tenth of the range: larger ones never hit anything in so many dimensions.
+        initial_temp=1.0, visit=1.5,
+    )  # fmt: skip
+    return Springs(misfit.reference, misfit.start * np.exp(found.x), evaluations=misfit.evaluations)

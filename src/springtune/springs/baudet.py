@@ -1,0 +1,58 @@
+r"""Rectangles with both diagonals that keep the shear modulus (Baudet and others, 2006 to 2009), and two corrections.
+
+A rectangle of sides l and h gives, per element,
+
+.. math:: k_d = \frac{E t (l^2 + h^2)}{4 l h (1 + \nu)}, \quad
+          k_l = \frac{E t ((3 \nu + 2) h^2 - l^2)}{4 l h (1 + \nu)}, \quad
+          k_h = \frac{E t ((3 \nu + 2) l^2 - h^2)}{4 l h (1 + \nu)}.
+
+G is exact; the bulk modulus stays 3/4 E t whatever nu is, so Poisson's ratio moves the wrong way, and k_l is negative
+for (l/h)^2 > 3 nu + 2. Source: HAL hal-01493734 and hal-00994456, abstracts read, formulas derived again.
+
+Baudet's own correction adds forces: here the lateral stress (1 - 3 nu)/2 of the axial one on the long faces, outwards
+for nu < 1/3, derived as the stress that makes E and nu exact. It needs the axial force, so it is for uniaxial scenes.
+
+The incompressibility correction is in the manner of Flechon (2011), whose text could not be read: ours. An area energy
+of modulus ``E (3 nu - 1) / (4 (1 - nu))`` completes the bulk modulus to E / (2 (1 - nu)), so that areas are kept as
+well as they should be under any load; G stays exact, E and nu are not, since the springs are not isotropic.
+"""
+
+import numpy as np
+
+from ..energies import AreaEnergy
+from .base import Springs, from_rectangles, not_negative, rectangles_only
+
+
+def springs(mesh, material, thickness):
+    """Rectangles with both diagonals that keep the shear modulus (Baudet 2007); nu moves the wrong way.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on cells other than
+    rectangles, and on rectangles slender enough for a negative stiffness.
+    """
+    along, across = rectangles_only(mesh)
+    nu = material.poisson_ratio
+    scale = 1 / (4 * along * across * (1 + nu))
+    first = not_negative(scale * ((3 * nu + 2) * across**2 - along**2))
+    second = not_negative(scale * ((3 * nu + 2) * along**2 - across**2))
+    relative = from_rectangles(mesh, first, second, scale * (along**2 + across**2))
+    return Springs(material.young_modulus * thickness, relative)
+
+
+def corrected(mesh, material, thickness):
+    """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone.
+
+    Parameters, returns and errors as in `springs`.
+    """
+    plain = springs(mesh, material, thickness)
+    return Springs(plain.reference, plain.relative, lateral=(1 - 3 * material.poisson_ratio) / 2)
+
+
+def incompressible(mesh, material, thickness):
+    """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours).
+
+    Parameters, returns and errors as in `springs`.
+    """
+    plain = springs(mesh, material, thickness)
+    nu = material.poisson_ratio
+    modulus = np.full(len(mesh.quads), (3 * nu - 1) / (4 * (1 - nu)))
+    return Springs(plain.reference, plain.relative, (AreaEnergy(mesh.points, mesh.quads, modulus),))

@@ -1,0 +1,33 @@
+"""Stiffness of each spring by a genetic search on the displacements of a scene's reference.
+
+As Bianchi and others (2003, 2004) did for topology and stiffness, here for stiffness: a population of networks, of
+which mutants and crossings replace the worse ones. The search is scipy's differential evolution, from a fixed seed.
+"""
+
+import math
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from .base import Springs
+from .identification import SPAN, Misfit
+
+MAX_EVALUATIONS = 300
+POPULATION = 20
+
+
+def springs(mesh, material, thickness, cases, evaluations=MAX_EVALUATIONS):
+    """Stiffness of each spring by a genetic search on a scene's reference displacements.
+
+    Parameters and returns as in `springtune.springs.annealed.springs`.
+    """
+    misfit = Misfit(mesh, material, thickness, cases)
+    limit = math.log(SPAN)
+    generator = np.random.default_rng(1)
+    first = 0.2 * generator.standard_normal((POPULATION, len(mesh.edges)))
+    first[0] = 0.0
+    found = differential_evolution(
+        misfit, [(-limit, limit)] * len(mesh.edges), init=np.clip(first, -limit, limit), rng=generator, polish=False,
+        maxiter=evaluations // POPULATION - 1, tol=0.0, mutation=(0.2, 0.6), recombination=0.3,
+    )  # fmt: skip
+    return Springs(misfit.reference, misfit.start * np.exp(found.x), evaluations=misfit.evaluations)

@@ -1,0 +1,135 @@
+"""Stiffness of each spring from displacements that the network is to have: what searches minimise.
+
+A case is a load and the displacements that it should cause. The misfit of a network is
+
+    J = 1/2 sum over cases |u - u*|^2 / |u*|^2
+
+over all particles. Unknown are the logarithms of the stiffnesses, from a tenth to ten times those of
+`springtune.springs.lattice`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..network import Network, SingularError
+from . import lattice
+
+SPAN = 10.0
+"""Largest factor between a spring and where its search starts [1]."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A load and what it should do.
+
+    Attributes
+    ----------
+    held : ndarray of bool, shape (n_points, 2)
+        Directions that cannot move.
+    forces : ndarray of float, shape (n_points, 2)
+        Forces on the particles [N].
+    displacements : ndarray of float, shape (n_points, 2)
+        Displacements that the network should have [m].
+    """
+
+    held: np.ndarray
+    forces: np.ndarray
+    displacements: np.ndarray
+
+
+def patch_cases(mesh, material, thickness):
+    """Tension along x and y and shear of the free mesh under even tractions; what it should do is known exactly.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    material : Material
+    thickness : float
+        Thickness of the sheet [m].
+
+    Returns
+    -------
+    list of Case
+    """
+    x, y = mesh.points.T
+    corner = np.argmin(x + y)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[corner] = True
+    held[np.argmax(x - y), 1] = True  # the other end of the lower side
+    points = mesh.points - mesh.points[corner]
+    modulus, nu = material.young_modulus, material.poisson_ratio
+    cases = []
+    for stress, gradient in (
+        ([[1, 0], [0, 0]], [[1, 0], [0, -nu]]),
+        ([[0, 0], [0, 1]], [[-nu, 0], [0, 1]]),
+        ([[0, 1], [1, 0]], [[0, 2 * (1 + nu)], [0, 0]]),
+    ):
+        forces = modulus * thickness * outline_forces(mesh, np.array(stress, dtype=float))
+        cases.append(Case(held, forces, points @ np.array(gradient, dtype=float).T))
+    return cases
+
+
+def outline_forces(mesh, stress):
+    """Forces of an even stress on the outline, over the thickness, shape (n_points, 2)."""
+    total = np.zeros(mesh.points.shape)
+    for corners in mesh.cells.values():
+        # Cell by cell; inside they cancel.
+        here = mesh.points[corners]
+        side = np.roll(here, -1, axis=1) - here
+        pull = 0.5 * np.stack([side[..., 1], -side[..., 0]], axis=2) @ stress.T
+        np.add.at(total, corners, pull + np.roll(pull, 1, axis=1))
+    return total
+
+
+class Misfit:
+    """Misfit of networks that differ in stiffness, its gradient, and how often it was asked.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    material : Material
+    thickness : float
+    cases : sequence of Case
+    """
+
+    def __init__(self, mesh, material, thickness, cases):
+        start = lattice.springs(mesh, material, thickness)
+        self.reference, self.start = start.reference, start.relative
+        self.mesh, self.evaluations = mesh, 0
+        self.groups = {}
+        for case in cases:
+            self.groups.setdefault(case.held.tobytes(), []).append(case)
+        self.patterns = {name: Network(mesh, group[0].held, self.start) for name, group in self.groups.items()}
+
+    def __call__(self, logarithms):
+        """Misfit at natural logarithms of the stiffnesses over their start, shape (n_edges,)."""
+        return self.evaluate(logarithms, gradient=False)[0]
+
+    def evaluate(self, logarithms, gradient=True):
+        """Misfit and its gradient, shape (n_edges,), by one solve more for each case (adjoint method)."""
+        self.evaluations += 1
+        relative = self.start * np.exp(logarithms)
+        total, slope = 0.0, np.zeros(len(relative))
+        for name, cases in self.groups.items():
+            network = Network(self.mesh, cases[0].held, relative, like=self.patterns[name])
+            try:
+                factor = network.factorize()
+            except SingularError:
+                return np.inf, slope
+            loads = np.stack([network.reduce(case.forces) for case in cases], axis=1) / self.reference
+            wanted = np.stack([network.reduce(case.displacements) for case in cases], axis=1)
+            weights = 1 / np.array([np.sum(case.displacements**2) for case in cases])
+            found = factor.solve(loads)
+            miss = found - wanted
+            total += 0.5 * float((weights * (miss**2).sum(axis=0)).sum())
+            if gradient:
+                adjoint = factor.solve(miss * weights)
+                normals = network.rest_vectors / network.rest_lengths[:, None]
+                for number in range(len(cases)):
+                    stretches = [
+                        np.einsum("ij,ij->i", normals, network.stretch(network.expand(field[:, number])))
+                        for field in (found, adjoint)
+                    ]
+                    slope -= relative * stretches[0] * stretches[1]
+        return total, slope

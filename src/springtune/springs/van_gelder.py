@@ -1,0 +1,56 @@
+r"""Springs from the areas of the triangles around them (Van Gelder, J. Graphics Tools 3(2), 1998).
+
+For nu = 0
+
+.. math:: k_c = E t \sum_T \frac{A_T}{|c|^2},
+
+in general
+
+.. math:: k_c = \sum_T \frac{E t}{1 + \nu} \frac{A_T}{|c|^2}
+          + \frac{E t \nu}{1 - \nu^2} \frac{|a|^2 + |b|^2 - |c|^2}{8 A_T}
+
+with a, b the other sides of triangle T. The second term is half the cotangent of the opposite angle: negative where
+that is obtuse.
+
+The nu of the general form does not become the network's, which stays 1/3 on a lattice and what the mesh makes it
+elsewhere; it scales E wrongly: by (3 - nu) / (3 (1 - nu^2)) on a lattice. The form for nu = 0 is exact there.
+
+The form for nu = 0 stands in public code that cites the article; the general one is derived from its abstract.
+Assumptions: triangles.
+"""
+
+import numpy as np
+
+from ..mesh import signed_areas
+from .base import Springs, not_negative, triangles_only
+
+
+def _shapes(mesh):
+    triangles_only(mesh)
+    areas = signed_areas(mesh.points, mesh.triangles)[:, None]
+    return areas, mesh.edge_lengths[mesh.cell_edges[3]] ** 2
+
+
+def springs(mesh, material, thickness):
+    """Springs by area over squared length, the form for nu = 0 (Van Gelder 1998): exact on lattices with no tuning.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    """
+    areas, squares = _shapes(mesh)
+    return Springs(material.young_modulus * thickness, mesh.sum_to_edges({3: areas / squares}))
+
+
+def general(mesh, material, thickness):
+    """Springs by area over squared length, the general form (Van Gelder 1998), whose nu only scales E.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals, and
+    where the opposite angles of an edge are so obtuse that its stiffness is negative.
+    """
+    areas, squares = _shapes(mesh)
+    nu = material.poisson_ratio
+    half_cotangents = (squares.sum(axis=1, keepdims=True) - 2 * squares) / (8 * areas)
+    parts = areas / squares / (1 + nu) + nu / (1 - nu**2) * half_cotangents
+    total = mesh.sum_to_edges({3: parts})
+    # Right angles opposite an edge give it exactly nothing but rounding.
+    total[np.abs(total) < 1e-14] = 0.0
+    return Springs(material.young_modulus * thickness, not_negative(total))

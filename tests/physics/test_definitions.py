@@ -1,0 +1,289 @@
+"""Each definition against the moduli that it must have: closed forms where there are any, else measured tables."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springtune.materials import Material
+from springtune.mesh import MESH_TYPES, Mesh, lattice
+from springtune.moduli import axial_moduli, ends, mean_gradient, patch_mesh, shear_modulus
+from springtune.network import Network
+from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.springs.adjoint import springs as adjoint
+from springtune.springs.identification import Misfit, patch_cases
+
+HEIGHT, SIZE = 20e-3, 2e-3
+RATIOS = (0.3, 1 / 3, 0.49)
+EVERY_RATIO = (0.0, 0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5)
+
+
+def patch(mesh_type, length=0.1):
+    """Mesh of ten cells over the height: of the exact lattice for rows of triangles."""
+    size = HEIGHT / (10 * math.sqrt(3) / 2) if mesh_type == "structured" else SIZE
+    return patch_mesh(MESH_TYPES[mesh_type], mesh_type, length, HEIGHT, size)
+
+
+def errors(name, mesh, nu):
+    """Error of E and G [1], and the effective Poisson's ratio."""
+    material = Material("unit", 1.0, nu)
+    springs = DEFINITIONS[name].springs(mesh, material, 1.0)
+    young, ratio = axial_moduli(mesh, springs)
+    shear = shear_modulus(mesh, springs)
+    return young * springs.reference - 1, ratio, shear * springs.reference * 2 * (1 + nu) - 1
+
+
+# -- closed forms ------------------------------------------------------------------------------------------------------
+
+ON_LATTICE = {
+    # name: E over the asked one
+    "uniform": lambda nu: 1.1,  # 1 + sqrt(3)/2 a/H = 1 + 1/rows
+    "oriented": lambda nu: 1.0,
+    "lattice": lambda nu: 1.0,
+    "lloyd": lambda nu: 1.0,
+    "van-gelder": lambda nu: 1.0,
+    "van-gelder-general": lambda nu: (3 - nu) / (3 * (1 - nu**2)),
+    "delingette-tensile": lambda nu: (10 - 6 * nu) / (9 * (1 - nu**2)),
+    "element-fit": lambda nu: 8 / (9 * (1 - nu**2)),
+    "patch": lambda nu: 1.0,
+}
+
+
+@pytest.mark.parametrize("nu", EVERY_RATIO)
+@pytest.mark.parametrize("name", ON_LATTICE)
+def test_springs_alone_on_the_lattice(name, nu):
+    young, ratio, _ = errors(name, patch("structured"), nu)
+    assert 1 + young == pytest.approx(ON_LATTICE[name](nu), rel=1e-9)
+    assert ratio == pytest.approx(1 / 3, rel=1e-9)  # Cauchy's relation: whatever was asked
+
+
+@pytest.mark.parametrize("nu", EVERY_RATIO)
+@pytest.mark.parametrize("name", ["area", "angular", "delingette", "patch-area"])
+def test_any_poisson_ratio_is_exact_on_the_lattice(name, nu):
+    young, ratio, shear = errors(name, patch("structured"), nu)
+    assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize("nu", EVERY_RATIO)
+@pytest.mark.parametrize("mesh_type", ["free", "right", "alternating", "isosceles-0.3"])
+def test_delingette_is_exact_on_every_mesh(mesh_type, nu):
+    young, ratio, shear = errors("delingette", patch(mesh_type), nu)
+    assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize("nu", EVERY_RATIO)
+def test_area_is_exact_on_squares_with_both_diagonals(nu):
+    young, ratio, shear = errors("area", patch("braced"), nu)
+    assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+
+
+@settings(max_examples=15, deadline=None)
+@given(nu=st.floats(0, 0.5), shape=st.floats(0.75, 1.33))
+def test_rectangles(nu, shape):
+    columns = 12
+    mesh = MESH_TYPES["braced"](columns * shape * SIZE, HEIGHT, SIZE)
+    stretched = Mesh(mesh.points * [columns * shape * SIZE / mesh.points[:, 0].max(), 1], mesh.triangles, mesh.quads)
+    for name in ("area", "baudet-corrected"):
+        young, ratio, shear = errors(name, stretched, nu)
+        assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+    _, _, shear = errors("flechon", stretched, nu)
+    assert shear == pytest.approx(0, abs=1e-9)
+    young, ratio, _ = errors("lattice", stretched, nu)
+    assert (young, ratio) == pytest.approx((0, 1 / 3), abs=1e-9)
+
+
+@pytest.mark.parametrize("nu", [0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5])
+def test_axis_exact_on_squares(nu):
+    young, ratio, shear = errors("axis-exact", patch("braced"), nu)
+    assert (young, ratio, 1 + shear) == pytest.approx((0, nu, 2 * nu / (1 - nu)), abs=1e-9)
+
+
+@pytest.mark.parametrize(("mesh_type", "nu"), [("isosceles-0.3", 0.3), ("isosceles-0.5", 0.5), ("structured", 1 / 3)])
+def test_axis_exact_on_rows_made_for_it(mesh_type, nu):
+    young, ratio, shear = errors("axis-exact", patch(mesh_type), nu)
+    assert (young, ratio, 1 + shear) == pytest.approx((0, nu, 2 * nu / (1 - nu)), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["uniform", "lattice", "van-gelder", "element-fit", "delingette-tensile", "patch"])
+def test_mesh_fixes_poisson_ratio_of_rows(name):
+    """Only the row springs carry a load along the rows: nu = (a / 2h)^2."""
+    assert errors(name, patch("isosceles-0.5"), 0.2)[1] == pytest.approx(0.5, rel=1e-9)
+    assert errors(name, patch("right"), 0.2)[1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "right", "alternating", "braced", "isosceles-0.5"])
+@pytest.mark.parametrize("name", ["patch", "patch-area"])
+def test_patch_makes_young_modulus_exact_on_any_mesh(name, mesh_type):
+    assert errors(name, patch(mesh_type), 0.45)[0] == pytest.approx(0, abs=1e-9)
+
+
+# -- measured tables (E and G in %, effective nu) for nu = .3, 1/3, .49 -----------------------------------------------
+
+TABLE = {
+    ("structured", "density"): ((5.6, 5.6, 5.6), (0.333, 0.333, 0.333), None),
+    ("right", "uniform"): ((-4.7, -4.7, -4.7), (0, 0, 0), None),
+    ("right", "lattice"): ((-13.4, -13.4, -13.4), (0, 0, 0), None),
+    ("right", "van-gelder"): ((0, 0, 0), (0, 0, 0), None),
+    ("right", "van-gelder-general"): ((9.9, 12.5, 31.6), (0, 0, 0), None),
+    ("right", "delingette-tensile"): ((48.3, 50, 65.1), (0, 0, 0), None),
+    ("right", "element-fit"): ((16.3, 18.5, 36), (0, 0, 0), None),
+    ("right", "density"): ((-19.9, -19.9, -19.9), (0, 0, 0), None),
+    ("right", "oriented"): ((0, 0, 0), (0, 0, 0), None),
+    ("right", "area"): ((-17, -13.4, -0.4), (-0.066, 0, 0.285), None),
+    ("right", "angular"): ((-13, -13.4, -34.9), (0.025, 0, -0.346), None),
+    ("alternating", "uniform"): ((22.7, 22.7, 22.7), None, None),
+    ("alternating", "lattice"): ((13.8, 13.8, 13.8), (0.314, 0.314, 0.314), None),
+    ("alternating", "van-gelder"): ((19.1, 19.1, 19.1), (0.191, 0.191, 0.191), None),
+    ("alternating", "van-gelder-general"): ((25.6, 28, 46), (0.143, 0.137, 0.109), None),
+    ("alternating", "delingette-tensile"): ((77.5, 78.7, 91.9), (0.197, 0.191, 0.162), None),
+    ("alternating", "element-fit"): ((27.5, 30.1, 49.8), (0.097, 0.098, 0.101), None),
+    ("alternating", "density"): ((3.1, 3.1, 3.1), None, None),
+    ("alternating", "oriented"): ((-1.3, -1.3, -1.3), None, None),
+    ("alternating", "area"): ((13.9, 13.8, 13.4), (0.283, 0.314, 0.464), None),
+    ("alternating", "angular"): ((10.6, 13.8, 35), (0.303, 0.314, 0.357), None),
+    ("braced", "uniform"): ((38.9, 38.9, 38.9), None, (125.2, 130.9, 158.1)),
+    ("braced", "lattice"): ((0, 0, 0), (0.333, 0.333, 0.333), (-2.5, 0, 11.75)),
+    ("braced", "lloyd"): ((-11.8, -11.8, -11.8), (0.412, 0.412, 0.412), (13.75, 16.7, 30.4)),
+    ("braced", "element-fit"): ((-16.4, -14.8, -2.4), (0.402, 0.404, 0.413), (4.1, 9.5, 44.6)),
+    ("braced", "baudet"): ((-1.7, 0, 6.8), (0.345, 0.333, 0.288), (0, 0, 0)),
+    ("braced", "axis-exact"): ((0, 0, 0), (0.3, 0.333, 0.49), (-14.3, 0, 92.2)),
+}
+
+
+@pytest.mark.parametrize(("mesh_type", "name"), TABLE)
+def test_measured_moduli(mesh_type, name):
+    youngs, ratios, shears = TABLE[mesh_type, name]
+    found = np.array([errors(name, patch(mesh_type), nu) for nu in RATIOS])
+    assert 100 * found[:, 0] == pytest.approx(youngs, abs=0.1)
+    if ratios:
+        assert found[:, 1] == pytest.approx(ratios, abs=1e-3)
+    if shears:
+        assert 100 * found[:, 2] == pytest.approx(shears, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["lattice", "van-gelder", "area", "angular", "delingette-tensile"])
+def test_free_meshes_are_a_few_percent_off(name):
+    """Disorder, some 3 %, does not vanish with the mesh size; measured on netgen's meshes of a/H = .1."""
+    young, ratio, _ = errors(name, patch("free"), 0.3)
+    assert abs(young) < 0.035
+    assert ratio == pytest.approx(0.3 if name in ("area", "angular") else 1 / 3, abs=0.025)
+
+
+# -- patch tests -------------------------------------------------------------------------------------------------------
+
+
+@given(gradient=st.tuples(*[st.floats(-1, 1)] * 4))
+@settings(max_examples=20, deadline=None)
+def test_mean_gradient_of_an_affine_field(gradient):
+    gradient = np.reshape(gradient, (2, 2))
+    for mesh_type in ("free", "braced"):
+        mesh = MESH_TYPES[mesh_type](0.03, 0.01, 2e-3)
+        assert np.allclose(mean_gradient(mesh, mesh.points @ gradient.T), gradient, atol=1e-12)
+
+
+def test_ends_of_straight_and_staggered_meshes():
+    mesh = lattice(5, 3)
+    left, right = ends(mesh)
+    assert left.tolist() == [0, 6, 12, 18] and right.tolist() == [5, 11, 17, 23]
+    mesh = MESH_TYPES["free"](0.03, 0.01, 2e-3)
+    for found, x in zip(ends(mesh), (0.0, 0.03)):
+        assert found.tolist() == np.flatnonzero(mesh.points[:, 0] == x).tolist()
+
+
+# -- refusals ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name, definition in DEFINITIONS.items() if definition.cells != (3, 4)])
+def test_cells_that_a_definition_cannot_have_are_refused(name):
+    definition = DEFINITIONS[name]
+    mesh = MESH_TYPES["braced" if definition.cells == (3,) else "structured"](0.03, 0.01, 2e-3)
+    with pytest.raises(DefinitionError, match="needs (triangles|rectangles).*mesh type"):
+        definition.springs(mesh, Material("unit", 1.0, 0.3), 1.0)
+
+
+def test_slender_rectangles_are_refused():
+    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    slender = Mesh(mesh.points * [2.5, 1], mesh.triangles, mesh.quads)
+    for name in ("baudet", "flechon", "lattice", "axis-exact"):
+        with pytest.raises(DefinitionError, match="negative stiffness"):
+            DEFINITIONS[name].springs(slender, Material("unit", 1.0, 0.3), 1.0)
+    with pytest.raises(DefinitionError, match="needs squares"):
+        DEFINITIONS["lloyd"].springs(slender, Material("unit", 1.0, 0.3), 1.0)
+
+
+def test_obtuse_triangles_are_refused_where_they_make_a_spring_negative():
+    mesh = lattice(6, 4, row_height=0.3)
+    with pytest.raises(DefinitionError, match="negative stiffness.*obtuse"):
+        DEFINITIONS["van-gelder-general"].springs(mesh, Material("unit", 1.0, 0.5), 1.0)
+
+
+def test_axis_exact_names_the_rows_that_it_needs():
+    with pytest.raises(DefinitionError, match=r"nu = 0.333 and the material 0.49; use rows of height 0.7143 mm"):
+        DEFINITIONS["axis-exact"].springs(lattice(5, 4, 1e-3), Material("unit", 1.0, 0.49), 1.0)
+    with pytest.raises(DefinitionError, match="isosceles"):
+        DEFINITIONS["axis-exact"].springs(MESH_TYPES["free"](0.03, 0.01, 2e-3), Material("unit", 1.0, 0.3), 1.0)
+    with pytest.raises(DefinitionError, match="above 0"):
+        DEFINITIONS["axis-exact"].springs(patch("braced"), Material("unit", 1.0, 0.0), 1.0)
+
+
+# -- identification ----------------------------------------------------------------------------------------------------
+
+
+def test_gradient_of_the_misfit_is_exact():
+    mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
+    material = Material("any", 5.0, 0.45)
+    misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
+    generator = np.random.default_rng(1)
+    here, direction = 0.3 * generator.standard_normal((2, len(mesh.edges)))
+    _, slope = misfit.evaluate(here)
+    difference = (misfit(here + 1e-5 * direction) - misfit(here - 1e-5 * direction)) / 2e-5
+    assert difference == pytest.approx(slope @ direction, rel=1e-7)
+
+
+def test_patch_cases_are_met_by_linear_triangles():
+    """Their displacements are linear, so a network equal to linear triangles has no misfit."""
+    mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material("any", 5.0, 0.45)
+    springs = DEFINITIONS["delingette"].springs(mesh, material, 2.0)
+    for case in patch_cases(mesh, material, 2.0):
+        network = Network(mesh, case.held, springs.relative, springs.energies)
+        found = network.expand(network.rest_factor.solve(network.reduce(case.forces / springs.reference)))
+        assert np.abs(found - case.displacements).max() <= 1e-11 * np.abs(case.displacements).max()
+        assert np.abs(case.forces.sum(axis=0)).max() <= 1e-12 * np.abs(case.forces).max()
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+def test_adjoint_reaches_poisson_ratios_that_springs_cannot(nu):
+    mesh, material = MESH_TYPES["free"](0.04, 0.0133, 2.5e-3), Material("unit", 1.0, nu)
+    springs = adjoint(mesh, material, 1.0)
+    young, ratio = axial_moduli(mesh, springs)
+    assert young * springs.reference == pytest.approx(1, abs=0.03)
+    # 150 particles: with 373 of them .307 and .484 have been reached.
+    assert ratio == pytest.approx(nu, abs=0.04)
+    assert springs.spring_ratio <= 100.0 * 2  # bounds of ten each way, about outline springs of half weight
+    assert 10 < springs.evaluations <= 450
+
+
+@pytest.mark.parametrize("name", ["annealed", "evolved"])
+def test_searches_are_repeatable_and_never_worse_than_their_start(name):
+    mesh, material = MESH_TYPES["free"](0.03, 0.01, 5e-3), Material("unit", 1.0, 0.45)
+    cases = patch_cases(mesh, material, 1.0)
+    first, second = (DEFINITIONS[name].function(mesh, material, 1.0, cases, 60) for _ in "ab")
+    assert (first.relative == second.relative).all()
+    assert first.evaluations <= 60
+    misfit = Misfit(mesh, material, 1.0, cases)
+    assert misfit(np.log(first.relative / misfit.start)) <= misfit(np.zeros(len(mesh.edges)))
+
+
+@pytest.mark.slow
+def test_adjoint_reaches_in_two_seconds_what_annealing_does_not_in_3000_evaluations():
+    mesh, material = MESH_TYPES["free"](0.04, 0.01, 1.15e-3), Material("unit", 1.0, 0.3)
+    cases = patch_cases(mesh, material, 1.0)
+    misfit = Misfit(mesh, material, 1.0, cases)
+    found = {
+        "adjoint": DEFINITIONS["adjoint"].springs(mesh, material, 1.0),
+        "annealed": DEFINITIONS["annealed"].function(mesh, material, 1.0, cases, 3000),
+    }
+    left = {name: misfit(np.log(springs.relative / misfit.start)) for name, springs in found.items()}
+    assert left["adjoint"] < 0.5 * left["annealed"]

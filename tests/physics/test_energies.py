@@ -1,0 +1,151 @@
+"""Energies of areas, angles and squared lengths: exact forces and tangents, and the continuum that they stand for."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springtune.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy
+from springtune.materials import Material
+from springtune.mesh import MESH_TYPES, corner_angles, signed_areas
+from springtune.network import Network
+from springtune.springs import DEFINITIONS, delingette
+
+KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled")
+
+
+def energy_of(kind, seed):
+    """An energy of random moduli on a small mesh, which is returned, too."""
+    generator = np.random.default_rng(seed)
+    mesh = MESH_TYPES["braced" if "quads" in kind else "free"](0.02, 0.01, 5e-3)
+    corners = mesh.quads if "quads" in kind else mesh.triangles
+    modulus = generator.uniform(-0.5, 1.0, len(corners))
+    if "area" in kind:
+        return mesh, AreaEnergy(mesh.points, corners, modulus)
+    if kind == "angles":
+        return mesh, AngleEnergy(mesh.points, corners, 25e-6 * modulus)
+    tensile, coupling = 1e6 * generator.uniform(-0.5, 1.0, (2, len(corners), 3))
+    return mesh, BiquadraticEnergy(mesh.points, corners, tensile, coupling if kind == "coupled" else None)
+
+
+def scattered(mesh, seed, amplitude):
+    return amplitude * np.random.default_rng(seed).standard_normal(mesh.points.shape)
+
+
+def assembled(mesh, corners, forces):
+    total = np.zeros(mesh.points.shape)
+    np.add.at(total, corners, forces)
+    return total
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 8e-4))
+def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
+    mesh, energy = energy_of(kind, seed)
+    here, direction = scattered(mesh, seed + 1, amplitude), scattered(mesh, seed + 2, 1.0)
+    # A step of a thousandth of an edge: the central difference leaves its square, 1e-6 of the third derivative.
+    step = 5e-6
+    difference = (energy.value(here + step * direction) - energy.value(here - step * direction)) / (2 * step)
+    forces = assembled(mesh, energy.corners, energy.forces(here))
+    scale = np.abs(energy.tangent(here)).max() * 5e-3  # forces of a displacement of an edge
+    assert abs(difference - (forces * direction).sum()) <= 1e-5 * scale * np.linalg.norm(direction)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 8e-4))
+def test_tangent_is_the_derivative_of_the_forces(kind, seed, amplitude):
+    mesh, energy = energy_of(kind, seed)
+    here, direction = scattered(mesh, seed + 1, amplitude), scattered(mesh, seed + 2, 1.0)
+    step = 1e-7
+    difference = (energy.forces(here + step * direction) - energy.forces(here - step * direction)) / (2 * step)
+    moved = direction[energy.corners].reshape(len(energy.corners), -1)
+    exact = np.einsum("nij,nj->ni", energy.tangent(here), moved).reshape(difference.shape)
+    # step / edge = 2e-5, squared, and rounding of 1e-16 over it.
+    assert np.abs(difference - exact).max() <= 1e-6 * np.abs(energy.tangent(here)).max() * np.abs(direction).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tangent_is_symmetric_and_that_at_rest_is_the_limit(kind):
+    mesh, energy = energy_of(kind, 3)
+    tangent = energy.tangent(scattered(mesh, 4, 3e-4))
+    assert np.abs(tangent - tangent.transpose(0, 2, 1)).max() <= 1e-12 * np.abs(tangent).max()
+    rest = energy.tangent()
+    assert np.abs(energy.tangent(scattered(mesh, 4, 1e-12)) - rest).max() <= 1e-8 * np.abs(rest).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(angle=st.floats(-3.1, 3.1), shift=st.floats(-1, 1))
+@settings(max_examples=15, deadline=None)
+def test_rigid_motion_costs_nothing(kind, angle, shift):
+    mesh, energy = energy_of(kind, 5)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    moved = mesh.points @ turn.T + shift - mesh.points
+    # Coordinates of size 1 are rounded to 1e-16, edges are 5 mm: strains of 1e-13 are left.
+    assert np.abs(energy.forces(moved)).max() <= 1e-11 * np.abs(energy.tangent()).max() * 5e-3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_small_strain_keeps_its_digits(kind):
+    mesh, energy = energy_of(kind, 6)
+    direction = scattered(mesh, 7, 1.0)
+    linear = np.einsum("nij,nj->ni", energy.tangent(), direction[energy.corners].reshape(len(energy.corners), -1))
+    forces = energy.forces(1e-15 * direction).reshape(linear.shape) / 1e-15
+    # A displacement of 1e-15 m over edges of 5 mm: the law is linear to 1e-12.
+    assert np.abs(forces - linear).max() <= 1e-10 * np.abs(linear).max()
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**31), nu=st.floats(0, 0.5), amplitude=st.floats(1e-5, 1.5e-3))
+def test_delingette_is_saint_venant_kirchhoff_at_any_strain(seed, nu, amplitude):
+    mesh = MESH_TYPES["free"](0.02, 0.01, 5e-3)
+    moved = scattered(mesh, seed, amplitude)
+    springs = delingette.springs(mesh, Material("any", 7.0, nu), 2.0)
+    ours = springs.reference * springs.energies[0].value(moved)
+    # Green's strain of each triangle, from its two sides.
+    rest, now = mesh.points[mesh.triangles], (mesh.points + moved)[mesh.triangles]
+    gradient = (now[:, 1:] - now[:, :1]).transpose(0, 2, 1) @ np.linalg.inv(
+        (rest[:, 1:] - rest[:, :1]).transpose(0, 2, 1)
+    )
+    strain = 0.5 * (gradient.transpose(0, 2, 1) @ gradient - np.eye(2))
+    trace = np.trace(strain, axis1=1, axis2=2)
+    first, second = 7.0 * nu / (1 - nu**2), 7.0 / (2 * (1 + nu))  # Lame's parameters in plane stress
+    density = 0.5 * first * trace**2 + second * (strain**2).sum(axis=(1, 2))
+    expected = 2.0 * (density * signed_areas(mesh.points, mesh.triangles)).sum()
+    assert ours == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5])
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "right", "alternating", "isosceles-0.5"])
+def test_delingette_at_rest_is_the_linear_triangle(mesh_type, nu):
+    mesh = MESH_TYPES[mesh_type](0.03, 0.01, 2e-3)
+    springs = delingette.springs(mesh, Material("unit", 1.0, nu), 1.0)
+    ours = Network(mesh, np.zeros(mesh.points.shape, bool), springs.relative, springs.energies).tangent().toarray()
+    elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
+    expected = np.zeros(ours.shape)
+    for corners, area in zip(mesh.triangles, signed_areas(mesh.points, mesh.triangles)):
+        slopes = np.linalg.inv(np.column_stack([np.ones(3), mesh.points[corners]]))[1:]
+        strain = np.zeros((3, 6))
+        strain[0, ::2] = strain[2, 1::2] = slopes[0]
+        strain[1, 1::2] = strain[2, ::2] = slopes[1]
+        places = np.stack([2 * corners, 2 * corners + 1], axis=1).ravel()
+        expected[np.ix_(places, places)] += area * strain.T @ elasticity @ strain
+    assert np.linalg.norm(ours - expected) <= 1e-12 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("name", ["area", "angular", "delingette", "patch-area", "flechon"])
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+def test_free_networks_have_three_rigid_motions_and_no_other(name, nu):
+    definition = DEFINITIONS[name]
+    mesh = MESH_TYPES["free" if 3 in definition.cells else "braced"](0.03, 0.01, 2.5e-3)
+    springs = definition.springs(mesh, Material("unit", 1.0, nu), 1.0)
+    network = Network(mesh, np.zeros(mesh.points.shape, bool), springs.relative, springs.energies)
+    eigenvalues = np.linalg.eigvalsh(network.tangent().toarray())
+    assert np.abs(eigenvalues[:3]).max() <= 1e-12 * eigenvalues[-1]
+    assert eigenvalues[3] >= 1e-5 * eigenvalues[-1]
+
+
+def test_angles_sum_up():
+    mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
+    assert np.allclose(corner_angles(mesh.points, mesh.triangles).sum(axis=1), np.pi, rtol=1e-14)
