@@ -1,7 +1,43 @@
 """Loads: how a beam is held and pulled.
 
-Every load clamps the left end (x = 0) and spreads a force along x evenly over the right end (x = length).
+::
+
+    traction, compression          bending                       shear
+     //+------------+->          //+------------+ ^           o  o  o  o  o  o     rollers: u_y = 0
+     //|            |->          //|            | |          +--------------+ ->
+     //|            |->          //|            | |          |              | ->
+     //+------------+->          //+------------+ |          +--------------+
+      clamped        even         clamped        even        ////// clamped
+
+A load's displacement is the mean one of the loaded side, along the force.
 """
 
-DIRECTION = {"traction": 1.0, "compression": -1.0}
-"""Sign of the end force of a load; tension is positive."""
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load.
+
+    Attributes
+    ----------
+    kind : str
+        What is held, and where and along what the force acts: ``"axial"``, ``"bending"`` or ``"shear"``.
+    sign : float
+        Sign of the force of a load [1]; tension is positive.
+    """
+
+    kind: str
+    sign: float
+
+
+LOADS = {
+    "traction": Load("axial", 1.0),
+    "compression": Load("axial", -1.0),
+    "bending": Load("bending", 1.0),
+    "shear": Load("shear", 1.0),
+}
+"""Loads by name."""
+
+KINDS = ("axial", "bending", "shear")
+"""Kinds of load; loads of one kind differ by a factor."""

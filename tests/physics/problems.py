@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from springtune.boundary import clamped, end_weights
+from springtune.boundary import held, weights
 from springtune.mesh import MESH_TYPES, lattice
 from springtune.network import Network
 from springtune.springs.lattice import uniform
 from springtune.statics import StaticProblem
 
 
-def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None):
+def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind="axial"):
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
-    weights = end_weights(mesh, length)
+    pattern = weights(mesh, kind)
     stiffness = uniform(mesh) if relative is None else relative(mesh)
-    return StaticProblem(Network(mesh, clamped(mesh), stiffness), weights), weights
+    return StaticProblem(Network(mesh, held(mesh, kind), stiffness), pattern), pattern
 
 
 def roller_patch(cells, rows, stiffness):

@@ -1,19 +1,19 @@
-"""Reference for a beam under traction: linear elasticity at small strain, plane stress, by finite elements.
+"""Reference for a beam: linear elasticity at small strain, plane stress, by finite elements.
 
-::
+Kinds of load are those of `springtune.loads`. Of each beam half is solved; the dashed line is its axis of symmetry or
+antisymmetry::
 
-          ____________________________ ->
-        //|                            |->
-        //|                            |->   force / (height * thickness) on every point of the right end
-        //|- - - - - - - - - - - - - - |->   axis of symmetry: only the upper half is solved
-        //|                            |->
-        //|____________________________|->
-       u = 0                        mean of u_x
+        axial                          bending                            shear
+          ____________________ ->        ____________________            o  o  o  o  o  o
+        //|                  |->       //|                  |^          +-------:-------+ ->
+        //|- - - - - - - - - |->       //|- - - - - - - - - ||          |       :       | ->
+        //|__________________|->       //|__________________||          +-------:-------+
+                                                                        ///////////////
 
-The stress is singular where the clamp meets the free edges, the more so the larger Poisson's ratio, and quadratic
-elements of even size creep towards the answer. The elements here are rectangles whose sides shrink geometrically
-towards those corners, and their polynomial degree grows with the number of layers: the error then falls exponentially
-(hp version), to 1e-6 with some thousand unknowns.
+The stress is singular where a clamp meets a free edge, the more so the larger Poisson's ratio, and quadratic elements
+of even size creep towards the answer. The elements here are rectangles whose sides shrink geometrically towards the
+corners, and their polynomial degree grows with the number of layers: the error then falls exponentially (hp version),
+to 1e-6 with some thousand unknowns.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,9 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementLinePp, LinearForm, MeshLine
 
 from ..geometry import Beam
+from ..loads import KINDS
 from ..materials import Material
+from .field import interpolate
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
 FIRST_LEVEL, LAST_LEVEL = 3, 8
@@ -37,8 +39,8 @@ SHRINKAGE = 0.2
 #: Largest ratio of neighbouring elements away from the corners, where the solution is smooth.
 GROWTH = 3.0
 
-#: Round-off of a displacement, relative, is below this times (1 + aspect ratio squared): measured with nu = 0, where
-#: every level contains the exact answer.
+#: Round-off of a displacement, relative, is below this times (1 + aspect ratio squared), its fourth power in bending:
+#: measured with nu = 0, where every level contains the exact answer, and by levels far beyond convergence.
 ROUND_OFF = 5e-11
 
 #: Number of points of the field that is handed out, about.
@@ -56,24 +58,22 @@ class ReferenceSolution:
     Attributes
     ----------
     displacement : float
-        Mean axial displacement of the right end [m], positive in tension.
+        Mean displacement of the loaded side along the force [m].
     error_estimate : float
         Bound on the relative error of `displacement` [1].
-    points : ndarray of float, shape (n_points, 2)
-        Where the field is given [m]; closer to each other near the clamp and the free edges.
-    triangles : ndarray of int, shape (n_triangles, 3)
-        Counter-clockwise triangulation of the points, for plots and for interpolation. It is not the mesh of the
-        solution: that has few, large elements of high degree.
-    displacements : ndarray of float, shape (n_points, 2)
-        Displacement at the points [m].
+    x : ndarray of float, shape (n_x,)
+    y : ndarray of float, shape (n_y,)
+        Coordinates of a grid on which the field is given [m]; closer to each other near the outline.
+    displacements : ndarray of float, shape (n_x, n_y, 2)
+        Displacement there [m].
     unknowns : int
         Number of unknowns of the finest level, of the half that is solved.
     """
 
     displacement: float
     error_estimate: float
-    points: np.ndarray
-    triangles: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
     displacements: np.ndarray
     unknowns: int
 
@@ -81,9 +81,15 @@ class ReferenceSolution:
         """The solution under `factor` times the force; exact, since small strain is linear."""
         return replace(self, displacement=self.displacement * factor, displacements=self.displacements * factor)
 
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Displacements at points of the beam [m], shape (n, 2); see `springtune.reference.field.interpolate`."""
+        return interpolate(self.x, self.y, self.displacements, points)
 
-def solve_small_strain(beam: Beam, material: Material, force: float, tolerance: float = 1e-4) -> ReferenceSolution:
-    r"""Displacements of a beam clamped at its left end and pulled at its right end.
+
+def solve_small_strain(
+    beam: Beam, material: Material, force: float, tolerance: float = 1e-4, kind: str = "axial"
+) -> ReferenceSolution:
+    r"""Displacements of a beam under a load.
 
     Parameters
     ----------
@@ -92,9 +98,11 @@ def solve_small_strain(beam: Beam, material: Material, force: float, tolerance: 
     material : Material
         Young's modulus [Pa] and Poisson's ratio [1], -1 < nu <= 0.5.
     force : float
-        Force [N], spread evenly over the right end; positive in tension.
+        Force [N], spread evenly over the loaded side; axial ones are positive in tension.
     tolerance : float
         Largest relative error estimate to accept [1].
+    kind : str
+        Kind of load, one of `springtune.loads.KINDS`.
 
     Returns
     -------
@@ -103,7 +111,7 @@ def solve_small_strain(beam: Beam, material: Material, force: float, tolerance: 
     Raises
     ------
     ValueError
-        If Poisson's ratio is outside its range.
+        If Poisson's ratio is outside its range, or the kind of load unknown.
     ReferenceNotConvergedError
         If the last level does not meet the tolerance.
 
@@ -112,7 +120,7 @@ def solve_small_strain(beam: Beam, material: Material, force: float, tolerance: 
     Lengths over half the height and stresses over the traction leave a problem of the aspect ratio and of nu alone, so
     the displacement is exactly proportional to ``force / (E t)``.
 
-    The mean displacement of the loaded end is twice the elastic energy over the force. The spaces of successive levels
+    The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive levels
     are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and what is missing is the sum of all
     later steps :math:`d_p = J_p - J_{p-1}`. These fall geometrically: with :math:`u \sim r^\lambda` at a corner one
     more layer takes the energy that the innermost element cannot represent down by :math:`.2^{2\lambda}`, and one more
@@ -136,26 +144,31 @@ def solve_small_strain(beam: Beam, material: Material, force: float, tolerance: 
     nu = material.poisson_ratio
     if not -1 < nu <= 0.5:
         raise ValueError(f"Poisson's ratio of {material.name!r} is {nu}: isotropic materials have -1 < nu <= 0.5")
-    level, estimate = _converge(2 * beam.length / beam.height, nu, tolerance, f"{beam.name}, {material.name}")
-    points, triangles, field = level.field()
-    scale = force / (2 * material.young_modulus * beam.thickness)
+    if kind not in KINDS:
+        raise ValueError(f"unknown kind of load {kind!r}; known: {', '.join(KINDS)}")
+    name = f"{beam.name}, {material.name}"
+    level, estimate = _converge(2 * beam.length / beam.height, nu, tolerance, name, kind)
     half_height = beam.height / 2
+    side = beam.length if kind == "shear" else beam.height
+    scale = half_height * force / (side * beam.thickness * material.young_modulus)
+    x, y, field = level.field()
     return ReferenceSolution(
         displacement=scale * level.displacement,
         error_estimate=estimate,
-        points=half_height * (points + np.array([0.0, 1.0])),
-        triangles=triangles,
+        x=half_height * x,
+        y=half_height * (y + 1.0),
         displacements=scale * field,
         unknowns=level.unknowns,
     )
 
 
-def _converge(length, nu, tolerance, name):
+def _converge(length, nu, tolerance, name, kind):
     """First level whose error estimate meets the tolerance, and the estimate."""
-    round_off = ROUND_OFF * (1 + length**2 / 4)  # the length is in half heights
+    aspect_ratio = length / 2  # the length is in half heights
+    round_off = ROUND_OFF * (1 + aspect_ratio ** (4 if kind == "bending" else 2))
     values = []
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
-        level = UnitLevel(length, nu, degree)
+        level = UnitLevel(length, nu, degree, kind)
         values.append(level.displacement)
         if len(values) < 3:
             continue
@@ -170,7 +183,7 @@ def _converge(length, nu, tolerance, name):
 
 
 class UnitLevel:
-    """Upper half, of height 1, of a beam with E = 1 under traction 1, solved on one level.
+    """Half of a beam of height 2 with E = 1 under traction 1, solved on one level.
 
     Parameters
     ----------
@@ -180,71 +193,89 @@ class UnitLevel:
         Poisson's ratio [1].
     degree : int
         Level: degree of the polynomials along each axis, and number of layers at a corner.
+    kind : str
+        Kind of load, one of `springtune.loads.KINDS`.
 
     Attributes
     ----------
     displacement : float
-        Mean axial displacement of the right end [1].
+        Mean displacement of the loaded side along the force [1].
     unknowns : int
         Number of unknowns.
 
     Notes
     -----
     On a grid of rectangles the basis is the products of one along x and one along y, and the matrices in the plane are
-    Kronecker products of those on the two lines: milliseconds, for any degree.
+    Kronecker products of those on the two lines: milliseconds, for any degree. Each side is held as a whole, so the
+    unknowns of a component are products of those on the lines, too.
     """
 
-    def __init__(self, length, nu, degree):
-        reach = min(length, 1.0)
-        self._x = x = _Line(_graded(length, reach, degree), degree)
-        # Reversed: the singular corner is at y = 1, the axis of symmetry at y = 0.
-        self._y = y = _Line(1 - _graded(1.0, reach, degree)[::-1], degree)
-        # u_x vanishes on the clamp alone, u_y on the axis of symmetry also.
-        free_x, free_y, all_y = x.all[x.all != x.first], y.all[y.all != y.first], y.all
-
+    def __init__(self, length, nu, degree, kind="axial"):
+        self._length, self._kind = length, kind
+        if kind == "shear":  # the left half, from y = 0 to 2
+            along, across = _graded(length / 2, min(length / 2, 1.0), degree), _graded_both(2.0, degree)
+        else:  # the upper half; its free edge, where corners are, is at y = 1
+            reach = min(length, 1.0)
+            along = _graded(length, reach, degree) if kind == "axial" else _graded_both(length, degree)
+            across = 1 - _graded(1.0, reach, degree)[::-1]
+        self._x, self._y = x, y = _Line(along, degree), _Line(across, degree)
+        # Unknowns of u_x and of u_y along x and along y: what clamp, rollers and symmetry leave.
+        x_held, y_held = {
+            "axial": (((x.first,), ()), ((x.first,), (y.first,))),
+            "bending": (((x.first,), (y.first,)), ((x.first,), ())),
+            "shear": (((), (y.first,)), ((x.last,), (y.first, y.last))),
+        }[kind]
+        (x_1, y_1), (x_2, y_2) = (
+            [line.all[~np.isin(line.all, ends)] for line, ends in zip((x, y), sides)] for sides in (x_held, y_held)
+        )
         direct, shear = 1 / (1 - nu**2), 1 / (2 * (1 + nu))
-        mass_x, slope_x, mixed_x = (_part(matrix, free_x, free_x) for matrix in (x.mass, x.slope, x.mixed))
-        mass_y, slope_y = (_part(matrix, free_y, free_y) for matrix in (y.mass, y.slope))
-        mixed_y, mixed_y_transposed = (_part(matrix, all_y, free_y) for matrix in (y.mixed, y.mixed.T))
-        xx = direct * kron(slope_x, y.mass) + shear * kron(mass_x, y.slope)
-        yy = direct * kron(mass_x, slope_y) + shear * kron(slope_x, mass_y)
-        xy = nu * direct * kron(mixed_x, mixed_y_transposed) + shear * kron(mixed_x.T, mixed_y)
+
+        def product(of_x, of_y, rows, columns):
+            return kron(_part(of_x, rows[0], columns[0]), _part(of_y, rows[1], columns[1]))
+
+        first, second = (x_1, y_1), (x_2, y_2)
+        xx = direct * product(x.slope, y.mass, first, first) + shear * product(x.mass, y.slope, first, first)
+        yy = direct * product(x.mass, y.slope, second, second) + shear * product(x.slope, y.mass, second, second)
+        xy = nu * direct * product(x.mixed, y.mixed.T, first, second)
+        xy = xy + shear * product(x.mixed.T, y.mixed, first, second)
         matrix = block_array([[xx, xy], [xy.T, yy]], format="csc")
 
-        end = (free_x == x.last).astype(float)
-        load = np.concatenate([np.kron(end, y.integrals), np.zeros(yy.shape[0])])
+        load = np.zeros(matrix.shape[0])
+        split = len(x_1) * len(y_1)
+        if kind == "axial":
+            load[:split] = np.kron(x_1 == x.last, y.integrals[y_1])
+        elif kind == "bending":
+            load[split:] = np.kron(x_2 == x.last, y.integrals[y_2])
+        else:
+            load[:split] = np.kron(x.integrals[x_1], y_1 == y.last)
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         solution = factor.solve(load)
 
-        self.displacement = float(load @ solution)
+        self.displacement = float(load @ solution) / (length / 2 if kind == "shear" else 1.0)
         self.unknowns = len(load)
         self._coefficients = np.zeros((2, len(x.all), len(y.all)))
-        split = len(free_x) * len(all_y)
-        self._coefficients[0][free_x] = solution[:split].reshape(len(free_x), -1)
-        self._coefficients[1][np.ix_(free_x, free_y)] = solution[split:].reshape(len(free_x), -1)
+        self._coefficients[0][np.ix_(x_1, y_1)] = solution[:split].reshape(len(x_1), -1)
+        self._coefficients[1][np.ix_(x_2, y_2)] = solution[split:].reshape(len(x_2), -1)
 
     def displacements(self, x, y):
         """Displacements on the grid of the coordinates x (0 to length) and y (-1 to 1), shape (n_x, n_y, 2)."""
-        at_x, at_y = self._x.values(x), self._y.values(np.abs(y))
-        axial, lateral = (at_x @ coefficients @ at_y.T for coefficients in self._coefficients)
-        return np.stack([axial, np.sign(y) * lateral], axis=2)
+        signs = np.ones((2, len(x), len(y)))
+        if self._kind == "shear":
+            signs[1] = np.sign(self._length / 2 - x)[:, None]
+            x, y = np.minimum(x, self._length - x), y + 1
+        else:
+            signs[0 if self._kind == "bending" else 1] = np.sign(y)
+            y = np.abs(y)
+        at_x, at_y = self._x.values(x), self._y.values(y)
+        return np.stack([sign * (at_x @ part @ at_y.T) for sign, part in zip(signs, self._coefficients)], axis=2)
 
     def field(self):
-        """Points of the whole beam (y from -1 to 1), triangles and displacements; see `ReferenceSolution`."""
-        length = self._x.points[-1]
-        spacing = (2 * length / FIELD_POINTS) ** 0.5
-        x = _plot_points(length, spacing)
-        half = 1 - _plot_points(1.0, spacing)[::-1]
+        """Coordinates along x (0 to length) and y (-1 to 1) of a grid, and displacements; see `ReferenceSolution`."""
+        spacing = (2 * self._length / FIELD_POINTS) ** 0.5
+        x, half = _plot_points(self._length / 2, spacing), 1 - _plot_points(1.0, spacing)[::-1]
+        x = np.concatenate([x, self._length - x[-2::-1]])
         y = np.concatenate([-half[:0:-1], half])
-        points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2).reshape(-1, 2)
-        corner = (np.arange(len(x) - 1)[:, None] * len(y) + np.arange(len(y) - 1)).ravel()
-        right, up = corner + len(y), corner + 1
-        opposite = right + 1
-        # Diagonals are mirrored at the axis, as the solution is.
-        lower = np.tile(y[:-1] < 0, len(x) - 1)[:, None]
-        first = np.where(lower, np.stack([corner, right, up], 1), np.stack([corner, right, opposite], 1))
-        second = np.where(lower, np.stack([right, opposite, up], 1), np.stack([corner, opposite, up], 1))
-        return points, np.concatenate([first, second]), self.displacements(x, y).reshape(-1, 2)
+        return x, y, self.displacements(x, y)
 
 
 class _Line:
@@ -302,6 +333,12 @@ def _graded(length, reach, layers):
     near = reach * SHRINKAGE ** np.arange(layers - 1, -1, -1.0)
     count = ceil(log(length / reach, GROWTH))  # none where the reach is the length
     return np.concatenate([[0.0], near, np.geomspace(reach, length, count + 1)[1:]])
+
+
+def _graded_both(length, layers):
+    """Ends of elements from 0 to length, as `_graded` towards either end."""
+    half = _graded(length / 2, min(length / 2, 1.0), layers)
+    return np.concatenate([half, length - half[-2::-1]])
 
 
 def _plot_points(length, spacing):

@@ -24,7 +24,8 @@ def springs(mesh, material, thickness):
     misfit = Misfit(mesh, material, thickness, patch_cases(mesh, material, thickness))
     limit = math.log(SPAN)
     found = minimize(
-        misfit.evaluate, np.zeros(len(mesh.edges)), jac=True, method="L-BFGS-B", bounds=[(-limit, limit)] * len(mesh.edges),
+        misfit.evaluate, np.zeros(len(mesh.edges)), jac=True, method="L-BFGS-B",
+        bounds=[(-limit, limit)] * len(mesh.edges),
         options={"maxfun": MAX_EVALUATIONS, "maxiter": MAX_EVALUATIONS, "maxcor": 20, "ftol": 1e-12, "gtol": 1e-10},
     )  # fmt: skip
     return Springs(misfit.reference, misfit.start * np.exp(found.x), evaluations=misfit.evaluations)

@@ -9,8 +9,8 @@ area of each cell,
 adds the rest of the bulk modulus. Negative for nu < 1/3, which is harmless: the sum stays positive. Exact in E, nu and
 G on equilateral rows and on rectangles with both diagonals; within 2 or 3 % on free meshes.
 
-The idea is that of Golec and others (The Visual Computer 36, 2020, hal-02124471, abstract read): springs keep the Cauchy
-part, an energy of the volume alone the rest. The plane form is derived here.
+The idea is that of Golec and others (The Visual Computer 36, 2020, hal-02124471, abstract read): springs keep the
+Cauchy part, an energy of the volume alone the rest. The plane form is derived here.
 """
 
 import numpy as np

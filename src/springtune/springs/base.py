@@ -82,6 +82,7 @@ def not_negative(stiffness):
     bad = int((stiffness < 0).sum())
     if bad:
         raise DefinitionError(
-            f"gives {bad} of {len(stiffness)} springs a negative stiffness; use a mesh with less slender or obtuse cells"
+            f"gives {bad} of {len(stiffness)} springs a negative stiffness; use a mesh with less slender or obtuse "
+            "cells"
         )
     return stiffness

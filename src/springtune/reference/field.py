@@ -1,0 +1,34 @@
+"""The displacement field of a reference, handed from file to file without the finite elements behind it."""
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+
+
+def interpolate(x, y, displacements, points):
+    """Displacements between the points of a grid, by cubic splines.
+
+    Parameters
+    ----------
+    x : ndarray of float, shape (n_x,)
+    y : ndarray of float, shape (n_y,)
+        Coordinates of the grid [m], ascending.
+    displacements : ndarray of float, shape (n_x, n_y, 2)
+        Displacements there [m].
+    points : ndarray of float, shape (n, 2)
+        Where they are wanted [m], inside the grid.
+
+    Returns
+    -------
+    ndarray of float, shape (n, 2)
+        With the grid of a `ReferenceSolution` within 1e-5 of the largest displacement, most of it near a clamp's
+        corners.
+    """
+    return np.stack([RectBivariateSpline(x, y, displacements[:, :, axis]).ev(*points.T) for axis in range(2)], axis=1)
+
+
+def outline(x, y, displacements):
+    """Points of a grid on its outline, in order around it, and their displacements, each of shape (n, 2)."""
+    n_x, n_y = len(x), len(y)
+    i = np.concatenate([np.arange(n_x), np.full(n_y - 1, n_x - 1), np.arange(n_x - 2, -1, -1), np.zeros(n_y - 2, int)])
+    j = np.concatenate([np.zeros(n_x, int), np.arange(1, n_y), np.full(n_x - 1, n_y - 1), np.arange(n_y - 2, 0, -1)])
+    return np.stack([x[i], y[j]], axis=1), displacements[i, j]
