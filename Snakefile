@@ -9,6 +9,7 @@ include: "workflow/rules/mesh.smk"
 include: "workflow/rules/reference.smk"
 include: "workflow/rules/sensitivity.smk"
 include: "workflow/rules/solve.smk"
+include: "workflow/rules/moduli.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/tables.smk"
@@ -21,7 +22,9 @@ rule all:
     input:
         # Stages before the dataset, too: what they store is made again where it is missing.
         rules.reference.output,
-        expand(RESULTS / "done/{stage}_{bundle}.json", stage=["mesh", "sensitivity", "solve"], bundle=BUNDLES),
+        expand(RESULTS / "done/{stage}_{bundle}.json", stage=["mesh", "solve"], bundle=BUNDLES["solve"]),
+        rules.collect.input.curves,
+        rules.collect.input.moduli,
         rules.collect.output,
         rules.figures_all.input,
-        rules.tables.output,
+        TABLES.values(),

@@ -42,6 +42,127 @@ def definitions():
     click.echo(_table([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
 
 
+MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
+"""Young's modulus and Poisson's ratio of the paper's materials."""
+
+
+@main.command()
+@click.option("--beam", required=True, help="Length x height in mm, such as 200x40.")
+@click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
+@click.option("--mesh", "mesh_type", default="structured", show_default=True, help="A mesh type, or a mesh file.")
+@click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
+@click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
+@click.option("--material", help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson.")
+@click.option("--young", help="Young's modulus, such as '210 GPa'.")
+@click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
+def predict(beam, thickness, mesh_type, size, unit, material, young, poisson):
+    """Recommend a definition and its stiffness for one mesh, with the error to expect.
+
+    Closed forms and one patch test of the mesh: no study, no reference.
+    """
+    from .predict import predict as choices
+    from .springs import DefinitionError
+
+    try:
+        asked = _asked_beam(beam, thickness), _asked_material(material, young, poisson)
+        mesh, name = _asked_mesh(asked[0], mesh_type, size, unit)
+        found = choices(mesh, *asked)
+    except (click.ClickException, DefinitionError, ValueError) as error:
+        click.echo(str(getattr(error, "message", error)), err=True)
+        raise SystemExit(1) from None
+    click.echo(_prediction(mesh, name, *asked, found))
+
+
+def _quantity(option, text, kind):
+    from .units import UnitError, parse
+
+    try:
+        number = parse(text, kind)
+    except UnitError as error:
+        raise ValueError(f"{option}: {error}") from None
+    if not number > 0:
+        raise ValueError(f"{option}: '{text}' is not above zero; give a size above zero")
+    return number
+
+
+def _asked_beam(text, thickness):
+    from .geometry import Beam
+
+    sides = text.lower().split("x")
+    try:
+        length, height = (1e-3 * float(side) for side in sides)
+    except ValueError:
+        raise ValueError(f"--beam: '{text}' is not length x height; give millimetres such as 200x40") from None
+    if not (length > 0 and height > 0):
+        raise ValueError(f"--beam: '{text}' has a side that is not above zero; give millimetres such as 200x40")
+    return Beam(text, length, height, _quantity("--thickness", thickness, "length"))
+
+
+def _asked_material(name, young, poisson):
+    from .materials import Material
+
+    if name is not None and name not in MATERIALS:
+        raise ValueError(
+            f"--material: unknown material '{name}'; known: {', '.join(MATERIALS)}; or give --young and --poisson"
+        )
+    defaults = MATERIALS.get(name, (None, None))
+    young, poisson = young or defaults[0], poisson or defaults[1]
+    if young is None or poisson is None:
+        raise ValueError(f"--material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson")
+    try:
+        ratio = float(poisson)
+    except ValueError:
+        ratio = float("nan")
+    if not 0 <= ratio <= 0.5:
+        raise ValueError(f"--poisson: '{poisson}' is out of range; give a number from 0 to 0.5")
+    return Material(name or "material", _quantity("--young", young, "stress"), ratio)
+
+
+def _asked_mesh(beam, mesh_type, size, unit):
+    from .mesh import MESH_TYPES, read_beam_mesh
+
+    if mesh_type not in MESH_TYPES:
+        if not Path(mesh_type).is_file():
+            known = ", ".join(MESH_TYPES)
+            raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {known}")
+        scale = _quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
+        return read_beam_mesh(mesh_type, beam.length, beam.height, scale), Path(mesh_type).name
+    if size is None:
+        raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
+    edge = _quantity("--size", size, "length")
+    if edge > min(beam.length, beam.height):
+        raise ValueError(f"--size: '{size}' is larger than beam '{beam.name}'; give at most its smaller side")
+    return MESH_TYPES[mesh_type](beam.length, beam.height, edge), f"{mesh_type} {size}"
+
+
+def _prediction(mesh, name, beam, material, choices):
+    """Text of a prediction."""
+    rows = [["definition", "springs inside", "on the outline", "traction", "bending", "shear", "nu", "besides springs"]]
+    for choice in choices:
+        stiffness = [
+            f"{value:.5g} N/m" if value == value else "each its own" for value in (choice.inside, choice.outline)
+        ]
+        errors = [f"{100 * value + 0.0:+.1f} %" for value in (choice.traction, choice.bending, choice.shear)]
+        rows.append([choice.definition, *stiffness, *errors, f"{choice.poisson_ratio:.3f}", choice.extra])
+    first = choices[0].definition
+    modulus = (
+        f"E = {material.young_modulus / 1e9:g} GPa"
+        if material.young_modulus >= 1e9
+        else f"E = {material.young_modulus / 1e6:g} MPa"
+    )
+    lines = [
+        f"{beam.name} mm, {name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
+        f"{material.name}, {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm",
+        "",
+        f"recommended: {first}; with springs alone: patch",
+        "",
+        _table(rows, left=2, right=(3, 4, 5, 6)),
+        "",
+        "Errors are of the displacement of the loaded side, to expect under each load at small strain.",
+    ]
+    return "\n".join(lines)
+
+
 @main.command()
 @click.option(
     "--write", is_flag=True, help=f"Write {SCHEMA} and the tables of {MANUAL} instead of printing the schema."

@@ -18,6 +18,7 @@ DIMENSIONS = {
     "definition": "definition of the spring stiffness",
     "kinematics": "kinematics of the network",
     "stiffness_ratio": "uniform stiffness over E t",
+    "poisson_ratio": "Poisson's ratio that the definition is asked for",
 }
 UNITS = {"mesh_size": "m"}
 """Units of the coordinates that have one; the others are labels or ratios."""
@@ -30,8 +31,9 @@ CELL = ("beam", "mesh_type", "mesh_size", "material", "load")
 
 ROOT_VARIABLES = {
     # name: (dimensions, units, long name, what a cell without a value holds)
-    "displacement": (SCENE, "m", "mean axial displacement of the loaded end, network", np.nan),
+    "displacement": (SCENE, "m", "mean displacement of the loaded side along the force, network", np.nan),
     "deformation_error": (SCENE, "1", "signed deformation error, (network - reference) / |reference|", np.nan),
+    "field_error": (SCENE, "1", "difference of the whole displacement fields in L2, over the reference", np.nan),
     "stiffness": (SCENE, "N/m", "uniform spring stiffness", np.nan),
     "status": (SCENE, "1", "what became of the scene", 0),
     "message": (SCENE, "1", "why the scene is not solved", ""),
@@ -39,8 +41,18 @@ ROOT_VARIABLES = {
     "residual": (SCENE, "1", "out-of-balance force over the load", np.nan),
     "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
     "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
-    "force": (REFERENCE, "N", "force on the right end, tension positive", np.nan),
-    "reference_displacement": (REFERENCE, "m", "mean axial displacement of the loaded end, reference", np.nan),
+    "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
+    "definition_evaluations": (SCENE, "1", "solves that deriving the springs' parameters took", np.nan),
+    "spring_ratio": (SCENE, "1", "largest spring stiffness over the smallest", np.nan),
+    "material_young_modulus": (("material",), "Pa", "Young's modulus", np.nan),
+    "material_poisson_ratio": (("material",), "1", "Poisson's ratio", np.nan),
+    "force": (REFERENCE, "N", "force on the loaded side, tension positive", np.nan),
+    "reference_displacement": (
+        REFERENCE,
+        "m",
+        "mean displacement of the loaded side along the force, reference",
+        np.nan,
+    ),
     "reference_error_estimate": (REFERENCE, "1", "estimated relative error of the reference", np.nan),
     "reference_seconds": (REFERENCE, "s", "time to solve the reference, shared by all loads", np.nan),
     "particles": (MESH, "1", "number of particles", np.nan),
@@ -58,7 +70,12 @@ ROOT_VARIABLES = {
 
 SENSITIVITY_VARIABLES = {
     "stiffness": ((*CURVE, "stiffness_ratio"), "N/m", "uniform spring stiffness", np.nan),
-    "displacement": ((*CURVE, "stiffness_ratio"), "m", "mean axial displacement of the loaded end, network", np.nan),
+    "displacement": (
+        (*CURVE, "stiffness_ratio"),
+        "m",
+        "mean displacement of the loaded side along the force, network",
+        np.nan,
+    ),
     "deformation_error": (
         (*CURVE, "stiffness_ratio"),
         "1",
@@ -69,6 +86,19 @@ SENSITIVITY_VARIABLES = {
     "best_stiffness": (CURVE, "N/m", "stiffness with no deformation error", np.nan),
     "predicted_stiffness": (CURVE, "N/m", "stiffness by closed form, full outline", np.nan),
     "curve_seconds": (CURVE, "s", "time to trace the curve, networks shared", np.nan),
+}
+
+PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
+
+MODULI_VARIABLES = {
+    "young_modulus_error": (PATCH, "1", "error of Young's modulus along x, effective / asked - 1", np.nan),
+    "effective_poisson_ratio": (PATCH, "1", "effective Poisson's ratio under load along x", np.nan),
+    "shear_modulus_error": (PATCH, "1", "error of the shear modulus, effective / asked - 1", np.nan),
+    "definition_seconds": (PATCH, "s", "time to derive the springs' parameters", np.nan),
+    "definition_evaluations": (PATCH, "1", "solves that deriving the springs' parameters took", np.nan),
+    "spring_ratio": (PATCH, "1", "largest spring stiffness over the smallest", np.nan),
+    "status": (PATCH, "1", "what became of the patch test", 0),
+    "message": (PATCH, "1", "why there are no moduli", ""),
 }
 
 FIELD = (*SCENE, "particle")
@@ -87,6 +117,13 @@ FIELD_VARIABLES = {
     "reference_displacement_y": (OUTLINE, "m", "displacement along y, reference", np.nan),
 }
 """Whole fields, of each beam's and mesh type's coarsest mesh: they are there to be looked at."""
+
+
+def most_asked(root, dimension):
+    """Label of a dimension that most scenes of a dataset's root are of."""
+    asked = root.status != 0
+    counts = asked.sum([name for name in asked.dims if name != dimension])
+    return str(counts[dimension].values[int(counts.values.argmax())])
 
 
 def empty(axes, variables):

@@ -9,6 +9,8 @@
 Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1].
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from .mesh import ROW_HEIGHT, lattice, row_height
@@ -70,6 +72,65 @@ def mean_gradient(mesh, displacements):
     return total / mesh.area
 
 
+class PatchTest:
+    """Patch tests of many networks on one mesh, whose numbering of unknowns they share.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    """
+
+    def __init__(self, mesh):
+        self.mesh = mesh
+        self._first = {}
+
+    def _network(self, name, held, springs):
+        network = Network(self.mesh, held, springs.relative, springs.energies, self._first.get(name))
+        self._first.setdefault(name, network)
+        return network
+
+    @cached_property
+    def _rollers(self):
+        """Particles at both ends, directions held and displacements given between rollers."""
+        left, right = ends(self.mesh)
+        held = np.zeros(self.mesh.points.shape, dtype=bool)
+        held[left, 0] = held[right, 0] = True
+        held[left[0], 1] = True
+        return left, right, held, np.where(held, self.mesh.points * [1.0, 0.0], 0.0)
+
+    @cached_property
+    def _frame(self):
+        """Directions held and displacements given under even shear of the whole outline."""
+        held = np.zeros(self.mesh.points.shape, dtype=bool)
+        held[self.mesh.edges[self.mesh.on_outline]] = True
+        return held, self.mesh.points[:, ::-1] * [1.0, 0.0]
+
+    def axial(self, springs):
+        """See `axial_moduli`."""
+        mesh, (left, right, held, given) = self.mesh, self._rollers
+        network = self._network("rollers", held, springs)
+        moved = given + network.expand(network.rest_factor.solve(-network.linear_resistance(given)))
+        force = network.linear_forces(moved)[right, 0].sum()
+        height = mesh.area / (mesh.points[right, 0].mean() - mesh.points[left, 0].mean())
+        stress = force / height
+        if springs.lateral:
+            pushed = network.expand(network.rest_factor.solve(network.reduce(lateral_forces(mesh))))
+            own = network.linear_forces(pushed)[right, 0].sum() * springs.lateral
+            stress = force / (height - own)
+            moved += stress * springs.lateral * pushed
+        strain = mean_gradient(mesh, moved)
+        return stress / strain[0, 0], -strain[1, 1] / strain[0, 0]
+
+    def shear(self, springs):
+        """See `shear_modulus`."""
+        held, given = self._frame
+        network = self._network("frame", held, springs)
+        moved = given
+        if network.unknowns:
+            moved = given - network.expand(network.rest_factor.solve(network.linear_resistance(given)))
+        return float((network.linear_forces(moved) * given).sum()) / self.mesh.area
+
+
 def axial_moduli(mesh, springs):
     """Young's modulus along x and Poisson's ratio, between rollers.
 
@@ -85,24 +146,7 @@ def axial_moduli(mesh, springs):
     poisson_ratio : float
         Mean transverse over mean axial strain, sign changed [1].
     """
-    left, right = ends(mesh)
-    held = np.zeros(mesh.points.shape, dtype=bool)
-    held[left, 0] = held[right, 0] = True
-    held[left[0], 1] = True
-    network = Network(mesh, held, springs.relative, springs.energies)
-    given = np.zeros(mesh.points.shape)
-    given[held[:, 0], 0] = mesh.points[held[:, 0], 0]
-    moved = given + network.expand(network.rest_factor.solve(-network.linear_resistance(given)))
-    force = network.linear_forces(moved)[right, 0].sum()
-    height = mesh.area / (mesh.points[right, 0].mean() - mesh.points[left, 0].mean())
-    stress = force / height
-    if springs.lateral:
-        pushed = network.expand(network.rest_factor.solve(network.reduce(lateral_forces(mesh))))
-        own = network.linear_forces(pushed)[right, 0].sum() * springs.lateral
-        stress = force / (height - own)
-        moved += stress * springs.lateral * pushed
-    strain = mean_gradient(mesh, moved)
-    return stress / strain[0, 0], -strain[1, 1] / strain[0, 0]
+    return PatchTest(mesh).axial(springs)
 
 
 def shear_modulus(mesh, springs):
@@ -113,15 +157,7 @@ def shear_modulus(mesh, springs):
     float
         G t over the reference stiffness [1].
     """
-    held = np.zeros(mesh.points.shape, dtype=bool)
-    held[mesh.edges[mesh.on_outline]] = True
-    network = Network(mesh, held, springs.relative, springs.energies)
-    given = np.zeros(mesh.points.shape)
-    given[:, 0] = mesh.points[:, 1]
-    moved = given
-    if network.unknowns:
-        moved = given - network.expand(network.rest_factor.solve(network.linear_resistance(given)))
-    return float((network.linear_forces(moved) * given).sum()) / mesh.area
+    return PatchTest(mesh).shear(springs)
 
 
 def lateral_forces(mesh):

@@ -21,9 +21,9 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from . import units
 from .geometry import Beam
-from .loads import DIRECTION
+from .loads import LOADS
 from .materials import Material
-from .mesh import MESH_TYPES
+from .mesh import MESH_TYPES, QUADS
 from .springs import DEFINITIONS
 from .springs.lattice import COEFFICIENT
 
@@ -38,6 +38,10 @@ MOST_PARTICLES = 5e6
 
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
+
+OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions")
+"""What is made from a dataset: figures of curves, of errors against mesh size and of deformed networks; tables as the
+paper's; figures and tables that compare definitions."""
 
 SHOWN_PROBLEMS = 5
 """Problems that one message lists; it counts the others."""
@@ -58,14 +62,20 @@ class MeshSpec:
     ----------
     beam : Beam
     mesh_type : str
-        Key of `springtune.mesh.MESH_TYPES`.
+        Key of `springtune.mesh.MESH_TYPES`, or the name of meshes from files.
     mesh_size : float
         Asked length of an edge [m].
+    file : Path or None
+        The file that it is read from.
+    unit : float
+        Unit of the coordinates in the file [m].
     """
 
     beam: Beam
     mesh_type: str
     mesh_size: float
+    file: Path | None = None
+    unit: float = 1.0
 
     @property
     def name(self):
@@ -82,9 +92,9 @@ class Scene:
     mesh : MeshSpec
     material : Material
     load : str
-        Key of `springtune.loads.DIRECTION`.
+        Key of `springtune.loads.LOADS`.
     force : float
-        Force on the right end, tension positive [N].
+        Force on the loaded side, tension positive [N].
     definition : str
         Key of `springtune.springs.DEFINITIONS`.
     kinematics : str
@@ -126,6 +136,27 @@ class Reference:
 
 
 @dataclass(frozen=True)
+class Moduli:
+    """Effective moduli of a definition on a patch, see `Study.patch`.
+
+    Attributes
+    ----------
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_type : str
+    mesh_size : float
+        Length of an edge [m].
+    poisson_ratio : float
+        Poisson's ratio that the definition is asked for [1].
+    """
+
+    definition: str
+    mesh_type: str
+    mesh_size: float
+    poisson_ratio: float
+
+
+@dataclass(frozen=True)
 class Grid:
     """What one grid of a study asks for, whether or not other grids ask for it, too.
 
@@ -134,11 +165,13 @@ class Grid:
     name : str
     scenes : tuple of Scene
     curves : tuple of Curve
+    moduli : tuple of Moduli
     """
 
     name: str
     scenes: tuple
     curves: tuple
+    moduli: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -199,6 +232,13 @@ class Study:
     scenes : tuple of Scene
     curves : tuple of Curve
     references : tuple of Reference
+    moduli : tuple of Moduli
+    patch : Beam or None
+        Box on whose meshes moduli are measured; its thickness does not matter.
+    mesh_files : dict
+        `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
+    outputs : tuple of str
+        What is made from the dataset: of `OUTPUTS`.
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -222,6 +262,10 @@ class Study:
     scenes: tuple
     curves: tuple
     references: tuple
+    moduli: tuple
+    patch: Beam | None
+    mesh_files: dict
+    outputs: tuple
     grids: tuple
     stiffness_ratios: tuple
     stiffness_table: dict
@@ -425,8 +469,11 @@ Stress = _quantity("stress")
 PoissonRatio = _number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
 Ratio = _number("a number above 0", 0, math.inf, above=True)
 Points = _number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
-MeshType = _one_of("mesh type", MESH_TYPES)
-Load = _one_of("load", DIRECTION)
+MeshType = Annotated[
+    str, _Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
+]
+Load = _one_of("load", LOADS)
+Output = _one_of("output", OUTPUTS)
 Kinematics = _one_of("kinematics", KINEMATICS)
 DefinitionName = _one_of("definition", DEFINITIONS)
 Flag = Annotated[bool, _Scalar(_read_flag, {"type": "boolean"}, "true or false")]
@@ -620,6 +667,25 @@ class SensitivityConfig(Section):
     points: Points = Field("61", validate_default=True, description="Number of stiffnesses, both ends included.")
 
 
+class MeshFileConfig(Section):
+    """One mesh from a file, of a format that meshio reads; it fills its beam and its lower left corner is anywhere."""
+
+    file: FileName = Field(description="The file, its path relative to the study's folder.")
+    beam: BeamName = Field(description="Beam that it meshes.")
+    mesh_size: Length = Field(description="Length of an edge that it goes by in grids and in the dataset.")
+    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
+
+
+class PatchConfig(Section):
+    """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
+
+    Rows of triangles come as the exact lattice there, with staggered ends, not stretched to the box.
+    """
+
+    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
+    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
+
+
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
@@ -629,14 +695,17 @@ class GridConfig(Section):
     beam: Annotated[list[BeamName], _OneOrMore()] = Field(description="Beams, by name.")
     mesh_type: Annotated[list[MeshType], _OneOrMore()] = Field(
         description="`structured`: equilateral rows fitted to the box; "
-        "`free`: Delaunay inside an outline of imposed edge size."
+        "`free`: Delaunay inside an outline of imposed edge size; `right`, `alternating`: squares with one diagonal; "
+        "`braced`: squares with both; `isosceles-0.3`, `isosceles-0.5`: rows of triangles whose shape sets that "
+        "Poisson's ratio; or a name under `mesh_files`."
     )
     mesh_size: Annotated[list[Length], _OneOrMore()] = Field(
         description="Lengths of an edge; at most the smaller side of each beam."
     )
     material: Annotated[list[MaterialName], _OneOrMore()] = Field(description="Materials, by name.")
     load: Annotated[list[Load], _OneOrMore()] = Field(
-        description="Loads along x on the right end, spread evenly; the left end is clamped."
+        description="`traction`, `compression`: along x on the right end, `bending`: along y there, the left end "
+        "clamped; `shear`: along x on the upper side, which stays level, the lower side clamped. Spread evenly."
     )
     force: Annotated[dict[str, Force], _PerBeam()] = Field(
         description="Magnitude of the force: one for all beams, or one for each. The load's name carries the sign. "
@@ -656,6 +725,12 @@ class GridConfig(Section):
         description="Whether each mesh, material, load and kinematics also gets a sensitivity curve. "
         "Curves that `calibrated` needs are made in any case.",
     )
+    moduli: Flag = Field(
+        "false",
+        validate_default=True,
+        description="Whether effective moduli are measured for each definition, mesh type, mesh size and Poisson's "
+        "ratio, on the box under `patch`. Definitions that are told their stiffness have none.",
+    )
 
 
 class StudyConfig(Section):
@@ -669,6 +744,17 @@ class StudyConfig(Section):
     )
     sensitivity: SensitivityConfig = Field(
         default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
+    )
+    mesh_files: Annotated[dict[str, list[MeshFileConfig]], _Named("mesh type")] | None = Field(
+        None, description="Mesh types of your own: for each a list of files, one for each beam and mesh size."
+    )
+    patch: PatchConfig = Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured.")
+    outputs: Annotated[list[Output], _OneOrMore()] = Field(
+        ["sensitivity", "size", "deformed", "tables"],
+        validate_default=False,
+        description="What is made from the dataset: figures of sensitivity curves, of errors against mesh size, of "
+        "deformed networks (and the group `/fields` behind them), tables as the paper's; `definitions`: figures and "
+        "tables that compare definitions. Figures are of nonlinear kinematics.",
     )
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
@@ -687,6 +773,8 @@ SECTIONS = {
     "definitions.paper.stiffness[]": StatedStiffness,
     "definitions.calibrated": CalibratedConfig,
     "sensitivity": SensitivityConfig,
+    "mesh_files.<name>[]": MeshFileConfig,
+    "patch": PatchConfig,
     "grids.<name>": GridConfig,
 }
 """Model of each section of a study, by its place."""
@@ -732,11 +820,12 @@ def load_study(path):
     problems.stop()
     _check_meshes(config, content, problems)
     problems.stop()
-    grids = _expand(config, problems)
+    mesh_files = _mesh_files(config, path.parent, problems)
+    grids = _expand(config, mesh_files, problems)
     _check_definitions(config, content, grids, problems)
     problems.stop()
     printed_path = path.parent / config.printed if config.printed else None
-    about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path}
+    about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
     return _study(config, grids, problems, about)
 
 
@@ -768,7 +857,17 @@ def _check_names(config, problems):
         if name not in names:
             problems.add(path, f"unknown {what} '{name}'; {_nearest(name, names)}; or declare it under {what}s")
 
+    mesh_types = _mesh_types(config)
+    for name in config.mesh_files or ():
+        if name in MESH_TYPES:
+            problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
+        for number, row in enumerate(config.mesh_files[name]):
+            known(("mesh_files", name, number, "beam"), "beam", row.beam, config.beams)
     for name, grid in config.grids.items():
+        for mesh_type in grid.mesh_type:
+            if mesh_type not in mesh_types:
+                message = f"unknown mesh type '{mesh_type}'; {_nearest(mesh_type, mesh_types)}"
+                problems.add(("grids", name, "mesh_type"), f"{message}; or declare it under mesh_files")
         for beam in grid.beam:
             known(("grids", name, "beam"), "beam", beam, config.beams)
         for material in grid.material:
@@ -787,6 +886,10 @@ def _check_names(config, problems):
     for number, row in enumerate(paper.stiffness if paper else ()):
         path = ("definitions", "paper", "stiffness", number)
         known((*path, "material"), "material", row.material, config.materials)
+        if row.mesh_type not in mesh_types:
+            problems.add(
+                (*path, "mesh_type"), f"unknown mesh type '{row.mesh_type}'; {_nearest(row.mesh_type, mesh_types)}"
+            )
         if (row.mesh_type, row.material) in seen:
             problems.add(path, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
         seen.add((row.mesh_type, row.material))
@@ -795,9 +898,34 @@ def _check_names(config, problems):
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
 
 
+def _mesh_types(config):
+    """Names of all mesh types, made ones first."""
+    return [*MESH_TYPES, *(config.mesh_files or ())]
+
+
+def _mesh_files(config, folder, problems):
+    """Meshes from files by (mesh type, beam's name, mesh size)."""
+    found = {}
+    for name, rows in (config.mesh_files or {}).items():
+        for number, row in enumerate(rows):
+            path, label = folder / row.file, (name, row.beam, row.mesh_size)
+            where = ("mesh_files", name, number)
+            if not path.is_file():
+                problems.add((*where, "file"), f"'{path}' is not a file; give its path relative to the study's folder")
+            if label in found:
+                problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")
+            beam = config.beams[row.beam]
+            beam = Beam(row.beam, beam.length, beam.height, beam.thickness)
+            found[label] = MeshSpec(beam, name, row.mesh_size, path, row.unit)
+    problems.stop()
+    return found
+
+
 def _check_meshes(config, content, problems):
     """Mesh sizes against the beams they are for."""
     for name, grid in config.grids.items():
+        if not any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type):
+            continue
         written = content["grids"][name]["mesh_size"]
         for number, size in enumerate(grid.mesh_size):
             shown = f"'{written[number]}'" if isinstance(written, list) else f"'{written}'"
@@ -817,9 +945,9 @@ def _ranks(config):
     """Place of each label in the order of its dimension."""
     names = {
         "beam": config.beams,
-        "mesh_type": MESH_TYPES,
+        "mesh_type": _mesh_types(config),
         "material": config.materials,
-        "load": DIRECTION,
+        "load": LOADS,
         "definition": DEFINITIONS,
         "kinematics": KINEMATICS,
     }
@@ -845,7 +973,7 @@ def _order(ranks):
     return key
 
 
-def _expand(config, problems):
+def _expand(config, mesh_files, problems):
     """Grids with their scenes and curves, in canonical order."""
     order = _order(_ranks(config))
     beams = {name: Beam(name, beam.length, beam.height, beam.thickness) for name, beam in config.beams.items()}
@@ -855,7 +983,7 @@ def _expand(config, problems):
     }
     forces, grids = {}, []
     for name, grid in config.grids.items():
-        scenes, curves = [], []
+        scenes, curves, absent = [], [], set()
         for beam, material, load in product(grid.beam, grid.material, grid.load):
             magnitude = grid.force[beam if beam in grid.force else None]
             other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
@@ -865,19 +993,58 @@ def _expand(config, problems):
                     f"{magnitude:g} N on beam '{beam}' of {material} in {load}, but grid '{other_grid}' has "
                     f"{other:g} N; give both the same force, or the other one a study of its own",
                 )
-            force = DIRECTION[load] * magnitude
+            force = LOADS[load].sign * magnitude
             for mesh_type, size, kinematics in product(grid.mesh_type, grid.mesh_size, grid.kinematics):
-                common = (MeshSpec(beams[beam], mesh_type, size), materials[material], load, force)
+                mesh = MeshSpec(beams[beam], mesh_type, size)
+                if mesh_type not in MESH_TYPES:
+                    mesh = mesh_files.get((mesh_type, beam, size))
+                    if mesh is None:
+                        absent.add((mesh_type, beam, f"{1e3 * size:g} mm"))
+                        continue
+                common = (mesh, materials[material], load, force)
                 scenes += [Scene(*common, definition, kinematics) for definition in grid.definition]
                 if grid.sensitivity:
                     curves.append(Curve(*common, kinematics))
-        grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order))))
+        for mesh_type, beam, size in sorted(absent):
+            row = f"{{file: <path>, beam: {beam}, mesh_size: {size}}}"
+            problems.add(("grids", name, "mesh_size"), f"no file for {size}; add {row} to mesh_files.{mesh_type}")
+        moduli = _moduli(grid, materials) if grid.moduli else ()
+        grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order)), moduli))
     problems.stop()
     return tuple(grids)
 
 
+def _moduli(grid, materials):
+    """Moduli that a grid asks for: of definitions that derive a stiffness."""
+    derived = [name for name in grid.definition if DEFINITIONS[name].needs != "stiffness"]
+    ratios = dict.fromkeys(materials[name].poisson_ratio for name in grid.material)
+    return tuple(Moduli(*labels) for labels in product(derived, grid.mesh_type, grid.mesh_size, ratios))
+
+
+def _check_kinds(grids, problems):
+    """Definitions against the cells and loads of the grids that use them."""
+    for grid in grids:
+        found = {}
+        for scene in grid.scenes:
+            definition, mesh_type = DEFINITIONS[scene.definition], scene.mesh.mesh_type
+            count = 4 if mesh_type in QUADS else 3
+            if mesh_type in MESH_TYPES and count not in definition.cells:
+                needs, has = ("triangles", "quadrilaterals") if count == 4 else ("rectangles", "triangles")
+                found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
+            if LOADS[scene.load].kind not in definition.kinds:
+                kinds = " and ".join(name for name, load in LOADS.items() if load.kind in definition.kinds)
+                found[f"'{definition.name}' is for {kinds} and load '{scene.load}' is neither; {SEPARATE}"] = None
+        for message in found:
+            problems.add(("grids", grid.name, "definition"), message)
+
+
+SEPARATE = "give them grids of their own"
+"""Remedy where two values of a grid do not go together."""
+
+
 def _check_definitions(config, content, grids, problems):
     """Parameters of the definitions against what the grids need of them."""
+    _check_kinds(grids, problems)
     stated = {(row.mesh_type, row.material): row.value for row in _stated(config)}
     thicknesses = {}
     for grid in grids:
@@ -966,6 +1133,12 @@ def _study(config, grids, problems, about):
     used["material"] = {scene.material.name for scene in scenes}
     axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}
     axes["mesh_size"] = tuple(sorted({mesh.mesh_size for mesh in meshes}))
+    moduli = tuple(dict.fromkeys(one for grid in grids for one in grid.moduli))
+    axes["poisson_ratio"] = tuple(sorted({one.poisson_ratio for one in moduli}))
+    outputs = tuple(name for name in OUTPUTS if name in config.outputs)
+    if "definitions" in outputs and not moduli:
+        problems.add(("outputs",), "'definitions' compares moduli and no grid has them; add 'moduli: true' to a grid")
+        problems.stop()
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     steps = [first + (last - first) * step / (points - 1) for step in range(points)]
     calibrated = config.definitions.calibrated
@@ -975,11 +1148,14 @@ def _study(config, grids, problems, about):
         scenes=scenes,
         curves=in_order(curves),
         references=references,
+        moduli=moduli,
+        patch=Beam("patch", config.patch.length, config.patch.height, 1.0) if moduli else None,
+        outputs=outputs,
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in _stated(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
-        printed=_read_printed(about["printed_path"], problems) if about["printed_path"] else (),
+        printed=_read_printed(about["printed_path"], _mesh_types(config), problems) if about["printed_path"] else (),
         axes=axes,
         **about,
     )
@@ -1021,7 +1197,7 @@ _PRINTED_COLUMNS = {
 }
 
 
-def _read_printed(path, problems):
+def _read_printed(path, mesh_types, problems):
     """Cells of a CSV file of printed values; lines that begin with # are comments."""
     try:
         text = path.read_bytes().decode("utf-8-sig")
@@ -1042,7 +1218,7 @@ def _read_printed(path, problems):
                     file_problems.add((), f"has columns {','.join(header)}; give {wanted}", rows.line_num)
                     break
             elif row:
-                cell = _printed_cell(header, row, rows.line_num, file_problems)
+                cell = _printed_cell(header, row, mesh_types, rows.line_num, file_problems)
                 if cell:
                     label = (cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load)
                     first = cells.setdefault(label, (rows.line_num, cell))[0]
@@ -1056,14 +1232,14 @@ def _read_printed(path, problems):
     return tuple(cell for _, cell in cells.values())
 
 
-def _printed_cell(header, row, line, problems):
+def _printed_cell(header, row, mesh_types, line, problems):
     if len(row) != len(header):
         problems.add((), f"{len(row)} values for {len(header)} columns; add or remove some", line)
         return None
     values = {}
     for column, text in zip(header, row):
         field, size = _PRINTED_COLUMNS[column]
-        known = {"mesh_type": MESH_TYPES, "load": DIRECTION}.get(field)
+        known = {"mesh_type": mesh_types, "load": LOADS}.get(field)
         if size is None:
             values[field] = text
             if known and text not in known:

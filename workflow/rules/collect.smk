@@ -5,8 +5,9 @@ rule collect:
         config=CONFIG,
         references=rules.reference.output,
         calibration=rules.calibrate.output,
-        curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES),
-        scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES),
+        curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
+        scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES["solve"]),
+        moduli=expand(RESULTS / "done/moduli_{bundle}.json", bundle=BUNDLES["moduli"]),
         printed=STUDY.printed_path or [],
         code=modules("collect"),
     output:

@@ -43,4 +43,4 @@ BUNDLES = tasks.write_tasks(STUDY, RESULTS, workflow.cores or 1)
 
 
 wildcard_constraints:
-    bundle="|".join(BUNDLES),
+    bundle="[0-9]+",

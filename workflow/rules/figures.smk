@@ -35,16 +35,33 @@ rule figures_scenes:
         FIGURES["deformed"],
     params:
         folder=str(RESULTS / "figures"),
+        kinds=[kind for kind in ("size", "deformed") if FIGURES[kind]],
     log:
         RESULTS / "logs/figures_scenes.log",
     benchmark:
         RESULTS / "benchmarks/figures_scenes.tsv"
     shell:
-        "python -m springtune.stages.figures_scenes {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.stages.figures_scenes {input.dataset} {params.folder} {params.kinds} > {log} 2>&1"
+
+
+rule figures_definitions:
+    message:
+        "Drawing the comparison of definitions"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_definitions"),
+    output:
+        FIGURES["definitions"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_definitions.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_definitions.tsv"
+    shell:
+        "python -m springtune.stages.figures_definitions {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_all:
     input:
-        FIGURES["sensitivity"],
-        FIGURES["size"],
-        FIGURES["deformed"],
+        FIGURES.values(),

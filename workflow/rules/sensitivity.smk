@@ -20,7 +20,7 @@ rule calibrate:
         "Calibrating the uniform stiffness"
     input:
         tasks=RESULTS / "tasks/calibrate.json",
-        curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES),
+        curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
         references=rules.reference.output,
         code=modules("calibrate"),
     output:

@@ -4,6 +4,7 @@ rule solve:
     input:
         tasks=RESULTS / "tasks/solve_{bundle}.json",
         meshes=RESULTS / "done/mesh_{bundle}.json",
+        references=rules.reference.output,
         calibration=rules.calibrate.output,
         code=modules("solve"),
     output:

@@ -1,5 +1,9 @@
 from springtune.tables import names as table_names
 
+TABLES = {
+    kind: [RESULTS / "tables" / name for name in names] for kind, names in table_names.of_study(STUDY).items()
+}
+
 
 rule tables:
     message:
@@ -9,8 +13,7 @@ rule tables:
         code=modules("tables"),
         page=PACKAGE / "tables/page.html",
     output:
-        [RESULTS / "tables" / f"{stem}.csv" for stem in table_names.of_study(STUDY)],
-        RESULTS / "tables/index.html",
+        TABLES["tables"],
     params:
         folder=str(RESULTS / "tables"),
     log:
@@ -19,3 +22,21 @@ rule tables:
         RESULTS / "benchmarks/tables.tsv"
     shell:
         "python -m springtune.stages.tables {input.dataset} {params.folder} > {log} 2>&1"
+
+
+rule tables_definitions:
+    message:
+        "Writing the tables of definitions"
+    input:
+        dataset=rules.collect.output,
+        code=modules("tables_definitions"),
+    output:
+        TABLES["definitions"],
+    params:
+        folder=str(RESULTS / "tables"),
+    log:
+        RESULTS / "logs/tables_definitions.log",
+    benchmark:
+        RESULTS / "benchmarks/tables_definitions.tsv"
+    shell:
+        "python -m springtune.stages.tables_definitions {input.dataset} {params.folder} > {log} 2>&1"

@@ -40,15 +40,25 @@ def of_study(study):
     Returns
     -------
     dict of str to dict
-        ``sensitivity``, ``size`` and ``deformed``, each a dict of selections by stem.
+        ``sensitivity``, ``size``, ``deformed`` and ``definitions``, each a dict of selections by stem; empty where the
+        study does not ask for the kind.
     """
     curves = [_labels(curve) for curve in study.curves if curve.kinematics == "nonlinear"]
     scenes = [_labels(scene) for scene in study.scenes if scene.kinematics == "nonlinear"]
-    return {
+    every = {
         "sensitivity": selections("sensitivity", SENSITIVITY, curves),
         "size": selections("size", SIZE, scenes),
         "deformed": selections("deformed", DEFORMED, scenes),
+        "definitions": definitions(study.axes["load"], study.axes["mesh_type"]),
     }
+    return {kind: chosen if kind in study.outputs else {} for kind, chosen in every.items()}
+
+
+def definitions(loads, mesh_types):
+    """Selections of the figures that compare definitions: moduli, errors against size by load, and heat maps."""
+    found = {"definitions_moduli": {}}
+    found |= {f"definitions_size_{load}": {"load": load} for load in loads}
+    return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
 
 
 def _labels(item):

@@ -45,8 +45,11 @@ LINES = (
 
 
 def line(number):
-    """Colour, dashes and marker of the line of that number; they repeat when used up."""
-    return dict(LINES[number % len(LINES)])
+    """Colour, dashes and marker of the line of that number; beyond the fifth, colours come back with other markers."""
+    turn, colour = divmod(number, len(LINES))
+    return {"color": LINES[colour]["color"]} | {
+        key: LINES[(colour + 2 * turn) % len(LINES)][key] for key in ("linestyle", "marker")
+    }
 
 
 @contextmanager

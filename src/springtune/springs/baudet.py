@@ -24,7 +24,7 @@ from .base import Springs, from_rectangles, not_negative, rectangles_only
 
 
 def springs(mesh, material, thickness):
-    """Rectangles with both diagonals that keep the shear modulus (Baudet 2007); nu moves the wrong way.
+    """Rectangles with both diagonals that keep the shear modulus (Baudet 2009); nu moves the wrong way.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on cells other than
     rectangles, and on rectangles slender enough for a negative stiffness.

@@ -10,12 +10,17 @@ from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
 
+from ..springs import DEFINITIONS
+
 PACKAGE = Path(__file__).parents[1]
+
+CHOOSING = ("solve", "moduli")
+"""Stages that run definitions by name: which modules those are no import in them says."""
 
 
 @cache
 def modules(stage):
-    """Files of the package that a stage imports, directly or not, and its own.
+    """Files of the package that a stage runs on: its own, all that it imports and the definitions that it may choose.
 
     Parameters
     ----------
@@ -27,7 +32,32 @@ def modules(stage):
     tuple of str
         Paths, sorted.
     """
-    found, waiting = set(), {PACKAGE / "stages" / f"{stage}.py"}
+    found = set(_closure(f"stages/{stage}.py"))
+    for name in DEFINITIONS if stage in CHOOSING else ():
+        found |= set(_closure(_definition_file(name)))
+    return tuple(sorted(found))
+
+
+@cache
+def digest(stage):
+    """Hash of the source of a stage's modules, definitions left out."""
+    return _hash(_closure(f"stages/{stage}.py"))
+
+
+@cache
+def definition_digest(name):
+    """Hash of the source of a definition and of what it imports."""
+    return _hash(_closure(_definition_file(name)))
+
+
+def _definition_file(name):
+    return f"springs/{DEFINITIONS[name].place.partition(':')[0]}.py"
+
+
+@cache
+def _closure(start):
+    """A file of the package and those that it imports, directly or not: paths, sorted."""
+    found, waiting = set(), {PACKAGE / start}
     while waiting:
         path = waiting.pop()
         found.add(path)
@@ -35,13 +65,16 @@ def modules(stage):
     return tuple(sorted(str(path) for path in found))
 
 
-@cache
-def digest(stage):
-    """Hash of the source of a stage's modules."""
+def _hash(paths):
     total = hashlib.sha256()
-    for path in modules(stage):
-        total.update(Path(path).read_bytes())
+    for path in paths:
+        total.update(_source(path))
     return total.hexdigest()
+
+
+@cache
+def _source(path):
+    return Path(path).read_bytes()
 
 
 @cache
@@ -49,7 +82,7 @@ def _imported(path):
     relative = path.relative_to(PACKAGE.parent).with_suffix("")
     package = ".".join(relative.parts[:-1])
     names = set()
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    for node in ast.walk(ast.parse(_source(path))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

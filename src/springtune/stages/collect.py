@@ -15,11 +15,27 @@ import xarray as xr
 from .. import __version__, dataset
 from ..compare import best_stiffness, deformation_error
 from ..mesh import read_mesh
+from ..reference.field import outline
 from ..springs.lattice import predicted_stiffness
 from ..study import load_study
 from . import files, store, tasks
 
 SOFTWARE = ("h5netcdf", "h5py", "meshio", "netgen-mesher", "numpy", "scikit-fem", "scipy", "snakemake", "xarray")
+
+
+COPIED = (
+    "displacement",
+    "stiffness",
+    "message",
+    "iterations",
+    "residual",
+    "negative_pivots",
+    "field_error",
+    "definition_seconds",
+    "definition_evaluations",
+    "spring_ratio",
+)
+"""What of a scene's result goes into the dataset as it is."""
 
 
 def run(config, folder, output):
@@ -40,6 +56,12 @@ def run(config, folder, output):
     _meshes(study, folder, root)
     references = _references(study, folder, root)
     _scenes(study, folder, root)
+    for material in {scene.material for scene in study.scenes}:
+        values = {
+            "material_young_modulus": material.young_modulus,
+            "material_poisson_ratio": material.poisson_ratio,
+        }
+        root.put(values, material=material.name)
     _printed(study, root)
     data = root.data
     data["deformation_error"].values = deformation_error(
@@ -48,7 +70,10 @@ def run(config, folder, output):
     groups = {"/": data}
     if study.curves:
         groups["/sensitivity"] = _sensitivity(study, folder, references, axes)
-    groups["/fields"] = _fields(study, folder, axes)
+    if study.moduli:
+        groups["/moduli"] = _moduli(study, folder, axes)
+    if "deformed" in study.outputs:
+        groups["/fields"] = _fields(study, folder, axes)
     dataset.write(output, groups, _attributes(study, config))
 
 
@@ -57,21 +82,21 @@ class _Filler:
 
     def __init__(self, data):
         self.data = data
+        # Looking an array up costs more than writing a cell of it.
+        self._arrays = {name: (array.dims, array.values) for name, array in data.data_vars.items()}
         self._places = {name: {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords}
 
     def put(self, values, **labels):
         for name, value in values.items():
-            array = self.data[name]
-            array.values[
-                tuple(self._places[dimension][labels[dimension]] for dimension in array.dims if dimension in labels)
-            ] = value
+            dimensions, array = self._arrays[name]
+            array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
 
     def put_rows(self, values, **labels):
         """Write rows that may be shorter than the last dimension."""
         for name, row in values.items():
-            array = self.data[name]
-            place = tuple(self._places[dimension][labels[dimension]] for dimension in array.dims[:-1])
-            array.values[place][: len(row)] = row
+            dimensions, array = self._arrays[name]
+            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions[:-1])
+            array[place][: len(row)] = row
 
 
 def _mesh_labels(mesh):
@@ -89,9 +114,7 @@ def _references(study, folder, root):
     """Displacement of each reference by (beam, material, load)."""
     displacements = {}
     for asked in study.references:
-        name = tasks.reference_key(asked.beam, asked.material)
-        file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
-        result = store.read(file, [name])[name]
+        result = _reference(folder, asked)
         labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
         root.put({"force": asked.force, "reference_seconds": result["seconds"]}, **labels)
         if "displacement" not in result:
@@ -103,6 +126,12 @@ def _references(study, folder, root):
     return displacements
 
 
+def _reference(folder, asked, fields=()):
+    name = tasks.reference_key(asked.beam, asked.material, asked.load)
+    file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
+    return store.read(file, [name], fields)[name]
+
+
 def _scenes(study, folder, root):
     calibration = files.read_json(folder / "done" / "calibrate.json")
     for mesh, scenes in _by_mesh(study.scenes).items():
@@ -111,9 +140,7 @@ def _scenes(study, folder, root):
         for scene, name in zip(scenes, names):
             result = results[name]
             values = {"status": dataset.STATUS.index(result["status"]), "solve_seconds": result["seconds"]}
-            for label in ("displacement", "stiffness", "message", "iterations", "residual", "negative_pivots"):
-                if label in result:
-                    values[label] = result[label]
+            values |= {label: result[label] for label in COPIED if label in result}
             labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
             root.put(values, kinematics=scene.kinematics, **labels, **_mesh_labels(mesh))
 
@@ -155,7 +182,7 @@ def _sensitivity(study, folder, references, axes):
                     "deformation_error": deformation_error(displacement, reference),
                     "status": status,
                     "best_stiffness": best_stiffness(stiffness, displacement, reference),
-                    "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size),
+                    "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
                     "curve_seconds": result["seconds"],
                 },
                 material=curve.material.name,
@@ -166,12 +193,24 @@ def _sensitivity(study, folder, references, axes):
     return curves.data
 
 
+def _moduli(study, folder, axes):
+    moduli = _Filler(dataset.empty(axes, dataset.MODULI_VARIABLES))
+    patches = defaultdict(dict)
+    for one in study.moduli:
+        patches[tasks.patch_name(one)][tasks.moduli_key(study, one)] = one
+    for patch, names in patches.items():
+        for name, result in store.read(folder / "moduli" / f"{patch}.h5", names).items():
+            one = names[name]
+            values = result | {"status": dataset.STATUS.index(result["status"])}
+            labels = {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "poisson_ratio": one.poisson_ratio}
+            moduli.put(values, definition=one.definition, **labels)
+    return moduli.data
+
+
 def _fields(study, folder, axes):
-    coarsest = {}
-    for mesh in sorted(study.meshes, key=lambda mesh: mesh.mesh_size):
-        coarsest[mesh.beam, mesh.mesh_type] = mesh
-    meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in coarsest.values()}
-    outlines = {(asked.beam, asked.material): _outline(folder, asked) for asked in study.references}
+    shown = tasks.shown_meshes(study)
+    meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
+    outlines = {asked: _outline(folder, asked) for asked in study.references}
     lengths = {
         "particle": max(len(mesh.points) for mesh in meshes.values()),
         "spring": max(len(mesh.edges) for mesh in meshes.values()),
@@ -194,7 +233,7 @@ def _fields(study, folder, axes):
                 chosen["kinematics"] = scene.kinematics
                 fields.put_rows({"displacement_x": found[:, 0], "displacement_y": found[:, 1]}, **chosen, **labels)
     for asked in study.references:
-        points, displacements = outlines[asked.beam, asked.material]
+        points, displacements = outlines[asked]
         moved = asked.force * displacements
         beam, load = {"beam": asked.beam.name}, {"material": asked.material.name, "load": asked.load}
         fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
@@ -206,16 +245,10 @@ def _fields(study, folder, axes):
 
 def _outline(folder, asked):
     """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
-    name = tasks.reference_key(asked.beam, asked.material)
-    file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
-    result = store.read(file, [name], ["points", "displacements"])[name]
-    if "points" not in result:
+    result = _reference(folder, asked, ["x", "y", "displacements"])
+    if "x" not in result:
         return np.zeros((0, 2)), np.zeros((0, 2))
-    points, box = result["points"], np.array([asked.beam.length, asked.beam.height])
-    on_outline = ((np.abs(points) < 1e-9 * box) | (np.abs(points - box) < 1e-9 * box)).any(axis=1)
-    points, displacements = points[on_outline], result["displacements"][on_outline]
-    around = np.argsort(np.arctan2(*(points - 0.5 * box).T[::-1]))
-    return points[around], displacements[around]
+    return outline(result["x"], result["y"], result["displacements"])
 
 
 def _by_mesh(items):

@@ -7,12 +7,13 @@ import xarray as xr
 from ..figures import deformed, size
 
 
-def run(dataset, folder):
-    """Draw the figures of a dataset's scenes into a folder."""
+def run(dataset, folder, *kinds):
+    """Draw figures of a dataset's scenes into a folder: of the kinds ``size`` and ``deformed``."""
+    drawers = {"size": size, "deformed": deformed}
     with xr.open_datatree(dataset, engine="h5netcdf") as tree:
         tree.load()
-        size.draw(tree, folder)
-        deformed.draw(tree, folder)
+        for kind in kinds:
+            drawers[kind].draw(tree, folder)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import sys
 import time
 from pathlib import Path
 
-from ..mesh import MESH_TYPES, quality, write_mesh
+from ..mesh import MESH_TYPES, quality, read_beam_mesh, write_mesh
 from . import files
 
 
@@ -14,7 +14,7 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder`` and ``meshes``, each with ``name, key, mesh_type, mesh_size, length, height``.
+        JSON file: ``folder`` and ``meshes``, each with ``name``, ``key`` and what `make` takes.
     done : str or Path
         JSON file to write: what was made.
     """
@@ -27,7 +27,7 @@ def run(tasks, done):
         if path.exists() and notes.exists() and files.read_json(notes)["key"] == task["key"]:
             continue
         begin = time.perf_counter()
-        mesh = MESH_TYPES[task["mesh_type"]](task["length"], task["height"], task["mesh_size"])
+        mesh = make(task)
         seconds = time.perf_counter() - begin
         # The notes name the mesh they belong to, so they go first and come last.
         notes.unlink(missing_ok=True)
@@ -36,6 +36,14 @@ def run(tasks, done):
         files.write_json(notes, {"key": task["key"], "mesh_seconds": seconds} | figures)
         made.append(task["name"])
     files.write_json(done, {"made": made})
+
+
+def make(source):
+    """Mesh from ``length``, ``height`` and ``mesh_type`` and ``mesh_size``, or ``file`` and its ``unit``."""
+    box = source["length"], source["height"]
+    if "file" in source:
+        return read_beam_mesh(source["file"], *box, source["unit"])
+    return MESH_TYPES[source["mesh_type"]](*box, source["mesh_size"])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Stage `reference`: one finite-element solution a beam and material, for a force of 1 N; loads scale it."""
+"""Stage `reference`: one finite-element solution a beam, material and kind of load, for 1 N; loads scale it."""
 
 import sys
 import time
@@ -16,7 +16,7 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder`` and ``references``, each with ``name, key, beam, material``.
+        JSON file: ``folder`` and ``references``, each with ``name, key, beam, material, kind``.
     done : str or Path
         JSON file to write: what was solved.
     """
@@ -28,15 +28,16 @@ def run(tasks, done):
             continue
         begin = time.perf_counter()
         try:
-            solution = solve_small_strain(Beam(**task["beam"]), Material(**task["material"]), 1.0)
+            material = Material(**task["material"])
+            solution = solve_small_strain(Beam(**task["beam"]), material, 1.0, kind=task["kind"])
         except RuntimeError as error:
             result = {"message": str(error)}
         else:
             result = {
                 "displacement": solution.displacement,
                 "error_estimate": solution.error_estimate,
-                "points": solution.points,
-                "triangles": solution.triangles,
+                "x": solution.x,
+                "y": solution.y,
                 "displacements": solution.displacements,
                 "message": "",
             }

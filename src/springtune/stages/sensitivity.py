@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..boundary import clamped, end_weights
+from ..boundary import held, weights
 from ..mesh import read_mesh
 from ..network import Network
 from ..path import stable_until, trace
@@ -21,8 +21,8 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder``, ``meshes`` (folder) and ``families``, each with ``name``, ``length`` and ``curves``, and
-        each of these with ``key, force, kinematics, stiffnesses``.
+        JSON file: ``folder``, ``meshes`` (folder) and ``families``, each with ``name`` and ``curves``, and each of
+        these with ``key, kind, force, kinematics, stiffnesses``.
     done : str or Path
         JSON file to write: how many curves were traced.
     """
@@ -35,9 +35,11 @@ def run(tasks, done):
         if not missing:
             continue
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
-        weights = end_weights(mesh, family["length"])
-        problem = StaticProblem(Network(mesh, clamped(mesh), uniform(mesh)), weights)
-        store.add(path, {curve["key"]: _trace(problem, weights, curve) for curve in missing})
+        problems = {}
+        for kind in {curve["kind"]: None for curve in missing}:
+            pattern = weights(mesh, kind)
+            problems[kind] = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), pattern), pattern
+        store.add(path, {curve["key"]: _trace(*problems[curve["kind"]], curve) for curve in missing})
         traced += len(missing)
     files.write_json(done, {"traced": traced})
 

@@ -1,18 +1,27 @@
 """Stage `solve`: the mass-spring network of every scene, all scenes of a mesh together."""
 
+import hashlib
 import sys
 import time
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from ..boundary import clamped, end_weights
+from ..boundary import held, weights
+from ..compare import field_error
 from ..materials import Material
 from ..mesh import read_mesh
+from ..moduli import lateral_forces
 from ..network import Network
-from ..springs import DEFINITIONS
+from ..reference.field import interpolate
+from ..springs import DEFINITIONS, DefinitionError
+from ..springs.identification import Case
 from ..statics import StaticProblem
 from . import files, store
+
+NETWORKS = 6
+"""Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""
 
 
 def run(tasks, calibration, done):
@@ -23,9 +32,10 @@ def run(tasks, calibration, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder``, ``meshes`` (folder) and ``families``, each with ``name``, ``length``, ``thickness`` and
-        ``scenes``, and each of these with ``key, material, force, definition, kinematics`` and either ``stiffness`` or
-        ``calibration``, the name of a group.
+        JSON file: ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name``,
+        ``thickness``, ``keep_fields`` and ``scenes``, and each of these with ``key, material, kind, force, definition,
+        kinematics, reference, reference_key`` and either ``stiffness``, or ``calibration``, the name of a group, and
+        ``thickness_ratio``.
     calibration : str or Path
         JSON file of the stage `calibrate`.
     done : str or Path
@@ -40,8 +50,11 @@ def run(tasks, calibration, done):
         missing = {name: scene for name, scene in scenes.items() if name not in present}
         if not missing:
             continue
-        beam = Solver(read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu"), family["length"], family["thickness"])
-        store.add(path, {name: beam.solve(scene, calibration) for name, scene in missing.items()})
+        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        references = References(Path(tasks["references"]), mesh)
+        solver = Solver(mesh, family["thickness"], references, family["keep_fields"])
+        order = sorted(missing, key=lambda name: _turn(missing[name]))
+        store.add(path, {name: solver.solve(missing[name], calibration) for name in order})
         solved += len(missing)
     files.write_json(done, {"solved": solved})
 
@@ -52,21 +65,53 @@ def _stored_key(scene, calibration):
     return files.key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
 
+def _turn(scene):
+    """Order in which scenes of one network follow each other."""
+    uniform = DEFINITIONS[scene["definition"]].uniform
+    return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], scene["kind"] == "shear")
+
+
+class References:
+    """Fields of references at the particles of a mesh, read when first asked for.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the references are stored.
+    mesh : Mesh
+    """
+
+    def __init__(self, folder, mesh):
+        self.folder, self.mesh, self.fields = folder, mesh, {}
+
+    def field(self, name, key):
+        """Displacements for 1 N [m], shape (n_points, 2); None where the reference has none."""
+        if key not in self.fields:
+            found = store.read(self.folder / f"{name}.h5", [key], ["x", "y", "displacements"])[key]
+            grid = [found.get(label) for label in ("x", "y", "displacements")]
+            self.fields[key] = None if grid[0] is None else interpolate(*grid, self.mesh.points)
+        return self.fields[key]
+
+
 class Solver:
     """Solves scenes of one mesh; networks that differ in reference stiffness alone are assembled and factorised once.
 
     Parameters
     ----------
     mesh : Mesh
-    length, thickness : float
+    thickness : float
         Of the beam [m].
+    references : References
+    keep_fields : bool
+        Whether displacements of all particles are part of the results.
     """
 
-    def __init__(self, mesh, length, thickness):
+    def __init__(self, mesh, thickness, references, keep_fields):
         self.mesh, self.thickness = mesh, thickness
-        self.held = clamped(mesh)
-        self.weights = end_weights(mesh, length)
-        self.problems = {}
+        self.references, self.keep_fields = references, keep_fields
+        self.patterns, self.networks, self.found = {}, {}, {}
+        self.held = lru_cache(lambda kind: held(mesh, kind))
+        self.weights = lru_cache(lambda kind: weights(mesh, kind))
 
     def solve(self, scene, calibration):
         """Result of a scene, ready to be stored.
@@ -81,14 +126,18 @@ class Solver:
         -------
         dict
             ``status`` (a flag meaning of the dataset), ``message``, ``displacement`` [m], ``stiffness`` [N/m],
-            ``iterations``, ``residual``, ``negative_pivots``, ``seconds``, and ``displacements`` [m] of the particles.
+            ``field_error``, ``iterations``, ``residual``, ``negative_pivots``, ``seconds``, those of the definition:
+            ``definition_seconds``, ``definition_evaluations``, ``spring_ratio``, and ``displacements`` [m] of the
+            particles where they are kept.
         """
         begin = time.perf_counter()
         try:
             result = self._solve(scene, calibration)
+        except DefinitionError as error:
+            result = {"status": "failed", "message": f"{scene['definition']}: {error}"}
         except Exception as error:  # the other scenes shall still arrive
             result = {"status": "failed", "message": f"{type(error).__name__}: {error}"}
-        return result | {"seconds": time.perf_counter() - begin}
+        return result | {"seconds": time.perf_counter() - begin - result.get("definition_seconds", 0.0)}
 
     def _solve(self, scene, calibration):
         definition = DEFINITIONS[scene["definition"]]
@@ -97,33 +146,69 @@ class Solver:
             group = calibration[scene["calibration"]]
             if group["stiffness"] is None:
                 return {"status": "failed", "message": group["message"]}
-            stiffness = group["stiffness"]
-        reference, relative = definition.springs(self.mesh, Material(**scene["material"]), self.thickness, stiffness)
-        problem = self._problem(relative)
-        s = scene["force"] / reference
+            stiffness = group["stiffness"] * scene["thickness_ratio"]
+        reference = self.references.field(scene["reference"], scene["reference_key"])
+        springs, seconds = self._springs(scene, stiffness, reference)
+        problem = self._problem(springs, scene["kind"])
+        s = scene["force"] / springs.reference
         found = problem.linear(s) if scene["kinematics"] == "linear" else problem.nonlinear(s)
         result = {
             "iterations": found.iterations,
             "residual": found.residual,
-            "stiffness": reference if definition.uniform else np.nan,
+            "stiffness": springs.reference if definition.uniform else np.nan,
+            "definition_seconds": seconds,
+            "definition_evaluations": springs.evaluations,
+            "spring_ratio": springs.spring_ratio,
         }
         if not found.converged:
             message = f"{found.reason}; last residual {found.residual:.1e}"
             return result | {"status": "not_converged", "message": message}
-        result["displacement"] = float(np.tensordot(found.displacements, self.weights, axes=2))
+        result["displacement"] = float(np.tensordot(found.displacements, self.weights(scene["kind"]), axes=2))
+        if reference is not None:
+            result["field_error"] = field_error(self.mesh, found.displacements, scene["force"] * reference)
         result["negative_pivots"] = pivots = found.factor.negative_pivots
         if pivots:
             message = f"unstable equilibrium: the tangent has {pivots} negative pivot{'s' if pivots > 1 else ''}"
             result |= {"status": "unstable", "message": message}
         else:
             result |= {"status": "solved", "message": ""}
-        return result | {"displacements": found.displacements}
+        return result | ({"displacements": found.displacements} if self.keep_fields else {})
 
-    def _problem(self, relative):
-        name = relative.tobytes()
-        if name not in self.problems:
-            self.problems[name] = StaticProblem(Network(self.mesh, self.held, relative), self.weights)
-        return self.problems[name]
+    def _springs(self, scene, stiffness, reference):
+        """Springs of a scene and the seconds that they took; the last ones are kept for the scene's other loads."""
+        definition = DEFINITIONS[scene["definition"]]
+        material = Material(**scene["material"])
+        name, given = (definition.name, material, stiffness), stiffness
+        if definition.needs == "cases":
+            if reference is None:
+                raise DefinitionError("needs the reference's displacements, and there are none")
+            force = scene["force"]
+            given = [Case(self.held(scene["kind"]), force * self.weights(scene["kind"]), force * reference)]
+            name += (scene["kind"], force)
+        if self.found.get("name") != name:
+            begin = time.perf_counter()
+            springs = definition.springs(self.mesh, material, self.thickness, given)
+            self.found = {"name": name, "springs": springs, "seconds": time.perf_counter() - begin}
+        return self.found["springs"], self.found["seconds"]
+
+    def _problem(self, springs, kind):
+        directions = self.held(kind)
+        parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
+        name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
+        network, problems = self.networks.pop(name, (None, {}))
+        if network is None:
+            like = self.patterns.get(directions.tobytes())
+            network = Network(self.mesh, directions, springs.relative, springs.energies, like)
+            self.patterns.setdefault(directions.tobytes(), network)
+        while len(self.networks) >= NETWORKS:
+            self.networks.pop(next(iter(self.networks)))
+        self.networks[name] = network, problems  # the last one used is the last one to go
+        if (kind, springs.lateral) not in problems:
+            pattern = self.weights(kind)
+            if springs.lateral:
+                pattern = pattern + springs.lateral / np.ptp(self.mesh.points[:, 1]) * lateral_forces(self.mesh)
+            problems[kind, springs.lateral] = StaticProblem(network, pattern)
+        return problems[kind, springs.lateral]
 
 
 if __name__ == "__main__":

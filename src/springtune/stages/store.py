@@ -1,23 +1,32 @@
-"""Results of scenes on disk: one HDF5 file a mesh and stage, one group a result, named by a hash of all it depends on.
+"""Results of scenes on disk: one HDF5 file a mesh and stage, results by a hash of all they depend on.
 
-A stage computes only the results that the file does not hold. What an earlier grid asked for stays, so going back to
-it computes nothing. Nothing but the dataset is meant for users.
+Scalars and texts of all results are one JSON text, since a group with attributes for each would cost more than solving
+it; arrays are datasets. A stage computes only the results that the file does not hold. What an earlier grid asked for
+stays, so going back to it computes nothing. Nothing but the dataset is meant for users.
 """
 
+import json
 import os
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+SCALARS = "scalars"
+"""Dataset of what is not an array."""
+
 
 def stored(path):
     """Keys of the results in a file; an unreadable file holds none."""
     try:
         with h5py.File(path) as file:
-            return set(file)
-    except OSError:
+            return set(_scalars(file))
+    except (OSError, KeyError, ValueError):
         return set()
+
+
+def _scalars(file):
+    return json.loads(file[SCALARS][()])
 
 
 def read(path, names, fields=()):
@@ -36,12 +45,12 @@ def read(path, names, fields=()):
     dict of str to dict
         Results by key: scalars, texts and the arrays asked for.
     """
-    results = {}
     with h5py.File(path) as file:
-        for name in names:
-            group = file[name]
-            result = {label: value.item() if hasattr(value, "item") else value for label, value in group.attrs.items()}
-            results[name] = result | {label: group[label][()] for label in fields if label in group}
+        scalars = _scalars(file)
+        results = {name: scalars[name] for name in names}
+        for name, result in results.items() if fields else ():
+            if name in file:
+                result |= {label: file[name][label][()] for label in fields if label in file[name]}
     return results
 
 
@@ -59,19 +68,22 @@ def add(path, results):
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(path.name + ".unfinished")
+    scalars = {}
     with h5py.File(unfinished, "w") as file:
         try:
             with h5py.File(path) as before:
+                scalars = {name: kept for name, kept in _scalars(before).items() if name not in results}
                 for name in before:
-                    if name not in results:
+                    if name in scalars:
                         before.copy(name, file)
-        except OSError:
+        except (OSError, KeyError, ValueError):
             pass  # there is none yet, or it cannot be read
         for name, result in results.items():
-            group = file.create_group(name)
+            scalars[name] = {}
             for label, value in result.items():
                 if isinstance(value, np.ndarray):
-                    group.create_dataset(label, data=value)
+                    file.create_dataset(f"{name}/{label}", data=value)
                 else:
-                    group.attrs[label] = value
+                    scalars[name][label] = value.item() if isinstance(value, np.generic) else value
+        file[SCALARS] = json.dumps(scalars)
     os.replace(unfinished, path)

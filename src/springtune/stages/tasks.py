@@ -5,19 +5,27 @@ file of a bundle changes only when its tasks do, so Snakemake reruns a job only 
 then computes only results that are not stored yet.
 """
 
+import hashlib
+from collections import defaultdict
 from dataclasses import asdict
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
+from ..loads import LOADS
+from ..mesh import MESH_TYPES
+from ..study import MeshSpec
 from . import files
-from .code import digest
+from .code import definition_digest, digest
 
 BUNDLE_SECONDS = 4.0
 """Work that a bundle holds: some ten times the start-up of a job."""
 
-SECONDS_PER_PARTICLE = 2e-4
-"""Rough cost of all scenes and curves of a mesh; it balances bundles and decides nothing else."""
+SCENE_SECONDS = {"linear": (1.5e-3, 2e-6), "nonlinear": (3e-3, 2e-5), "curve": (5e-3, 4e-5), "moduli": (4e-3, 1e-5)}
+"""Rough cost of a scene, curve or moduli, in any case and per particle; it balances bundles and nothing else."""
+
+SEARCH_SECONDS = {"adjoint": (0.5, 2e-3), "annealed": (0.1, 2e-3), "evolved": (0.1, 2e-3)}
+"""Rough cost of definitions that search, which they take besides."""
 
 
 def write_tasks(study, folder, cores):
@@ -33,14 +41,19 @@ def write_tasks(study, folder, cores):
 
     Returns
     -------
-    list of str
-        Labels of the bundles.
+    dict of str to list of str
+        Labels of the bundles by stage: ``solve`` (also of `mesh`), ``sensitivity`` and ``moduli``.
     """
     bundles = _bundles(study, cores)
     tasks = {"reference": _reference(study, folder), "calibrate": _calibrate(study, folder)}
-    for label, meshes in bundles.items():
-        for stage, made in (("mesh", _mesh), ("sensitivity", _sensitivity), ("solve", _solve)):
-            tasks[f"{stage}_{label}"] = made(study, folder, meshes)
+    scenes, curves = _by_mesh(study.scenes), _by_mesh(study.curves)
+    for label, meshes in bundles["solve"].items():
+        tasks[f"mesh_{label}"] = _mesh(folder, meshes)
+        tasks[f"solve_{label}"] = _solve(study, folder, meshes, scenes)
+    for label in bundles["sensitivity"]:
+        tasks[f"sensitivity_{label}"] = _sensitivity(study, folder, bundles["solve"][label], curves)
+    for label, patches in bundles["moduli"].items():
+        tasks[f"moduli_{label}"] = {"folder": str(folder / "moduli"), "patches": patches}
     for name, content in tasks.items():
         path = folder / "tasks" / f"{name}.json"
         if not path.exists() or files.read_json(path) != content:
@@ -49,22 +62,51 @@ def write_tasks(study, folder, cores):
         # Snakemake guards what is declared; results are not, so a missing one makes the job run again.
         if done.exists() and not all(Path(file).exists() for file in _products(name, content)):
             done.unlink()
-    return list(bundles)
+    return {stage: list(content) for stage, content in bundles.items()}
 
 
 def _bundles(study, cores):
-    """Meshes of each bundle: the costliest first, each to the bundle with least to do."""
-    costs = {}
-    for mesh in study.meshes:
-        particles = mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
-        costs[mesh] = 0.05 + SECONDS_PER_PARTICLE * particles
-    count = max(cores, round(sum(costs.values()) / BUNDLE_SECONDS))
-    count = min(count, len(costs))
+    """Meshes of each bundle by its label for the stages `solve` and `sensitivity`, and patches for `moduli`."""
+    costs = {mesh: 0.0 for mesh in study.meshes}
+    for scene in study.scenes:
+        costs[scene.mesh] += _cost(scene.kinematics, scene.mesh, scene.definition)
+    curved = {curve.mesh for curve in study.curves}
+    for curve in study.curves:
+        costs[curve.mesh] += _cost("curve", curve.mesh)
+    meshes = _shared_out(costs, lambda mesh: mesh.name, cores)
+    patches = _patches(study)
+    costs = {
+        name: sum(_cost("moduli", patch_mesh(study, one), one.definition) for one in patch["members"])
+        for name, patch in patches.items()
+    }
+    for patch in patches.values():
+        del patch["members"]
+    return {
+        "solve": meshes,
+        "sensitivity": [label for label, bundle in meshes.items() if curved & set(bundle)],
+        "moduli": {
+            label: [patches[name] for name in bundle] for label, bundle in _shared_out(costs, str, cores).items()
+        },
+    }
+
+
+def _cost(kind, mesh, definition=None):
+    """Seconds that a scene, a curve or moduli take, roughly."""
+    particles = mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
+    parts = (SCENE_SECONDS[kind], SEARCH_SECONDS.get(definition, (0.0, 0.0)))
+    return sum(always + each * particles for always, each in parts)
+
+
+def _shared_out(costs, name, cores):
+    """Bundles of about equal cost: the costliest first, each to the bundle with least to do."""
+    if not costs:
+        return {}
+    count = min(max(cores, round(sum(costs.values()) / BUNDLE_SECONDS)), len(costs))
     bundles, loads = [[] for _ in range(count)], [0.0] * count
-    for mesh in sorted(costs, key=lambda mesh: (-costs[mesh], mesh.name)):
+    for item in sorted(costs, key=lambda item: (-costs[item], name(item))):
         least = loads.index(min(loads))
-        bundles[least].append(mesh)
-        loads[least] += costs[mesh]
+        bundles[least].append(item)
+        loads[least] += costs[item]
     return {str(number): bundle for number, bundle in enumerate(bundles)}
 
 
@@ -73,29 +115,71 @@ def _stage_key(stage, *packages):
     return [digest(stage), *(f"{package} {version(package)}" for package in packages)]
 
 
+@cache
 def mesh_key(mesh):
-    """Key of a mesh: its parameters, the code that makes it and the library behind it."""
-    packages = ["netgen-mesher"] if mesh.mesh_type == "free" else []
-    parameters = [mesh.beam.length, mesh.beam.height, mesh.mesh_type, mesh.mesh_size]
-    return files.key(parameters, _stage_key("mesh", "numpy", *packages))
+    """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
+    packages = {"free": ["netgen-mesher"]}.get(mesh.mesh_type, []) if mesh.file is None else ["meshio"]
+    return files.key(_mesh_source(mesh), _stage_key("mesh", "numpy", *packages))
 
 
-def reference_key(beam, material):
-    """Key of a reference: one a beam and material, all loads scale it."""
-    return files.key(_beam(beam), _material(material), _stage_key("reference", "numpy", "scipy", "scikit-fem"))
+def _mesh_source(mesh):
+    """What a mesh is made from."""
+    source = {"length": mesh.beam.length, "height": mesh.beam.height}
+    if mesh.file is None:
+        return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+    content = hashlib.sha256(mesh.file.read_bytes()).hexdigest()
+    return source | {"file": str(mesh.file), "unit": mesh.unit, "content": content}
+
+
+@cache
+def reference_key(beam, material, load):
+    """Key of a reference: one a beam, material and kind of load, which loads of that kind scale."""
+    code = _stage_key("reference", "numpy", "scipy", "scikit-fem")
+    return files.key(_beam(beam), _material(material), LOADS[load].kind, code)
 
 
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
-    parameters = [mesh_key(curve.mesh), curve.force, curve.kinematics, stiffnesses(study, curve)]
+    parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
+    parameters.append(stiffnesses(study, curve))
     return files.key(parameters, _stage_key("sensitivity", "numpy", "scipy"))
 
 
 def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, _material(scene.material)]
-    parameters += [scene.force, scene.definition, scene.kinematics, _given_stiffness(study, scene)]
-    return files.key(parameters, _stage_key("solve", "numpy", "scipy"))
+    reference = reference_key(scene.mesh.beam, scene.material, scene.load)
+    parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, _material(scene.material), reference]
+    parameters += [LOADS[scene.load].kind, scene.force, scene.definition, scene.kinematics]
+    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
+    return files.key(parameters, _stage_key("solve", "numpy", "scipy"), definition_digest(scene.definition))
+
+
+def moduli_key(study, one):
+    """Key of the effective moduli of a definition on a patch."""
+    mesh = patch_mesh(study, one)
+    parameters = [_mesh_source(mesh), one.mesh_type, one.mesh_size, one.definition, one.poisson_ratio]
+    code = _stage_key("moduli", "numpy", "scipy", "netgen-mesher"), definition_digest(one.definition)
+    return files.key(parameters, *code)
+
+
+def patch_mesh(study, one):
+    """Mesh of a patch test: on the study's box, or the first mesh from a file."""
+    if one.mesh_type in MESH_TYPES:
+        return MeshSpec(study.patch, one.mesh_type, one.mesh_size)
+    return next(mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size))
+
+
+@lru_cache(maxsize=1)
+def _shown_meshes(meshes):
+    coarsest = {}
+    for mesh in sorted(meshes, key=lambda mesh: -mesh.mesh_size):
+        coarsest.setdefault((mesh.beam, mesh.mesh_type), mesh)
+    return frozenset(coarsest.values())
+
+
+def shown_meshes(study):
+    """Meshes whose whole fields are kept, the coarsest of each beam and mesh type; none where none are drawn."""
+    return _shown_meshes(study.meshes) if "deformed" in study.outputs else frozenset()
 
 
 def solved_key(study, scene, calibration):
@@ -113,8 +197,16 @@ def stiffnesses(study, curve):
 
 
 def reference_name(beam, material):
-    """File stem of a reference."""
+    """File stem of the references of a beam and material."""
     return f"{beam.name}_{material.name}"
+
+
+def _thickness_ratio(study, scene):
+    """Thickness over that of the beam that calibrates: stiffness is in proportion to it."""
+    if scene.definition != "calibrated":
+        return 1.0
+    calibrating = next(curve.mesh.beam for curve in study.curves if curve.mesh.beam.name == study.calibration[0])
+    return scene.mesh.beam.thickness / calibrating.thickness
 
 
 def calibration_name(scene):
@@ -134,90 +226,111 @@ def _material(material):
     return asdict(material) | {"name": ""}
 
 
-def _mesh(study, folder, meshes):
+def _by_mesh(items):
+    groups = defaultdict(list)
+    for item in items:
+        groups[item.mesh].append(item)
+    return groups
+
+
+def _mesh(folder, meshes):
     return {
         "folder": str(folder / "meshes"),
-        "meshes": [
-            {
-                "name": mesh.name,
-                "key": mesh_key(mesh),
-                "mesh_type": mesh.mesh_type,
-                "mesh_size": mesh.mesh_size,
-                "length": mesh.beam.length,
-                "height": mesh.beam.height,
-            }
-            for mesh in meshes
-        ],
+        "meshes": [{"name": mesh.name, "key": mesh_key(mesh)} | _mesh_source(mesh) for mesh in meshes],
     }
 
 
 def _reference(study, folder):
-    pairs = dict.fromkeys((reference.beam, reference.material) for reference in study.references)
+    loads = {}
+    for reference in study.references:
+        loads.setdefault(reference_key(reference.beam, reference.material, reference.load), reference)
     return {
         "folder": str(folder / "references"),
         "references": [
             {
-                "name": reference_name(beam, material),
-                "key": reference_key(beam, material),
-                "beam": _beam(beam),
-                "material": _material(material),
+                "name": reference_name(reference.beam, reference.material),
+                "key": key,
+                "beam": _beam(reference.beam),
+                "material": _material(reference.material),
+                "kind": LOADS[reference.load].kind,
             }
-            for beam, material in pairs
+            for key, reference in loads.items()
         ],
     }
+
+
+def patch_name(one):
+    """File stem of the moduli of a patch."""
+    return f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
+
+
+def _patches(study):
+    """What is asked of each patch, by its name."""
+    patches = {}
+    for one in study.moduli:
+        labels = {"name": patch_name(one), "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
+        source = {"mesh": _mesh_source(patch_mesh(study, one))}
+        patch = patches.setdefault(patch_name(one), labels | source | {"asked": [], "members": []})
+        asked = {"key": moduli_key(study, one), "definition": one.definition, "poisson_ratio": one.poisson_ratio}
+        patch["asked"].append(asked)
+        patch["members"].append(one)
+    return patches
 
 
 def _curve(study, curve):
     return {
         "key": curve_key(study, curve),
+        "kind": LOADS[curve.load].kind,
         "force": curve.force,
         "kinematics": curve.kinematics,
         "stiffnesses": stiffnesses(study, curve),
     }
 
 
-def _sensitivity(study, folder, meshes):
+def _sensitivity(study, folder, meshes, curves):
+    families = [
+        {"name": mesh.name, "curves": [_curve(study, curve) for curve in curves[mesh]]}
+        for mesh in meshes
+        if curves[mesh]
+    ]
+    return {"folder": str(folder / "curves"), "meshes": str(folder / "meshes"), "families": families}
+
+
+def _solve(study, folder, meshes, scenes):
     families = [
         {
             "name": mesh.name,
-            "length": mesh.beam.length,
-            "curves": [_curve(study, curve) for curve in study.curves if curve.mesh == mesh],
+            "thickness": mesh.beam.thickness,
+            "keep_fields": mesh in shown_meshes(study),
+            "scenes": [_scene(study, scene) for scene in scenes[mesh]],
         }
         for mesh in meshes
     ]
     return {
-        "folder": str(folder / "curves"),
+        "folder": str(folder / "solutions"),
         "meshes": str(folder / "meshes"),
-        "families": [family for family in families if family["curves"]],
+        "references": str(folder / "references"),
+        "families": families,
     }
-
-
-def _solve(study, folder, meshes):
-    families = [
-        {
-            "name": mesh.name,
-            "length": mesh.beam.length,
-            "thickness": mesh.beam.thickness,
-            "scenes": [_scene(study, scene) for scene in study.scenes if scene.mesh == mesh],
-        }
-        for mesh in meshes
-    ]
-    return {"folder": str(folder / "solutions"), "meshes": str(folder / "meshes"), "families": families}
 
 
 def _scene(study, scene):
     task = {
         "key": scene_key(study, scene),
         "material": _material(scene.material),
+        "kind": LOADS[scene.load].kind,
         "force": scene.force,
         "definition": scene.definition,
         "kinematics": scene.kinematics,
+        "reference": reference_name(scene.mesh.beam, scene.material),
+        "reference_key": reference_key(scene.mesh.beam, scene.material, scene.load),
     }
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
     if scene.definition == "calibrated":
         task["calibration"] = calibration_name(scene)
+        task["thickness_ratio"] = _thickness_ratio(study, scene)
     return task
 
 
@@ -233,7 +346,7 @@ def _calibrate(study, folder):
             {
                 "mesh": curve.mesh.name,
                 "reference": reference_name(curve.mesh.beam, material),
-                "reference_key": reference_key(curve.mesh.beam, material),
+                "reference_key": reference_key(curve.mesh.beam, material, curve.load),
                 **_curve(study, curve),
             }
             for curve in study.curves
@@ -251,6 +364,8 @@ def _products(name, content):
         return [folder / f"{mesh['name']}{ending}" for mesh in content["meshes"] for ending in (".vtu", ".json")]
     if stage == "reference":
         return [folder / f"{reference['name']}.h5" for reference in content["references"]]
+    if stage == "moduli":
+        return [folder / f"{patch['name']}.h5" for patch in content["patches"]]
     if stage in ("sensitivity", "solve"):
         return [folder / f"{family['name']}.h5" for family in content["families"]]
     return []

@@ -1,6 +1,9 @@
-"""Which tables a study has: one a load, mesh type and material, as in the paper."""
+"""Which tables a study has: one a load, mesh type and material, as in the paper; and those that compare definitions."""
 
 TABLE = ("load", "mesh_type", "material")
+
+DEFINITIONS = ("definitions.csv", "moduli.csv", "which_definition.md")
+"""Tables that compare definitions: of scenes, of moduli, and what to use."""
 
 
 def stem(selection, number=None):
@@ -9,7 +12,7 @@ def stem(selection, number=None):
 
 
 def of_study(study):
-    """Stems of the tables of a study.
+    """Files of the tables of a study, by kind: ``tables`` and ``definitions``, empty where it does not ask for them.
 
     Parameters
     ----------
@@ -17,8 +20,10 @@ def of_study(study):
 
     Returns
     -------
-    list of str
+    dict of str to list of str
     """
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
-    return [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
+    stems = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
+    files = {"tables": [*(f"{name}.csv" for name in stems), "index.html"], "definitions": list(DEFINITIONS)}
+    return {kind: names if kind in study.outputs else [] for kind, names in files.items()}

@@ -1,0 +1,160 @@
+"""Tables that compare definitions: all scenes, all moduli, and which definition to use."""
+
+import csv
+import io
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..dataset import PATCH, SCENE, STATUS, most_asked
+from .names import DEFINITIONS
+
+SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
+MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulus_error", "spring_ratio")
+
+
+def write(tree, folder):
+    """Write two CSV files and a page in Markdown.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        With the group ``/moduli``.
+    folder : str or Path
+
+    Returns
+    -------
+    list of str
+        Names of the files written.
+    """
+    root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
+    texts = (_csv(root, SCENE, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name, text in zip(DEFINITIONS, texts):
+        unfinished = Path(folder) / f"{name}.unfinished"
+        unfinished.write_text(text, encoding="utf-8")
+        os.replace(unfinished, Path(folder) / name)
+    return list(DEFINITIONS)
+
+
+def _csv(data, dimensions, values):
+    """One row for each cell that was asked for."""
+    status = data.status.transpose(*dimensions).values
+    labels = [data[name].values.tolist() for name in dimensions]
+    columns = [data[name].transpose(*dimensions).values for name in (*values, "message")]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*dimensions, "status", *values, "message"])
+    for place in map(tuple, np.argwhere(status != 0)):
+        row = [label[i] for label, i in zip(labels, place)]
+        found = [column[place] for column in columns]
+        numbers = ["" if np.isnan(value) else f"{value:.6g}" for value in found[:-1]]
+        writer.writerow([*row, STATUS[status[place]], *numbers, found[-1]])
+    return text.getvalue()
+
+
+# -- which definition to use -------------------------------------------------------------------------------------------
+
+MESH_TYPES = ("structured", "free", "braced", "alternating", "right")
+LOADS = ("traction", "bending", "shear")
+
+
+def decision(tree):
+    """Markdown: what each definition attains on each mesh type, and over the paper's cells.
+
+    Every figure is a cell of the dataset, or a median or largest one of cells that the heading names.
+    """
+    root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
+    parts = []
+    for mesh_type in MESH_TYPES:
+        lines = _attained(root, moduli, mesh_type) if mesh_type in root.mesh_type.values else []
+        if len(lines) > 2:
+            parts += [f"### Mesh type `{mesh_type}`", "", *lines, ""]
+    cells = _paper_cells(root)
+    return "\n".join(parts + (["### The paper's cells", "", *cells, ""] if cells else []))
+
+
+def _materials(root, beam):
+    """Name by Poisson's ratio: the material nearest to 0.3 and the one with the largest, of those with most scenes."""
+    asked = (
+        (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"]).sum("load").values
+    )
+    ratios = root.material_poisson_ratio.values
+    found = np.flatnonzero(asked == asked.max())
+    chosen = sorted(
+        {found[np.argmin(np.abs(ratios[found] - 0.3))], found[np.argmax(ratios[found])]}, key=lambda i: ratios[i]
+    )
+    return {float(ratios[i]): str(root.material.values[i]) for i in chosen}
+
+
+def _attained(root, moduli, mesh_type):
+    """Moduli on the middle patch and deformation errors on the finest mesh, of the beam that most scenes are of."""
+    beam = most_asked(root, "beam")
+    materials = _materials(root, beam)
+    loads = [load for load in LOADS if load in root["load"].values]
+    middle, fine = sorted(root.mesh_size.values)[len(root.mesh_size) // 2], min(root.mesh_size.values)
+    here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_asked(root, "kinematics"))
+    ratios = [ratio for ratio in materials if ratio in moduli.poisson_ratio.values]
+    heads = [f"E at {nu:g}" for nu in ratios] + [f"ν at {nu:g}" for nu in ratios]
+    heads += [f"{load}, {nu:g}" for load in loads for nu in materials]
+    lines = [f"| definition | {' | '.join(heads)} | cost |", "|---|" + "---:|" * (len(heads) + 1)]
+    for name in root.definition.values:
+        if name not in moduli.definition.values or mesh_type not in moduli.mesh_type.values:
+            continue
+        patch = moduli.sel(definition=name, mesh_type=mesh_type)
+        patched = patch.mesh_size.values[(patch.status == 1).any("poisson_ratio").values]
+        sizes = here.mesh_size.values[(here.status.sel(definition=name) == 1).any(["material", "load"]).values]
+        if not len(patched) or not len(sizes):
+            continue
+        patch = patch.sel(mesh_size=middle if middle in patched else max(patched))
+        cells = [_signed(patch.young_modulus_error.sel(poisson_ratio=nu)) for nu in ratios]
+        cells += [_plain(patch.effective_poisson_ratio.sel(poisson_ratio=nu), 3) for nu in ratios]
+        size = fine if fine in sizes else max(sizes)
+        scene = here.sel(definition=name, mesh_size=size)
+        cells += [
+            _signed(scene.deformation_error.sel(load=load, material=material))
+            for load in loads
+            for material in materials.values()
+        ]
+        seconds = float(scene.definition_seconds.max())
+        cells.append(f"{1e3 * seconds:.0f} ms" if seconds >= 5e-4 else "< 1 ms")
+        mark = "" if size == fine else f" ({1e3 * size:g} mm)"
+        lines.append(f"| `{name}`{mark} | {' | '.join(cells)} |")
+    return lines
+
+
+def _paper_cells(root):
+    """Median and largest error over beams, mesh sizes and the paper's three loads and materials."""
+    pairs = (("steel", "traction"), ("steel", "compression"), ("rubber", "traction"))
+    if not {"steel", "rubber"} <= set(root.material.values) or not {"traction", "compression"} <= set(
+        root["load"].values
+    ):
+        return []
+    errors = [
+        root.deformation_error.sel(material=material, load=load, kinematics=most_asked(root, "kinematics"))
+        for material, load in pairs
+    ]
+    lines = ["| definition | mesh type | steel, median | largest | rubber, median | largest |"]
+    lines.append("|---|---|---:|---:|---:|---:|")
+    for name in root.definition.values:
+        for mesh_type in root.mesh_type.values:
+            found = [error.sel(definition=name, mesh_type=mesh_type).values.ravel() for error in errors]
+            if np.isfinite(found[2]).any():
+                texts = []
+                for values in (np.concatenate(found[:2]), found[2]):
+                    values = 100 * np.abs(values[np.isfinite(values)])
+                    texts += [f"{np.median(values):.2f} %", f"{values.max():.2f} %"]
+                lines.append(f"| `{name}` | {mesh_type} | {' | '.join(texts)} |")
+    return lines
+
+
+def _signed(value):
+    value = 100 * float(value)
+    if np.isnan(value):
+        return ""
+    return f"{value:+.1f} %".replace("-", "−") if abs(value) >= 0.05 else "0.0 %"
+
+
+def _plain(value, digits):
+    return "" if np.isnan(float(value)) else f"{float(value):.{digits}f}".replace("-", "−")
