@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from . import __version__
+from .loads import LOADS
 
 SCHEMA = "study.schema.json"
 MANUAL = "README.md"
@@ -197,7 +198,7 @@ def summary(study):
     -------
     str
     """
-    pairs = {(reference.beam, reference.material) for reference in study.references}
+    pairs = {(reference.beam, reference.material, LOADS[reference.load].kind) for reference in study.references}
     networks = _networks(study)
     asked = sum(len(grid.scenes) for grid in study.grids)
     users = len(study.scenes) + len(study.curves)
@@ -207,8 +208,11 @@ def summary(study):
         ["meshes", len(study.meshes), f"each serves {users / len(study.meshes):.3g} scenes and curves on average"],
         ["references", len(study.references), f"from {_count(len(pairs), 'solution')}: small strain scales with force"],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
-        ["networks", networks, "to factorise at rest: loads, materials and uniform stiffnesses share one a mesh"],
+        ["networks", networks, "to factorise at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]
+    if study.moduli:
+        patches = {(one.mesh_type, one.mesh_size) for one in study.moduli}
+        rows.append(["moduli", len(study.moduli), f"measured on {_count(len(patches), 'patch')}"])
     if study.printed:
         rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
     lines = [f"{study.name}: {study.title}", "", _table(rows, left=0, right=(1,)), ""]
@@ -216,16 +220,18 @@ def summary(study):
 
 
 def _count(number, noun):
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}{'e' if noun.endswith('ch') else ''}s"
 
 
 def _networks(study):
-    """Number of distinct tangents at rest: uniform networks of a mesh differ by a factor only."""
+    """Number of distinct tangents at rest, at most: uniform networks of a mesh differ by a factor only."""
     from .springs import DEFINITIONS
 
-    found = {(curve.mesh, "uniform") for curve in study.curves}
+    found = {(curve.mesh, LOADS[curve.load].kind == "shear", "uniform") for curve in study.curves}
     for scene in study.scenes:
-        found.add((scene.mesh, "uniform" if DEFINITIONS[scene.definition].uniform else scene.definition))
+        uniform = DEFINITIONS[scene.definition].uniform
+        held = LOADS[scene.load].kind == "shear"
+        found.add((scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.poisson_ratio)))
     return len(found)
 
 

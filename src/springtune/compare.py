@@ -4,8 +4,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from .mesh import signed_areas
-
 
 def deformation_error(displacement, reference):
     """Signed deformation error ``(network - reference) / |reference|`` [1].
@@ -24,27 +22,6 @@ def deformation_error(displacement, reference):
     """
     displacement, reference = np.asarray(displacement), np.asarray(reference)
     return (displacement - reference) / np.abs(reference)
-
-
-def field_error(mesh, displacements, reference):
-    """Difference of whole displacement fields in L2, over the norm of the reference's [1].
-
-    Parameters
-    ----------
-    mesh : Mesh
-    displacements, reference : ndarray of float, shape (n_points, 2)
-        Displacements of the particles [m].
-
-    Returns
-    -------
-    float
-        Integrals are sums over the particles, each with its share of the area of its cells.
-    """
-    shares = np.zeros(len(mesh.points))
-    for count, corners in mesh.cells.items():
-        np.add.at(shares, corners, signed_areas(mesh.points, corners)[:, None] / count)
-    difference, size = (shares @ (field**2).sum(axis=1) for field in (displacements - reference, reference))
-    return float(np.sqrt(difference / size))
 
 
 def best_stiffness(stiffness, displacement, reference):

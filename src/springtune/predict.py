@@ -74,7 +74,8 @@ def predict(mesh, beam, material):
     springs = lattice.springs(mesh, material, beam.thickness)
     young, ratio = axial_moduli(mesh, springs)
     scalar = membrane / (young * springs.reference)
-    size = float(mesh.edge_lengths[mesh.on_outline].mean())
+    faces = np.concatenate([mesh.outline_edges(1, value) for value in (0.0, beam.height)])
+    size = float(np.abs(np.diff(mesh.points[faces, 0])).mean())
     locking = -BENDING_LOCKING * (size / beam.height) ** 2
     shear = (1 + ratio) / (1 + nu) - 1
     sides = mesh.cells_per_edge == 2

@@ -37,19 +37,19 @@ class TestScenes:
         assert "meshes 18 each serves 20 scenes and curves on average" in lines
         assert "references 9 from 6 solutions: small strain scales with force" in lines
         assert any(line.startswith("curves 90 of 61 stiffnesses") for line in lines)
-        assert any(line.startswith("networks 36 ") for line in lines)
+        assert any(line.startswith("networks 45 ") for line in lines)
         assert "printed 45 cells to compare with, 45 of them in this study" in lines
         assert [line for line in lines if line.startswith("table ")] == [f"table {n} 54 54 9 3 18" for n in range(1, 6)]
 
     def test_says_what_grids_share(self, tmp_path):
         text = (CONFIG / "quick.yaml").read_text().replace("printed: paper_tables.csv\n", "")
         grids = text.partition("grids:\n")[2]
-        for name in ("steel", "compression", "rubber"):
+        for name in ("steel", "compression", "transverse", "shear", "rubber"):
             grids = grids.replace(f"  {name}:\n", f"  {name} again:\n")
         path = tmp_path / "twice.yaml"
         path.write_text(f"{text}\n{grids}")
         lines = words(run("scenes", path).stdout)
-        assert "scenes 32 64 asked, 32 of them more than once" in lines
+        assert "scenes 41 82 asked, 41 of them more than once" in lines
         assert "steel 24 24 4 1 8" in lines
         assert "steel again 24 0 4 1 8" in lines
 
@@ -130,7 +130,7 @@ class TestSchema:
             ("length:", "lenght:"),
             ("100 mm", "100"),
             ("poisson_ratio: 0.3", "poisson_ratio: 0.6"),
-            ("mesh_type: [structured, free]", "mesh_type: [structured, fre]"),
+            ("mesh_type: [structured, free]", "mesh_type: [structured, structured]"),
             ("mesh_size: [2 mm, 5 mm]", "mesh_size: []"),
             ("sensitivity: false", "sensitivity: maybe"),
             ("  100x20: {", "  .x: {"),
@@ -155,3 +155,48 @@ class TestSchema:
         example = (CONFIG / MANUAL).read_text().partition("```yaml\n")[2].partition("```")[0]
         (tmp_path / "example.yaml").write_text(example)
         assert len(load_study(tmp_path / "example.yaml").scenes) == 4
+
+
+class TestPredict:
+    STEEL = ("--beam", "100x20", "--material", "steel")
+
+    def test_recommends_with_numbers(self):
+        result = run("predict", *self.STEEL, "--size", "5 mm")
+        assert result.exit_code == 0
+        rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
+        assert list(rows) == ["definition", "delingette", "area", "patch", "uniform"]
+        assert "recommended: delingette; with springs alone: patch" in result.stdout
+        # sqrt(3)/2 E t / (1 + sqrt(3)/2 a/H), a / H = 1/4
+        assert "1.4949e+08 N/m" in rows["uniform"]
+        assert "+0.0 %" in rows["patch"]
+
+    def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
+        from springtune.mesh import MESH_TYPES, write_mesh
+
+        write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
+        mesh = ("--mesh", tmp_path / "own.vtu")
+        result = run("predict", "--beam", "100x20", "--young", "3 GPa", "--poisson", "0.45", *mesh)
+        assert result.exit_code == 0
+        assert "recommended: area" in result.stdout and "own.vtu" in result.stdout
+        assert "K_A = 658.3 MPa" in result.stdout  # E (3 nu - 1) / (2 (1 - nu^2))
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            (("--beam", "100", "--material", "steel", "--size", "5 mm"), "--beam: '100' is not length x height; give"),
+            ((*STEEL,), "--size: missing; give the length of an edge"),
+            ((*STEEL, "--size", "5"), "--size: '5' has no unit; give a length"),
+            ((*STEEL, "--size", "30 mm"), "--size: '30 mm' is larger than beam '100x20'; give at most"),
+            ((*STEEL, "--size", "0 mm"), "--size: '0 mm' is not above zero"),
+            ((*STEEL, "--size", "5 mm", "--mesh", "fre"), "--mesh: 'fre' is neither a mesh type nor a file; known:"),
+            (("--beam", "100x20", "--size", "5 mm"), "--material: none; give one of steel, rubber"),
+            (("--beam", "100x20", "--size", "5 mm", "--material", "stel"), "--material: unknown material 'stel'"),
+            ((*STEEL, "--size", "5 mm", "--poisson", "0.7"), "--poisson: '0.7' is out of range"),
+            ((*STEEL, "--size", "5 mm", "--young", "3 N"), "--young: '3 N' is a force; give a stress"),
+        ],
+    )
+    def test_refusals_are_one_line(self, arguments, message):
+        result = run("predict", *arguments)
+        assert result.exit_code == 1
+        assert message in result.stderr
+        assert len(result.stderr.splitlines()) == 1

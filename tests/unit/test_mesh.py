@@ -13,10 +13,16 @@ from scipy.spatial import Delaunay
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
+    MeshError,
+    alternating,
+    braced,
     free,
+    isosceles,
     lattice,
     quality,
+    read_beam_mesh,
     read_mesh,
+    right,
     signed_areas,
     structured,
     write_mesh,
@@ -34,13 +40,15 @@ boxes = {
 @given(**boxes)
 def test_any_box_is_covered_once(mesh_type, length, height, size):
     mesh = MESH_TYPES[mesh_type](length, height, size)
-    areas = signed_areas(mesh.points, mesh.triangles)
-    assert (areas > 0).all()
-    assert areas.sum() == pytest.approx(length * height, rel=1e-12)
-    # Euler's formula of a disc, and each edge at one or two triangles.
-    assert len(mesh.points) - len(mesh.edges) + len(mesh.triangles) == 1
+    for corners in mesh.cells.values():
+        assert (signed_areas(mesh.points, corners) > 0).all()
+    assert mesh.area == pytest.approx(length * height, rel=1e-12)
+    assert not mesh.inverted(mesh.points)
+    # Euler's formula of a disc, diagonals left out, and each edge at one or two cells.
+    sides = len(mesh.edges) - 2 * len(mesh.quads)
+    assert len(mesh.points) - sides + len(mesh.triangles) + len(mesh.quads) == 1
     assert set(np.unique(mesh.cells_per_edge)) <= {1, 2}
-    outline = sum(mesh.edge_lengths[mesh.cells_per_edge == 1])
+    outline = sum(mesh.edge_lengths[mesh.on_outline])
     assert outline == pytest.approx(2 * (length + height), rel=1e-12)
     for axis, end in ((0, length), (1, height)):
         for value in (0.0, end):
@@ -106,13 +114,104 @@ def test_file_keeps_every_digit(tmp_path, mesh_type):
     mesh = MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)
     write_mesh(tmp_path / "mesh.vtu", mesh)
     again = read_mesh(tmp_path / "mesh.vtu")
-    assert (again.points == mesh.points).all() and (again.triangles == mesh.triangles).all()
-    assert [block.type for block in meshio.read(tmp_path / "mesh.vtu").cells] == ["triangle"]
+    assert (again.points == mesh.points).all()
+    assert (again.triangles == mesh.triangles).all() and (again.quads == mesh.quads).all()
+    kinds = {"braced": ["quad"]}.get(mesh_type, ["triangle"])
+    assert [block.type for block in meshio.read(tmp_path / "mesh.vtu").cells] == kinds
     assert [path.name for path in tmp_path.iterdir()] == ["mesh.vtu"]
 
 
-def test_file_without_triangles_is_refused(tmp_path):
-    path = tmp_path / "quads.vtu"
-    meshio.Mesh(np.eye(4, 3), [("quad", np.array([[0, 1, 2, 3]]))]).write(path)
-    with pytest.raises(ValueError, match="quads.vtu.*triangle"):
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+HALVES = [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]
+
+
+@pytest.mark.parametrize(
+    ("points", "cells", "message"),
+    [
+        (SQUARE, [("line", np.array([[0, 1]]))], "no cell block 'triangle' or 'quad'; write"),
+        (SQUARE, [("tetra", np.array([[0, 1, 2, 3]]))], "has cells 'tetra'; write linear triangles"),
+        (SQUARE + [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0.1]], HALVES, "leave the plane"),
+        (SQUARE * [1, 0, 1], HALVES, "no area"),
+    ],
+)
+def test_files_that_are_no_plane_mesh_are_refused(tmp_path, points, cells, message):
+    path = tmp_path / "mesh.vtu"
+    meshio.Mesh(points, cells).write(path)
+    with pytest.raises(MeshError, match=f"mesh.vtu: .*{message}"):
         read_mesh(path)
+
+
+def test_unreadable_file_is_refused(tmp_path):
+    for name, content in (("mesh.txt", "nothing"), ("mesh.vtu", "nothing"), ("mesh.msh", "$MeshFormat")):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(MeshError, match=f"{name}: meshio cannot read it.*; convert it"):
+            read_mesh(tmp_path / name)
+
+
+@pytest.mark.parametrize(("ending", "name"), [("vtu", "vtu"), ("msh", "gmsh"), ("inp", "abaqus"), ("vtk", "vtk")])
+@pytest.mark.parametrize("mesh_type", ["free", "braced"])
+def test_a_beam_may_come_from_any_format(tmp_path, ending, name, mesh_type):
+    mesh = MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)
+    # Elsewhere, in mm, with a particle of no cell and with lines on the outline; the first cell clockwise.
+    points = np.column_stack([1e3 * mesh.points + [7.0, -3.0], np.zeros(len(mesh.points))])
+    points = np.vstack([points, [[50.0, 10.0, 0.0]]])
+    kind, cells = ("quad", mesh.quads.copy()) if len(mesh.quads) else ("triangle", mesh.triangles.copy())
+    cells[0] = cells[0][::-1]
+    path = tmp_path / f"beam.{ending}"
+    meshio.Mesh(points, [("line", mesh.outline_edges(1, 0.0)), (kind, cells)]).write(path, file_format=name)
+    found = read_beam_mesh(path, 0.1, 0.02, unit=1e-3)
+    # Formats in text keep some twelve digits.
+    assert np.allclose(found.points, mesh.points, rtol=0, atol=1e-10)
+    assert len(found.edges) == len(mesh.edges)
+    assert (signed_areas(found.points, next(iter(found.cells.values()))) > 0).all()
+    for axis, end in ((0, 0.1), (1, 0.02)):
+        for value in (0.0, end):
+            assert len(found.outline_edges(axis, value)) == len(mesh.outline_edges(axis, value))
+
+
+def test_a_mesh_that_does_not_fill_its_beam_is_refused(tmp_path):
+    mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
+    path = tmp_path / "beam.vtu"
+    write_mesh(path, mesh)
+    with pytest.raises(MeshError, match="extends over 100 x 20 mm, its beam over 200 x 40 mm; correct the unit"):
+        read_beam_mesh(path, 0.2, 0.04)
+    corner = (mesh.triangles == np.argmin(mesh.points.sum(axis=1) - 0.05)).any(axis=1)
+    inner = mesh.triangles[~(mesh.points[mesh.triangles, 1] < 1e-9).any(axis=1) | corner]
+    missing = np.delete(mesh.triangles, np.flatnonzero((mesh.points[mesh.triangles, 1] > 1e-9).all(axis=1))[0], axis=0)
+    assert len(inner) < len(mesh.triangles)
+    write_mesh(path, Mesh(mesh.points, missing))
+    with pytest.raises(MeshError, match="cover .* % of the box or overlap"):
+        read_beam_mesh(path, 0.1, 0.02)
+    write_mesh(path, Mesh(mesh.points, np.vstack([mesh.triangles, mesh.triangles[:1]])))
+    with pytest.raises(MeshError, match="overlap"):
+        read_beam_mesh(path, 0.1, 0.02)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+def test_isosceles_rows_have_the_shape_for_their_poisson_ratio(nu):
+    mesh = isosceles(0.2, 0.04, 2e-3, nu)
+    x, y = np.abs(mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]).T
+    slanted = (x > 1e-9) & (y > 1e-9)
+    # Rows and cells are whole numbers: 22 and 28 rows, 100 cells.
+    assert (x[slanted] / y[slanted]) ** 2 == pytest.approx(nu, rel=0.02)
+
+
+def test_springs_of_squares():
+    mesh = right(0.03, 0.02, 0.01)
+    assert (len(mesh.points), len(mesh.triangles), len(mesh.edges)) == (12, 12, 23)
+    falling = mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]
+    assert not ((falling > 1e-9).any(axis=1) & (falling < -1e-9).any(axis=1)).any()  # all diagonals rise
+    mixed = alternating(0.03, 0.02, 0.01)
+    degree = np.bincount(mixed.edges.ravel())
+    assert sorted(set(degree)) == [2, 3, 5, 8] or set(degree) <= {2, 3, 4, 5, 8}
+    both = braced(0.03, 0.02, 0.01)
+    assert (len(both.quads), len(both.edges), both.on_outline.sum()) == (6, 17 + 12, 10)
+
+
+def test_quads_turn_inside_out_corner_by_corner():
+    mesh = braced(0.01, 0.01, 0.01)
+    assert not mesh.inverted(mesh.points)
+    pushed = mesh.points.copy()
+    pushed[mesh.quads[0, 0]] = [0.008, 0.008]  # past the diagonal: the area stays positive
+    assert signed_areas(pushed, mesh.quads)[0] > 0
+    assert mesh.inverted(pushed)

@@ -54,6 +54,17 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     assert "statics.py" not in names["mesh"]
 
 
+def test_definitions_belong_to_the_stages_that_choose_them_and_to_their_own_keys():
+    solve, sensitivity = set(code.modules("solve")), set(code.modules("sensitivity"))
+    for name in ("angular", "delingette", "patch"):
+        path = str(code.PACKAGE / f"springs/{name}.py")
+        assert path in solve and path not in sensitivity
+    # An edit of one definition is to solve that definition's scenes again and no others.
+    digests = {name: code.definition_digest(name) for name in ("angular", "delingette", "patch", "lattice")}
+    assert len(set(digests.values())) == len(digests)
+    assert not any(path.endswith("springs/angular.py") for path in code._closure("stages/solve.py"))
+
+
 @pytest.mark.parametrize("stage", ["mesh", "sensitivity", "solve", "reference"])
 def test_physics_imports_no_workflow_dataset_or_plots(stage):
     """A job of these pays for numpy, scipy.sparse, h5py and its own libraries only."""

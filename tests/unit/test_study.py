@@ -12,8 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from springtune.geometry import Beam
+from springtune.loads import LOADS
 from springtune.materials import Material
-from springtune.study import Curve, MeshSpec, Reference, Scene, StudyError, load_study
+from springtune.study import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, StudyError, load_study
 
 CONFIG = Path(__file__).parents[2] / "config"
 LATTICE = math.sqrt(3) / 2
@@ -131,6 +132,7 @@ class TestExpansion:
             "load": ("traction", "compression"),
             "definition": ("paper", "calibrated", "lattice"),
             "kinematics": ("nonlinear", "linear"),
+            "poisson_ratio": (),
         }
 
     def test_names(self, load):
@@ -324,7 +326,125 @@ def test_quick_is_small_but_has_everything():
     assert {mesh.beam.name for mesh in study.meshes} == {"100x20"}
     whole = load_study(CONFIG / "paper.yaml").axes
     for dimension in ("mesh_type", "material", "load", "definition", "kinematics"):
-        assert study.axes[dimension] == whole[dimension]
+        assert set(study.axes[dimension]) >= set(whole[dimension])
+    assert study.axes["load"] == tuple(LOADS)
+    assert set(study.outputs) == set(OUTPUTS)
+
+
+class TestMeshFiles:
+    TEXT = SMALL.replace(
+        "grids:\n", "mesh_files:\n  own: [{file: own.msh, unit: 1 mm, beam: short, mesh_size: 3 mm}]\ngrids:\n", 1
+    )
+    GRID = """\
+  own:
+    beam: short
+    mesh_type: own
+    mesh_size: 3 mm
+    material: steel
+    load: bending
+    force: 10 N
+    definition: lattice
+    sensitivity: false
+"""
+
+    def test_is_a_mesh_type_of_its_own(self, load, tmp_path):
+        (tmp_path / "own.msh").write_text("any")
+        study = load(self.TEXT + self.GRID)
+        short = Beam("short", 0.1, 0.02, 0.002)
+        mesh = MeshSpec(short, "own", 0.003, tmp_path / "own.msh", 1e-3)
+        assert study.meshes[-1] == mesh and mesh.name == "short_own_3mm"
+        assert study.axes["mesh_type"] == ("structured", "free", "own")
+        assert study.mesh_files == {("own", "short", 0.003): mesh}
+
+    @pytest.mark.parametrize(
+        ("change", "expected"),
+        [
+            ((), "mesh_files.own[0].file: '"),
+            (
+                ("mesh_size: 3 mm\n", "mesh_size: 4 mm\n"),
+                "no file for 4 mm; add {file: <path>, beam: short, mesh_size: 4 mm}",
+            ),
+            (("own: [{", "free: [{"), "mesh_files.free: 'free' is a mesh type that is made; rename yours"),
+            (("beam: short, mesh_size: 3 mm}", "beam: shirt, mesh_size: 3 mm}"), "unknown beam 'shirt'; did you mean"),
+            (("3 mm}]", "3 mm}, {file: own.msh, beam: short, mesh_size: 3 mm}]"), "a second file for beam 'short'"),
+            (("unit: 1 mm", "unit: 1 kg"), "mesh_files.own[0].unit: '1 kg'"),
+        ],
+    )
+    def test_refusals(self, refusal, tmp_path, change, expected):
+        if change:
+            (tmp_path / "own.msh").write_text("any")
+        text = self.TEXT + self.GRID
+        assert expected in refusal(text.replace(*change, 1) if change else text)
+
+
+class TestDefinitions:
+    GRID = """\
+  moduli:
+    beam: short
+    mesh_type: [structured, right]
+    mesh_size: [2 mm, 5 mm]
+    material: [steel, rubber]
+    load: shear
+    force: 1 N
+    definition: [area, patch]
+    kinematics: linear
+    sensitivity: false
+    moduli: true
+"""
+
+    def test_moduli_of_every_pair(self, load):
+        study = load(SMALL.replace("grids:", "outputs: [definitions]\ngrids:") + self.GRID)
+        assert len(study.moduli) == 2 * 2 * 2 * 2
+        assert study.moduli[0] == Moduli("area", "structured", 0.002, 0.3)
+        assert study.axes["poisson_ratio"] == (0.3, 0.5)
+        assert (study.patch.length, study.patch.height) == (0.1, 0.02)
+        assert study.outputs == ("definitions",)
+
+    def test_stated_stiffness_has_no_moduli(self, load):
+        study = load(changed(("    kinematics: [nonlinear, linear]\n", "    moduli: true\n")))
+        assert {one.definition for one in study.moduli} == {"lattice"}
+
+    def test_no_moduli_without_asking(self, load):
+        study = load(SMALL)
+        assert (study.moduli, study.patch, study.outputs) == ((), None, ("sensitivity", "size", "deformed", "tables"))
+
+    @pytest.mark.parametrize(
+        ("change", "expected"),
+        [
+            (
+                ("[area, patch]", "baudet"),
+                "'baudet' needs rectangles and mesh type 'structured' has triangles; give them",
+            ),
+            (("[structured, right]", "braced"), None),
+            (("[area, patch]", "[area, pach]"), "unknown definition 'pach'; did you mean 'patch'?"),
+            (
+                ("outputs: [definitions]", "outputs: [definition]"),
+                "unknown output 'definition'; did you mean 'definitions'?",
+            ),
+            (
+                ("    moduli: true\n", ""),
+                "outputs: 'definitions' compares moduli and no grid has them; add 'moduli: true'",
+            ),
+        ],
+    )
+    def test_refusals(self, load, refusal, change, expected):
+        text = SMALL.replace("grids:", "outputs: [definitions]\ngrids:") + self.GRID
+        changed_text = text[: len(SMALL) // 2] + text[len(SMALL) // 2 :].replace(*change, 1)
+        if change[0].startswith("outputs"):
+            changed_text = text.replace(*change, 1)
+        if expected is None:
+            load(changed_text)
+        else:
+            assert expected in refusal(changed_text)
+
+    def test_triangles_and_uniaxial_scenes(self, refusal):
+        braced = SMALL + self.GRID.replace("[structured, right]", "braced").replace("[area, patch]", "angular")
+        assert "'angular' needs triangles and mesh type 'braced' has quadrilaterals" in refusal(braced)
+        sheared = SMALL + self.GRID.replace("[structured, right]", "braced").replace(
+            "[area, patch]", "baudet-corrected"
+        )
+        message = "'baudet-corrected' is for traction and compression and load 'shear' is neither"
+        assert message in refusal(sheared)
 
 
 # -- bad input ---------------------------------------------------------------------------------------------------------
@@ -442,7 +562,7 @@ REFUSED = {
     ),
     "unknown mesh type": (
         ("[structured, free]", "[structured, fre]"),
-        "grids.pull.mesh_type[1]: unknown mesh type 'fre'; did",
+        "grids.pull.mesh_type: unknown mesh type 'fre'; did",
     ),
     "unknown beam": (
         ("beam: short", "beam: shirt"),

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
+from ..mesh import signed_areas
+
 
 def interpolate(x, y, displacements, points):
     """Displacements between the points of a grid, by cubic splines.
@@ -32,3 +34,24 @@ def outline(x, y, displacements):
     i = np.concatenate([np.arange(n_x), np.full(n_y - 1, n_x - 1), np.arange(n_x - 2, -1, -1), np.zeros(n_y - 2, int)])
     j = np.concatenate([np.zeros(n_x, int), np.arange(1, n_y), np.full(n_x - 1, n_y - 1), np.arange(n_y - 2, 0, -1)])
     return np.stack([x[i], y[j]], axis=1), displacements[i, j]
+
+
+def field_error(mesh, displacements, reference):
+    """Difference of whole displacement fields in L2, over the norm of the reference's [1].
+
+    Parameters
+    ----------
+    mesh : Mesh
+    displacements, reference : ndarray of float, shape (n_points, 2)
+        Displacements of the particles [m].
+
+    Returns
+    -------
+    float
+        Integrals are sums over the particles, each with its share of the area of its cells.
+    """
+    shares = np.zeros(len(mesh.points))
+    for count, corners in mesh.cells.items():
+        np.add.at(shares, corners, signed_areas(mesh.points, corners)[:, None] / count)
+    difference, size = (shares @ (field**2).sum(axis=1) for field in (displacements - reference, reference))
+    return float(np.sqrt(difference / size))

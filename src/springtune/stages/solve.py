@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from ..boundary import held, weights
-from ..compare import field_error
 from ..materials import Material
 from ..mesh import read_mesh
 from ..moduli import lateral_forces
 from ..network import Network
-from ..reference.field import interpolate
+from ..reference.field import field_error, interpolate
 from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import Case
 from ..statics import StaticProblem
