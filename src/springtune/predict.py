@@ -75,7 +75,7 @@ def predict(mesh, beam, material):
     young, ratio = axial_moduli(mesh, springs)
     scalar = membrane / (young * springs.reference)
     faces = np.concatenate([mesh.outline_edges(1, value) for value in (0.0, beam.height)])
-    size = float(np.abs(np.diff(mesh.points[faces, 0])).mean())
+    size = float(np.median(np.abs(np.diff(mesh.points[faces, 0]))))
     locking = -BENDING_LOCKING * (size / beam.height) ** 2
     shear = (1 + ratio) / (1 + nu) - 1
     sides = mesh.cells_per_edge == 2

@@ -148,7 +148,7 @@ def test_unreadable_file_is_refused(tmp_path):
             read_mesh(tmp_path / name)
 
 
-@pytest.mark.parametrize(("ending", "name"), [("vtu", "vtu"), ("msh", "gmsh"), ("inp", "abaqus"), ("vtk", "vtk")])
+@pytest.mark.parametrize(("ending", "name"), [("vtu", "vtu"), ("msh", "gmsh22"), ("inp", "abaqus"), ("vtk", "vtk")])
 @pytest.mark.parametrize("mesh_type", ["free", "braced"])
 def test_a_beam_may_come_from_any_format(tmp_path, ending, name, mesh_type):
     mesh = MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)

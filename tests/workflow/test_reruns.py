@@ -1,8 +1,11 @@
 """What runs again when a study or a file changes, and what a study that cannot be solved leaves behind."""
 
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
+
+from springtune.mesh import MESH_TYPES, Mesh
 
 STUDY = """
 title: Reruns
@@ -74,6 +77,41 @@ def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     assert (root.residual > 1e-10).all()
     assert all("last residual" in message for message in root.message.values.ravel())
     assert np.isfinite(root.reference_displacement).all()
+
+
+def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
+    mesh = MESH_TYPES["free"](0.05, 0.02, 5e-3)
+    path = run.folder / "own.inp"
+
+    def save(mesh):
+        points = np.column_stack([1e3 * mesh.points, np.zeros(len(mesh.points))])
+        meshio.Mesh(points, [("triangle", mesh.triangles)]).write(path)
+
+    text = study("5 mm").replace("mesh_type: structured\n    mesh", "mesh_type: own\n    mesh")
+    files = "mesh_files: {own: [{file: own.inp, unit: 1 mm, beam: small, mesh_size: 5 mm}]}\n"
+    text = text.replace("grids:", f"{files}outputs: [tables]\ngrids:").replace("[paper, lattice]", "delingette")
+    run.write("own.yaml", text)
+    save(mesh)
+    code, output = run.snakemake("own.yaml")
+    assert code == 0, output
+    first = dataset(run, "own").to_dataset()
+    assert first.mesh_type.values.tolist() == ["own"] and (first.status == 1).all()
+    assert abs(first.deformation_error.item()) < 0.02
+
+    moved = mesh.points.copy()
+    inside = ((moved > 1e-9) & (moved < [0.05 - 1e-9, 0.02 - 1e-9])).all(axis=1)
+    moved[inside] += 3e-4
+    save(Mesh(moved, mesh.triangles))
+    assert run.snakemake("own.yaml")[0] == 0
+    second = dataset(run, "own").to_dataset()
+    assert second.displacement.item() != first.displacement.item()
+    assert second.displacement.item() == pytest.approx(first.displacement.item(), rel=0.01)
+
+    save(Mesh(2 * mesh.points, mesh.triangles))
+    code, output = run.snakemake("own.yaml")
+    assert code == 1
+    assert "extends over 100 x 40 mm, its beam over 50 x 20 mm; correct the unit or the beam" in output
+    assert "Traceback" not in output
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import sys
 import time
 from pathlib import Path
 
-from ..mesh import MESH_TYPES, quality, read_beam_mesh, write_mesh
+from ..mesh import MESH_TYPES, MeshError, quality, read_beam_mesh, write_mesh
 from . import files
 
 
@@ -27,7 +27,10 @@ def run(tasks, done):
         if path.exists() and notes.exists() and files.read_json(notes)["key"] == task["key"]:
             continue
         begin = time.perf_counter()
-        mesh = make(task)
+        try:
+            mesh = make(task)
+        except MeshError as error:  # the user's file: the message says it all
+            raise SystemExit(str(error)) from None
         seconds = time.perf_counter() - begin
         # The notes name the mesh they belong to, so they go first and come last.
         notes.unlink(missing_ok=True)

@@ -60,13 +60,45 @@ MESH_TYPES = ("structured", "free", "braced", "alternating", "right")
 LOADS = ("traction", "bending", "shear")
 
 
+ADVICE = (
+    # what one has, what to use, on which mesh type
+    ("Triangles, and the simulator can couple the sides of a triangle", "delingette", "free"),
+    ("Triangles, springs and an energy of their area", "patch-area", "free"),
+    ("the same, without a patch test", "area", "free"),
+    ("Triangles, springs alone", "patch", "free"),
+    ("Rows of near-equilateral triangles, springs alone, no patch test", "van-gelder", "structured"),
+    ("Squares with both diagonals and an energy of their area", "area", "braced"),
+    ("Squares with both diagonals, springs alone", "lattice", "braced"),
+    ("One stiffness for all springs, whatever it costs", "uniform", "structured"),
+)
+
+
+def _advice(root):
+    """What to use, with errors on the finest mesh of the beam that most scenes are of."""
+    beam, kinematics = most_asked(root, "beam"), most_asked(root, "kinematics")
+    materials = _materials(root, beam)
+    loads = [load for load in LOADS if load in root["load"].values]
+    here = root.deformation_error.sel(beam=beam, kinematics=kinematics).sel(mesh_size=min(root.mesh_size.values))
+    heads = [f"{load}, ν = {nu:g}" for load in loads for nu in materials]
+    lines = [f"| what you have | use | {' | '.join(heads)} |", "|---|---|" + "---:|" * len(heads)]
+    for situation, name, mesh_type in ADVICE:
+        if name not in here.definition.values or mesh_type not in here.mesh_type.values:
+            continue
+        cell = here.sel(definition=name, mesh_type=mesh_type)
+        values = [cell.sel(load=load, material=material) for load in loads for material in materials.values()]
+        if all(np.isfinite(value) for value in values):
+            lines.append(f"| {situation} | `{name}` | {' | '.join(map(_signed, values))} |")
+    return lines
+
+
 def decision(tree):
-    """Markdown: what each definition attains on each mesh type, and over the paper's cells.
+    """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells.
 
     Every figure is a cell of the dataset, or a median or largest one of cells that the heading names.
     """
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
-    parts = []
+    advice = _advice(root)
+    parts = ["### In short", "", *advice, ""] if len(advice) > 2 else []
     for mesh_type in MESH_TYPES:
         lines = _attained(root, moduli, mesh_type) if mesh_type in root.mesh_type.values else []
         if len(lines) > 2:
