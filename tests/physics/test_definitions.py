@@ -266,14 +266,14 @@ def test_adjoint_reaches_poisson_ratios_that_springs_cannot(nu):
 
 
 @pytest.mark.parametrize("name", ["annealed", "evolved"])
-def test_searches_are_repeatable_and_never_worse_than_their_start(name):
+def test_searches_are_repeatable_and_better_than_their_start(name):
     mesh, material = MESH_TYPES["free"](0.03, 0.01, 5e-3), Material("unit", 1.0, 0.45)
     cases = patch_cases(mesh, material, 1.0)
-    first, second = (DEFINITIONS[name].function(mesh, material, 1.0, cases, 60) for _ in "ab")
+    first, second = (DEFINITIONS[name].function(mesh, material, 1.0, cases, 200) for _ in "ab")
     assert (first.relative == second.relative).all()
-    assert first.evaluations <= 60
+    assert first.evaluations <= 200
     misfit = Misfit(mesh, material, 1.0, cases)
-    assert misfit(np.log(first.relative / misfit.start)) <= misfit(np.zeros(len(mesh.edges)))
+    assert misfit(np.log(first.relative / misfit.start)) < misfit(np.zeros(len(mesh.edges)))
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from scipy.optimize import differential_evolution
 from .base import Springs
 from .identification import SPAN, Misfit
 
-MAX_EVALUATIONS = 300
+MAX_EVALUATIONS = 1000
 POPULATION = 20
 
 
