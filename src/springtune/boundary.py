@@ -18,7 +18,9 @@ def held(mesh, kind):
     ndarray of bool, shape (n_points, 2)
     """
     directions = np.zeros(mesh.points.shape, dtype=bool)
-    if kind == "shear":
+    if kind == "face":
+        directions[mesh.outline_edges(1, 0.0)] = True
+    elif kind == "shear":
         directions[mesh.outline_edges(1, 0.0)] = True
         directions[mesh.outline_edges(1, mesh.points[:, 1].max()), 1] = True
     else:
@@ -27,10 +29,9 @@ def held(mesh, kind):
 
 
 def weights(mesh, kind):
-    """Weight of each particle in an even distribution over the loaded side, along the force.
+    """Weight of each particle in an even distribution over the loaded side, along the force: the pattern of a load.
 
-    Each edge of the side gives half of its share of the length to either particle. The same field is the load pattern
-    of a force of 1 and the weights of the mean displacement of that side.
+    Each edge of the side gives half of its share of the length to either particle.
 
     Parameters
     ----------
@@ -44,9 +45,31 @@ def weights(mesh, kind):
     ndarray of float, shape (n_points, 2)
         Sum 1 along the force, zero across.
     """
-    along, across = (1, 0) if kind == "shear" else (0, 1)
-    edges = mesh.outline_edges(along, mesh.points[:, along].max())
+    edges, across = loaded_edges(mesh, kind)
     share = np.abs(mesh.points[edges[:, 1], across] - mesh.points[edges[:, 0], across])
     field = np.zeros(mesh.points.shape)
-    np.add.at(field[:, 1 if kind == "bending" else 0], edges, 0.5 * share[:, None])
+    np.add.at(field[:, 1 if kind in ("bending", "face") else 0], edges, 0.5 * share[:, None])
     return field / field.sum()
+
+
+def loaded_edges(mesh, kind):
+    """Edges of the loaded side, shape (n, 2), and the axis along it."""
+    along, across = (1, 0) if kind in ("shear", "face") else (0, 1)
+    return mesh.outline_edges(along, mesh.points[:, along].max()), across
+
+
+def measured(mesh, kind):
+    """Weights of the displacements that make the displacement of a load, shape (n_points, 2), sum 1.
+
+    The mean over the loaded side; of a face its middle, by interpolation along the edge that it lies on.
+    """
+    if kind != "face":
+        return weights(mesh, kind)
+    edges, across = loaded_edges(mesh, kind)
+    ends = mesh.points[edges, across]
+    middle = 0.5 * (mesh.points[:, across].min() + mesh.points[:, across].max())
+    found = int(np.argmax((ends.min(axis=1) <= middle) & (middle <= ends.max(axis=1))))
+    share = (middle - ends[found, 0]) / (ends[found, 1] - ends[found, 0])
+    field = np.zeros(mesh.points.shape)
+    field[edges[found], 1] = 1 - share, share
+    return field

@@ -9,7 +9,14 @@
      //+------------+->          //+------------+ |          +--------------+
       clamped        even         clamped        even        ////// clamped
 
-A load's displacement is the mean one of the loaded side, along the force.
+    pressure, follower-pressure
+     v  v  v  v  v  v
+    +----------------+
+    |                |
+    +----------------+
+    ////// clamped
+
+A load's displacement is the mean one of the loaded side, along the force; under pressure, that of the side's middle.
 """
 
 from dataclasses import dataclass
@@ -22,13 +29,16 @@ class Load:
     Attributes
     ----------
     kind : str
-        What is held, and where and along what the force acts: ``"axial"``, ``"bending"`` or ``"shear"``.
+        What is held, and where and along what the force acts: one of `KINDS`.
     sign : float
         Sign of the force of a load [1]; tension is positive.
+    follower : bool
+        Whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
     """
 
     kind: str
     sign: float
+    follower: bool = False
 
 
 LOADS = {
@@ -36,8 +46,10 @@ LOADS = {
     "compression": Load("axial", -1.0),
     "bending": Load("bending", 1.0),
     "shear": Load("shear", 1.0),
+    "pressure": Load("face", -1.0),
+    "follower-pressure": Load("face", -1.0, follower=True),
 }
 """Loads by name."""
 
-KINDS = ("axial", "bending", "shear")
+KINDS = ("axial", "bending", "shear", "face")
 """Kinds of load; loads of one kind differ by a factor."""

@@ -149,8 +149,15 @@ class Network:
         """Tangent factorised at rest."""
         return self.factorize()
 
-    def factorize(self, displacements=None):
+    def factorize(self, displacements=None, follower=None):
         """Factorised tangent.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2), optional
+            Where it is taken; at rest without.
+        follower : tuple of float and FollowerPressure, optional
+            A pressure and what it acts on, whose own derivative is taken off.
 
         Returns
         -------
@@ -162,6 +169,9 @@ class Network:
             If the tangent is singular.
         """
         matrix = self.tangent(displacements)
+        if follower is not None:
+            s, load = follower
+            matrix = self._pattern.matrix(matrix.data - s * self._pattern.cell_entries(load.edges, load.derivative))
         try:
             lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError as error:

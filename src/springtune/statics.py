@@ -41,6 +41,10 @@ class Equilibrium:
         The last factorised tangent.
     reason : str
         Why it did not converge, empty where it did.
+    load_share : float
+        Largest share of the load at which there is a good equilibrium [1]; 1 where it converged.
+    last : ndarray of float, shape (n_points, 2), or None
+        Displacements at that share, where it is below 1.
     """
 
     displacements: np.ndarray
@@ -49,6 +53,39 @@ class Equilibrium:
     residual: float
     factor: object
     reason: str = ""
+    load_share: float = 1.0
+    last: np.ndarray | None = None
+
+
+class FollowerPressure:
+    """A pressure that turns and grows with the edges that it acts on, of total force 1 at rest.
+
+    Each edge of vector e carries ``e`` turned by a right angle, over the length of the side, half of it on either end.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    edges : ndarray of int, shape (n, 2)
+        Edges of a straight side.
+    axis : int
+        Axis along the side; the force is along the other one.
+    """
+
+    def __init__(self, mesh, edges, axis):
+        along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
+        self.edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)
+        self.rest = mesh.points[self.edges[:, 1]] - mesh.points[self.edges[:, 0]]
+        turn = np.array([[0.0, -1.0], [1.0, 0.0]]) * (1 if axis == 0 else -1)
+        self.turn = 0.5 * turn / np.abs(along).sum()
+        half = np.block([-self.turn, self.turn])
+        self.derivative = np.broadcast_to(np.vstack([half, half]), (len(edges), 4, 4))
+
+    def forces(self, displacements):
+        """Forces on the particles [1], shape (n_points, 2)."""
+        sides = self.rest + displacements[self.edges[:, 1]] - displacements[self.edges[:, 0]]
+        field = np.zeros(displacements.shape)
+        np.add.at(field, self.edges, (sides @ self.turn.T)[:, None, :])
+        return field
 
 
 class StaticProblem:
@@ -59,10 +96,13 @@ class StaticProblem:
     network : Network
     pattern : ndarray of float, shape (n_points, 2)
         Forces on the particles [1]; scaled by ``s``.
+    follower : FollowerPressure, optional
+        What the forces become as the particles move; they stay as they are without.
     """
 
-    def __init__(self, network, pattern):
+    def __init__(self, network, pattern, follower=None):
         self.network = network
+        self.follower = follower
         self.load = network.reduce(pattern)
         self.load_norm = float(np.linalg.norm(self.load))
 
@@ -122,7 +162,7 @@ class StaticProblem:
         """
         iterations = 0
         starts = [lambda s: s * self.slope]
-        if not self.network.energies:  # the series is of springs
+        if not self.network.energies and self.follower is None:  # the series is of springs under dead loads
             starts.insert(0, lambda s: self.start.predict(s))
         for start in starts:
             found = self.newton(s, start(s))
@@ -154,7 +194,8 @@ class StaticProblem:
         scale = abs(s) * self.load_norm
 
         def balance(displacements):
-            missing = s * self.load - network.resistance(displacements)
+            load = self.load if self.follower is None else network.reduce(self.follower.forces(displacements))
+            missing = s * load - network.resistance(displacements)
             return missing, _norm(missing) / scale
 
         displacements, factor, factorised, steps = start, None, 0, 0
@@ -172,7 +213,7 @@ class StaticProblem:
                 if factorised == max_iterations:
                     return end("too many iterations")
                 try:
-                    factor = network.factorize(displacements)
+                    factor = network.factorize(displacements, self.follower and (s, self.follower))
                 except SingularError:
                     return end("singular tangent")
                 factorised += 1
@@ -198,7 +239,7 @@ class StaticProblem:
 
     def _in_steps(self, s, iterations, smallest=1 / 64):
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
-        done, step = 0.0, 0.25
+        done, step = 0.0, 0.25  # of the load
         last = before = np.zeros(self.network.held.shape)
         last_step = None
         while True:
@@ -213,8 +254,8 @@ class StaticProblem:
                     return replace(found, iterations=iterations)
                 step *= 1.5
             elif step <= smallest:
-                reason = f"{found.reason} at {100 * (done + step):.3g} % of the load"
-                return replace(found, iterations=iterations, reason=reason)
+                reason = f"{found.reason} beyond {100 * done:.3g} % of the load"
+                return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
             else:
                 step *= 0.5
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..boundary import held, weights
+from ..boundary import held, measured, weights
 from ..mesh import read_mesh
 from ..network import Network
 from ..path import stable_until, trace
@@ -37,8 +37,8 @@ def run(tasks, done):
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
         problems = {}
         for kind in {curve["kind"]: None for curve in missing}:
-            pattern = weights(mesh, kind)
-            problems[kind] = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), pattern), pattern
+            problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
+            problems[kind] = problem, measured(mesh, kind)
         store.add(path, {curve["key"]: _trace(*problems[curve["kind"]], curve) for curve in missing})
         traced += len(missing)
     files.write_json(done, {"traced": traced})

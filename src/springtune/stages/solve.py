@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..boundary import held, weights
+from ..boundary import held, loaded_edges, measured, weights
 from ..materials import Material
 from ..mesh import read_mesh
 from ..moduli import lateral_forces
@@ -16,8 +16,11 @@ from ..network import Network
 from ..reference.field import field_error, interpolate
 from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import Case
-from ..statics import StaticProblem
+from ..statics import FollowerPressure, StaticProblem
 from . import files, store
+
+FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
+"""Where the profile of a pressed face is given, over its length [1]."""
 
 NETWORKS = 6
 """Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""
@@ -111,6 +114,7 @@ class Solver:
         self.patterns, self.networks, self.found = {}, {}, {}
         self.held = lru_cache(lambda kind: held(mesh, kind))
         self.weights = lru_cache(lambda kind: weights(mesh, kind))
+        self.measured = lru_cache(lambda kind: measured(mesh, kind))
 
     def solve(self, scene, calibration):
         """Result of a scene, ready to be stored.
@@ -148,7 +152,7 @@ class Solver:
             stiffness = group["stiffness"] * scene["thickness_ratio"]
         reference = self.references.field(scene["reference"], scene["reference_key"])
         springs, seconds = self._springs(scene, stiffness, reference)
-        problem = self._problem(springs, scene["kind"])
+        problem = self._problem(springs, scene["kind"], scene["follower"])
         s = scene["force"] / springs.reference
         found = problem.linear(s) if scene["kinematics"] == "linear" else problem.nonlinear(s)
         result = {
@@ -158,11 +162,17 @@ class Solver:
             "definition_seconds": seconds,
             "definition_evaluations": springs.evaluations,
             "spring_ratio": springs.spring_ratio,
+            "load_share": found.load_share if scene["kinematics"] == "nonlinear" else np.nan,
         }
         if not found.converged:
             message = f"{found.reason}; last residual {found.residual:.1e}"
-            return result | {"status": "not_converged", "message": message}
-        result["displacement"] = float(np.tensordot(found.displacements, self.weights(scene["kind"]), axes=2))
+            result |= {"status": "not_converged", "message": message}
+            if found.last is not None:
+                result["last_displacement"] = float(np.tensordot(found.last, self.measured(scene["kind"]), axes=2))
+            return result
+        result["displacement"] = float(np.tensordot(found.displacements, self.measured(scene["kind"]), axes=2))
+        if scene["kind"] == "face":
+            result |= self._face(found.displacements)
         if reference is not None:
             result["field_error"] = field_error(self.mesh, found.displacements, scene["force"] * reference)
         result["negative_pivots"] = pivots = found.factor.negative_pivots
@@ -190,7 +200,15 @@ class Solver:
             self.found = {"name": name, "springs": springs, "seconds": time.perf_counter() - begin}
         return self.found["springs"], self.found["seconds"]
 
-    def _problem(self, springs, kind):
+    def _face(self, displacements):
+        """Mean displacement of a pressed face and its profile, along the force [m]."""
+        face = np.flatnonzero(self.weights("face")[:, 1] > 0)
+        x, moved = self.mesh.points[face, 0], displacements[face, 1]
+        order = np.argsort(x)
+        profile = np.interp(FACE_POSITIONS * np.ptp(x), x[order], moved[order])
+        return {"face_mean": float((self.weights("face") * displacements).sum()), "face_profile": profile}
+
+    def _problem(self, springs, kind, follower=False):
         directions = self.held(kind)
         parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
         name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
@@ -202,12 +220,14 @@ class Solver:
         while len(self.networks) >= NETWORKS:
             self.networks.pop(next(iter(self.networks)))
         self.networks[name] = network, problems  # the last one used is the last one to go
-        if (kind, springs.lateral) not in problems:
+        label = (kind, springs.lateral, follower)
+        if label not in problems:
             pattern = self.weights(kind)
             if springs.lateral:
                 pattern = pattern + springs.lateral / np.ptp(self.mesh.points[:, 1]) * lateral_forces(self.mesh)
-            problems[kind, springs.lateral] = StaticProblem(network, pattern)
-        return problems[kind, springs.lateral]
+            turning = FollowerPressure(self.mesh, *loaded_edges(self.mesh, kind)) if follower else None
+            problems[label] = StaticProblem(network, pattern, turning)
+        return problems[label]
 
 
 if __name__ == "__main__":

@@ -149,7 +149,7 @@ def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
     reference = reference_key(scene.mesh.beam, scene.material, scene.load)
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, _material(scene.material), reference]
-    parameters += [LOADS[scene.load].kind, scene.force, scene.definition, scene.kinematics]
+    parameters += [LOADS[scene.load].kind, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
     return files.key(parameters, _stage_key("solve", "numpy", "scipy"), definition_digest(scene.definition))
 
@@ -212,6 +212,11 @@ def _thickness_ratio(study, scene):
 def calibration_name(scene):
     """Name of the group of curves that calibrates a scene."""
     return f"{scene.mesh.mesh_type}_{scene.material.name}_{scene.kinematics}"
+
+
+def _follows(scene):
+    """Whether the force follows what it acts on: linear kinematics know no other place than that at rest."""
+    return LOADS[scene.load].follower and scene.kinematics == "nonlinear"
 
 
 def _given_stiffness(study, scene):
@@ -319,6 +324,7 @@ def _scene(study, scene):
         "key": scene_key(study, scene),
         "material": _material(scene.material),
         "kind": LOADS[scene.load].kind,
+        "follower": _follows(scene),
         "force": scene.force,
         "definition": scene.definition,
         "kinematics": scene.kinematics,

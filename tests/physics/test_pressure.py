@@ -1,0 +1,105 @@
+"""Pressure on a face: follower loads, the block, and what becomes of networks that cannot carry it."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springtune.boundary import held, loaded_edges, measured, weights
+from springtune.geometry import Beam
+from springtune.materials import Material
+from springtune.mesh import MESH_TYPES
+from springtune.network import Network
+from springtune.reference.small_strain import solve_small_strain
+from springtune.springs import DEFINITIONS
+from springtune.statics import FollowerPressure, StaticProblem
+
+BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
+FORCE = -20.0  # .1 MPa on 200 x 1 mm
+
+
+def block(definition, nu=0.5, size=2e-3, stiffness=None, mesh_type="structured", follower=False):
+    mesh = MESH_TYPES[mesh_type](0.2, 0.04, size)
+    springs = DEFINITIONS[definition].springs(mesh, Material("rubber", 1e6, nu), 1e-3, stiffness)
+    network = Network(mesh, held(mesh, "face"), springs.relative, springs.energies)
+    turning = FollowerPressure(mesh, *loaded_edges(mesh, "face")) if follower else None
+    return StaticProblem(network, weights(mesh, "face"), turning), FORCE / springs.reference, measured(mesh, "face")
+
+
+def middle(found, field):
+    return float(np.tensordot(found.displacements, field, axes=2))
+
+
+def test_reference_of_the_block():
+    solution = solve_small_strain(BLOCK, Material("rubber", 1e6, 0.5), FORCE, kind="face")
+    # CalculiX and the paper: 3.144 and 3.14 mm at the middle, 3.31 mm sideways at the upper corners.
+    assert solution.displacement == pytest.approx(-3.144e-3, rel=1e-4)
+    assert np.abs(solution.displacements[..., 0]).max() == pytest.approx(3.31e-3, rel=3e-3)
+    assert solution.error_estimate <= 1e-4
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
+@pytest.mark.parametrize("definition", ["area", "delingette"])
+def test_one_set_of_parameters_serves_the_block_too(definition, nu):
+    problem, s, field = block(definition, nu)
+    reference = solve_small_strain(BLOCK, Material("rubber", 1e6, nu), FORCE, kind="face")
+    assert middle(problem.linear(s), field) == pytest.approx(reference.displacement, rel=0.01)
+
+
+def test_uniform_network_of_the_paper():
+    """K = 1000 N/m: 3.20 mm by an independent program on the same network."""
+    problem, s, field = block("paper", stiffness=1000.0)
+    found = problem.nonlinear(s)
+    assert found.converged
+    assert middle(found, field) == pytest.approx(-3.20e-3, abs=0.01e-3)
+
+
+def test_softer_network_snaps_at_its_corners_and_keeps_the_last_good_step():
+    """K = 800 N/m: just before the whole load triangles at the upper corners turn inside out."""
+    problem, s, field = block("paper", stiffness=800.0)
+    found = problem.nonlinear(s)
+    assert not found.converged
+    assert 0.97 < found.load_share < 1.0
+    assert f"{100 * found.load_share:.3g} % of the load" in found.reason
+    last = float(np.tensordot(found.last, field, axes=2))
+    assert last / found.load_share == pytest.approx(-4.03e-3, rel=0.01)  # by the independent program, corners inverted
+    assert not problem.network.inverted(found.last)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**31), axis=st.integers(0, 1))
+def test_follower_pressure_has_its_derivative(seed, axis):
+    mesh = MESH_TYPES["free"](0.02, 0.01, 2.5e-3)
+    edges = mesh.outline_edges(1 - axis, mesh.points[:, 1 - axis].max())
+    load = FollowerPressure(mesh, edges, axis)
+    generator = np.random.default_rng(seed)
+    here, direction = 1e-3 * generator.standard_normal((2, *mesh.points.shape))
+    # Linear in the displacements: differences are exact but for rounding.
+    difference = load.forces(here + direction) - load.forces(here)
+    exact = np.zeros(mesh.points.shape)
+    moved = direction[load.edges].reshape(len(edges), 4)
+    np.add.at(exact, load.edges, np.einsum("nij,nj->ni", load.derivative, moved).reshape(-1, 2, 2))
+    assert np.abs(difference - exact).max() <= 1e-12
+    total = load.forces(np.zeros(mesh.points.shape)).sum(axis=0)
+    assert total == pytest.approx([0, 1] if axis == 0 else [1, 0], abs=1e-12)
+
+
+def test_follower_pressure_turns_with_the_face():
+    problem, s, _ = block("area", 0.3, follower=True)
+    found = problem.nonlinear(s)
+    assert found.converged
+    # Balance: the forces at rest plus what the turned ones differ must meet the resistance.
+    load = problem.network.reduce(problem.follower.forces(found.displacements))
+    assert (
+        np.linalg.norm(s * load - problem.network.resistance(found.displacements)) <= 1e-10 * abs(s) * problem.load_norm
+    )
+    # Turned by a right angle with its sheet, a pressure is turned, too.
+    mesh = problem.network.mesh
+    turned = mesh.points @ np.array([[0.0, 1.0], [-1.0, 0.0]]) - mesh.points
+    assert problem.follower.forces(turned).sum(axis=0) == pytest.approx([-1, 0], abs=1e-12)
+
+
+def test_few_newton_steps_under_follower_pressure():
+    problem, s, _ = block("area", 0.49, size=5e-3, follower=True)
+    found = problem.newton(s, s * problem.slope)
+    assert found.converged and found.iterations <= 12
