@@ -2,6 +2,9 @@
 
 import numpy as np
 
+FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
+"""Where the profile of a pressed face is given, over its length [1]."""
+
 
 def held(mesh, kind):
     """Directions that a kind of load holds, see `springtune.loads`.

@@ -19,6 +19,8 @@ DIMENSIONS = {
     "kinematics": "kinematics of the network",
     "stiffness_ratio": "uniform stiffness over E t",
     "poisson_ratio": "Poisson's ratio that the definition is asked for",
+    "reference": "kind of reference",
+    "face_position": "place on the loaded face over its length",
 }
 UNITS = {"mesh_size": "m"}
 """Units of the coordinates that have one; the others are labels or ratios."""
@@ -39,6 +41,7 @@ ROOT_VARIABLES = {
     "message": (SCENE, "1", "why the scene is not solved", ""),
     "iterations": (SCENE, "1", "Newton steps", np.nan),
     "residual": (SCENE, "1", "out-of-balance force over the load", np.nan),
+    "load_share": (SCENE, "1", "largest share of the load with a good equilibrium, nonlinear", np.nan),
     "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
     "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
     "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
@@ -99,6 +102,41 @@ MODULI_VARIABLES = {
     "spring_ratio": (PATCH, "1", "largest spring stiffness over the smallest", np.nan),
     "status": (PATCH, "1", "what became of the patch test", 0),
     "message": (PATCH, "1", "why there are no moduli", ""),
+}
+
+BLOCK_REFERENCE = (*REFERENCE, "reference")
+
+BLOCK_VARIABLES = {
+    "face_displacement": (SCENE, "m", "displacement of the middle of the loaded face along the force, network", np.nan),
+    "face_mean_displacement": (SCENE, "m", "mean displacement of the loaded face along the force, network", np.nan),
+    "face_profile": (
+        (*SCENE, "face_position"),
+        "m",
+        "displacement over the loaded face along the force, network",
+        np.nan,
+    ),
+    "last_face_displacement": (
+        SCENE,
+        "m",
+        "of the middle at the last good load step, where there is no whole one",
+        np.nan,
+    ),
+    "reference_face_displacement": (BLOCK_REFERENCE, "m", "displacement of the middle of the face, reference", np.nan),
+    "reference_face_mean_displacement": (BLOCK_REFERENCE, "m", "mean displacement of the face, reference", np.nan),
+    "reference_face_profile": (
+        (*BLOCK_REFERENCE, "face_position"),
+        "m",
+        "displacement over the face, reference",
+        np.nan,
+    ),
+    "reference_error_estimate": (BLOCK_REFERENCE, "1", "estimated relative error of the reference", np.nan),
+    "face_error": (
+        (*SCENE, "reference"),
+        "1",
+        "signed error of the middle of the face, (network - reference) / |reference|",
+        np.nan,
+    ),
+    "reference_message": (BLOCK_REFERENCE, "1", "why there is no reference", ""),
 }
 
 FIELD = (*SCENE, "particle")

@@ -39,9 +39,12 @@ MOST_PARTICLES = 5e6
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
 
-OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions")
+OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block")
 """What is made from a dataset: figures of curves, of errors against mesh size and of deformed networks; tables as the
-paper's; figures and tables that compare definitions."""
+paper's; figures and tables that compare definitions; the figure of a pressed block."""
+
+FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
+"""Kinds of reference besides the small-strain one, for scenes under pressure."""
 
 SHOWN_PROBLEMS = 5
 """Problems that one message lists; it counts the others."""
@@ -239,6 +242,8 @@ class Study:
         `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
     outputs : tuple of str
         What is made from the dataset: of `OUTPUTS`.
+    further_references : tuple of str
+        Of `FURTHER_REFERENCES`.
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -266,6 +271,7 @@ class Study:
     patch: Beam | None
     mesh_files: dict
     outputs: tuple
+    further_references: tuple
     grids: tuple
     stiffness_ratios: tuple
     stiffness_table: dict
@@ -474,6 +480,7 @@ MeshType = Annotated[
 ]
 Load = _one_of("load", LOADS)
 Output = _one_of("output", OUTPUTS)
+FurtherReference = _one_of("reference", FURTHER_REFERENCES)
 Kinematics = _one_of("kinematics", KINEMATICS)
 DefinitionName = _one_of("definition", DEFINITIONS)
 Flag = Annotated[bool, _Scalar(_read_flag, {"type": "boolean"}, "true or false")]
@@ -705,12 +712,30 @@ class GridConfig(Section):
     material: Annotated[list[MaterialName], _OneOrMore()] = Field(description="Materials, by name.")
     load: Annotated[list[Load], _OneOrMore()] = Field(
         description="`traction`, `compression`: along x on the right end, `bending`: along y there, the left end "
-        "clamped; `shear`: along x on the upper side, which stays level, the lower side clamped. Spread evenly."
+        "clamped; `shear`: along x on the upper side, which stays level, the lower side clamped; `pressure`, "
+        "`follower-pressure`: down on the upper side, the lower side clamped. Spread evenly."
     )
-    force: Annotated[dict[str, Force], _PerBeam()] = Field(
+    force: Annotated[dict[str, Force], _PerBeam()] | None = Field(
+        None,
         description="Magnitude of the force: one for all beams, or one for each. The load's name carries the sign. "
-        "A beam, material and load have the same force in all grids."
+        "A beam, material and load have the same force in all grids.",
     )
+    pressure: Stress | None = Field(
+        None,
+        description="Pressure on the upper side, in place of `force`; for loads `pressure` and `follower-pressure`.",
+    )
+
+    @model_validator(mode="after")
+    def _one_force(self):
+        if (self.force is None) == (self.pressure is None):
+            both = "both 'force' and 'pressure'; remove one"
+            missing = "'force' is missing; give a force such as '400 kN', or one for each beam"
+            raise _refuse(missing if self.force is None else both, *(() if self.force is None else ("pressure",)))
+        for load in self.load if self.pressure is not None else ():
+            if LOADS[load].kind != "face":
+                raise _refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
+        return self
+
     definition: Annotated[list[DefinitionName], _OneOrMore()] = Field(
         description="Rules that give every spring its stiffness; `springtune definitions` explains them."
     )
@@ -755,6 +780,11 @@ class StudyConfig(Section):
         description="What is made from the dataset: figures of sensitivity curves, of errors against mesh size, of "
         "deformed networks (and the group `/fields` behind them), tables as the paper's; `definitions`: figures and "
         "tables that compare definitions. Figures are of nonlinear kinematics.",
+    )
+    further_references: Annotated[list[FurtherReference], _OneOrMore()] = Field(
+        [],
+        description="References at finite strain besides the small-strain one, for scenes under pressure, in the group "
+        "`/block`. An incompressible material has none in plane strain.",
     )
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
@@ -872,10 +902,10 @@ def _check_names(config, problems):
             known(("grids", name, "beam"), "beam", beam, config.beams)
         for material in grid.material:
             known(("grids", name, "material"), "material", material, config.materials)
-        for beam in grid.force:
+        for beam in grid.force or ():
             if beam is not None:
                 known(("grids", name, "force", beam), "beam", beam, config.beams)
-        if None not in grid.force:
+        if grid.force and None not in grid.force:
             for beam in grid.beam:
                 if beam not in grid.force:
                     problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
@@ -985,7 +1015,10 @@ def _expand(config, mesh_files, problems):
     for name, grid in config.grids.items():
         scenes, curves, absent = [], [], set()
         for beam, material, load in product(grid.beam, grid.material, grid.load):
-            magnitude = grid.force[beam if beam in grid.force else None]
+            if grid.pressure is not None:
+                magnitude = grid.pressure * beams[beam].length * beams[beam].thickness
+            else:
+                magnitude = grid.force[beam if beam in grid.force else None]
             other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
             if other != magnitude:
                 problems.add(
@@ -1003,7 +1036,7 @@ def _expand(config, mesh_files, problems):
                         continue
                 common = (mesh, materials[material], load, force)
                 scenes += [Scene(*common, definition, kinematics) for definition in grid.definition]
-                if grid.sensitivity:
+                if grid.sensitivity and not LOADS[load].follower:  # k enters as F/k only where forces stay
                     curves.append(Curve(*common, kinematics))
         for mesh_type, beam, size in sorted(absent):
             row = f"{{file: <path>, beam: {beam}, mesh_size: {size}}}"
@@ -1136,6 +1169,9 @@ def _study(config, grids, problems, about):
     moduli = tuple(dict.fromkeys(one for grid in grids for one in grid.moduli))
     axes["poisson_ratio"] = tuple(sorted({one.poisson_ratio for one in moduli}))
     outputs = tuple(name for name in OUTPUTS if name in config.outputs)
+    if "block" in outputs and not any(LOADS[scene.load].kind == "face" for scene in scenes):
+        problems.add(("outputs",), "'block' shows scenes under pressure and no grid has them; add load 'pressure'")
+        problems.stop()
     if "definitions" in outputs and not moduli:
         problems.add(("outputs",), "'definitions' compares moduli and no grid has them; add 'moduli: true' to a grid")
         problems.stop()
@@ -1151,6 +1187,7 @@ def _study(config, grids, problems, about):
         moduli=moduli,
         patch=Beam("patch", config.patch.length, config.patch.height, 1.0) if moduli else None,
         outputs=outputs,
+        further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in _stated(config)},

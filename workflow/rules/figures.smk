@@ -62,6 +62,24 @@ rule figures_definitions:
         "python -m springtune.stages.figures_definitions {input.dataset} {params.folder} > {log} 2>&1"
 
 
+rule figures_block:
+    message:
+        "Drawing the pressed block"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_block"),
+    output:
+        FIGURES["block"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_block.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_block.tsv"
+    shell:
+        "python -m springtune.stages.figures_block {input.dataset} {params.folder} > {log} 2>&1"
+
+
 rule figures_all:
     input:
         FIGURES.values(),

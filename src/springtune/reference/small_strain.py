@@ -61,6 +61,8 @@ class ReferenceSolution:
     ----------
     displacement : float
         Mean displacement of the loaded side along the force [m]; of a face, that of its middle.
+    mean_displacement : float
+        Mean displacement of the loaded side along the force [m].
     error_estimate : float
         Bound on the relative error of `displacement` [1].
     x : ndarray of float, shape (n_x,)
@@ -73,6 +75,7 @@ class ReferenceSolution:
     """
 
     displacement: float
+    mean_displacement: float
     error_estimate: float
     x: np.ndarray
     y: np.ndarray
@@ -81,7 +84,8 @@ class ReferenceSolution:
 
     def scaled(self, factor: float) -> "ReferenceSolution":
         """The solution under `factor` times the force; exact, since small strain is linear."""
-        return replace(self, displacement=self.displacement * factor, displacements=self.displacements * factor)
+        names = ("displacement", "mean_displacement", "displacements")
+        return replace(self, **{name: getattr(self, name) * factor for name in names})
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points of the beam [m], shape (n, 2); see `springtune.reference.field.interpolate`."""
@@ -156,6 +160,7 @@ def solve_small_strain(
     x, y, field = level.field()
     return ReferenceSolution(
         displacement=scale * level.measured,
+        mean_displacement=scale * level.displacement,
         error_estimate=estimate,
         x=half_height * x,
         y=half_height * (y + 1.0),

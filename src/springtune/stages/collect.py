@@ -11,9 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import CubicSpline
 
 from .. import __version__, dataset
+from ..boundary import FACE_POSITIONS
 from ..compare import best_stiffness, deformation_error
+from ..loads import LOADS
 from ..mesh import read_mesh
 from ..reference.field import outline
 from ..springs.lattice import predicted_stiffness
@@ -34,6 +37,7 @@ COPIED = (
     "definition_seconds",
     "definition_evaluations",
     "spring_ratio",
+    "load_share",
 )
 """What of a scene's result goes into the dataset as it is."""
 
@@ -72,6 +76,8 @@ def run(config, folder, output):
         groups["/sensitivity"] = _sensitivity(study, folder, references, axes)
     if study.moduli:
         groups["/moduli"] = _moduli(study, folder, axes)
+    if any(LOADS[scene.load].kind == "face" for scene in study.scenes):
+        groups["/block"] = _block(study, folder, axes)
     if "deformed" in study.outputs:
         groups["/fields"] = _fields(study, folder, axes)
     dataset.write(output, groups, _attributes(study, config))
@@ -207,6 +213,67 @@ def _moduli(study, folder, axes):
     return moduli.data
 
 
+def _block(study, folder, axes):
+    """Displacements of pressed faces, of networks and of references of all kinds."""
+    kinds = (SMALL_STRAIN, *study.further_references)
+    block = _Filler(
+        dataset.empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}, dataset.BLOCK_VARIABLES)
+    )
+    for asked in study.references:
+        if LOADS[asked.load].kind != "face":
+            continue
+        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        for kind in kinds:
+            block.put(_face_reference(folder, asked, kind), reference=kind, **labels)
+    calibration = files.read_json(folder / "done" / "calibrate.json")
+    pressed = [scene for scene in study.scenes if LOADS[scene.load].kind == "face"]
+    for mesh, scenes in _by_mesh(pressed).items():
+        names = [tasks.solved_key(study, scene, calibration) for scene in scenes]
+        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), ["face_profile"])
+        for name, scene in zip(names, scenes):
+            labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
+            labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
+            found = {new: results[name][old] for old, new in FACE.items() if old in results[name]}
+            block.put(found, **labels)
+    data = block.data
+    pairs = xr.broadcast(data.face_displacement, data.reference_face_displacement)
+    data["face_error"].values = deformation_error(*(array.transpose(*data.face_error.dims) for array in pairs))
+    return data
+
+
+SMALL_STRAIN = "small-strain-plane-stress"
+"""Name of the reference that all studies have."""
+
+FACE = {
+    "displacement": "face_displacement",
+    "face_mean": "face_mean_displacement",
+    "face_profile": "face_profile",
+    "last_displacement": "last_face_displacement",
+}
+"""Values of a pressed face by their names in a result."""
+
+
+def _face_reference(folder, asked, kind):
+    """Middle, mean and profile of a pressed face of a reference."""
+    if kind == SMALL_STRAIN:
+        result, scale = _reference(folder, asked, ["x", "displacements"]), asked.force
+        if "x" in result:
+            result |= {"positions": result["x"] / asked.beam.length, "profile": result["displacements"][:, -1, 1]}
+    else:
+        file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
+        name = tasks.finite_key(asked, kind)
+        result, scale = store.read(file, [name], ["positions", "profile"])[name], 1.0
+    values = {"reference_message": result["message"]}
+    if "displacement" in result:
+        values |= {
+            "reference_face_displacement": scale * result["displacement"],
+            "reference_face_mean_displacement": scale * result["mean_displacement"],
+            "reference_face_profile": scale * CubicSpline(result["positions"], result["profile"])(FACE_POSITIONS),
+            "reference_error_estimate": result["error_estimate"],
+        }
+    return values
+
+
 def _fields(study, folder, axes):
     shown = tasks.shown_meshes(study)
     meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
@@ -224,9 +291,9 @@ def _fields(study, folder, axes):
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
-        names = {tasks.solved_key(study, scene, calibration): scene for scene in scenes[spec]}
-        results = store.read(folder / "solutions" / f"{spec.name}.h5", names, ["displacements"])
-        for name, scene in names.items():
+        names = [tasks.solved_key(study, scene, calibration) for scene in scenes[spec]]
+        results = store.read(folder / "solutions" / f"{spec.name}.h5", set(names), ["displacements"])
+        for name, scene in zip(names, scenes[spec]):
             if "displacements" in results[name]:
                 found = results[name]["displacements"]
                 chosen = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}

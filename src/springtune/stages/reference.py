@@ -16,7 +16,8 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder`` and ``references``, each with ``name, key, beam, material, kind``.
+        JSON file: ``folder``, ``references``, each with ``name, key, beam, material, kind``, and ``finite``, each with
+        ``name, key, beam, material, force, plane, follower``.
     done : str or Path
         JSON file to write: what was solved.
     """
@@ -35,6 +36,7 @@ def run(tasks, done):
         else:
             result = {
                 "displacement": solution.displacement,
+                "mean_displacement": solution.mean_displacement,
                 "error_estimate": solution.error_estimate,
                 "x": solution.x,
                 "y": solution.y,
@@ -44,7 +46,34 @@ def run(tasks, done):
         result["seconds"] = time.perf_counter() - begin
         store.add(path, {task["key"]: result})
         made.append(task["name"])
+    for task in tasks["finite"]:
+        path = Path(tasks["folder"]) / f"{task['name']}.h5"
+        if task["key"] not in store.stored(path):
+            store.add(path, {task["key"]: _finite(task)})
+            made.append(task["name"])
     files.write_json(done, {"made": made})
+
+
+def _finite(task):
+    """Result at finite strain."""
+    from ..reference.finite_strain import solve_neo_hooke  # here, since few studies need it
+
+    begin = time.perf_counter()
+    try:
+        beam, material = Beam(**task["beam"]), Material(**task["material"])
+        solution = solve_neo_hooke(beam, material, task["force"], plane=task["plane"], follower=task["follower"])
+    except (RuntimeError, ValueError) as error:
+        result = {"message": str(error)}
+    else:
+        result = {
+            "displacement": solution.displacement,
+            "mean_displacement": solution.mean_displacement,
+            "error_estimate": solution.error_estimate,
+            "positions": solution.positions,
+            "profile": solution.profile,
+            "message": "",
+        }
+    return result | {"seconds": time.perf_counter() - begin}
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..boundary import held, loaded_edges, measured, weights
+from ..boundary import FACE_POSITIONS, held, loaded_edges, measured, weights
 from ..materials import Material
 from ..mesh import read_mesh
 from ..moduli import lateral_forces
@@ -18,9 +18,6 @@ from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import Case
 from ..statics import FollowerPressure, StaticProblem
 from . import files, store
-
-FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
-"""Where the profile of a pressed face is given, over its length [1]."""
 
 NETWORKS = 6
 """Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""

@@ -138,6 +138,13 @@ def reference_key(beam, material, load):
     return files.key(_beam(beam), _material(material), LOADS[load].kind, code)
 
 
+def finite_key(reference, kind):
+    """Key of a reference at finite strain, which no load scales."""
+    parameters = [_beam(reference.beam), _material(reference.material), reference.force, kind]
+    code = _stage_key("reference", "numpy", "scipy", "scikit-fem")
+    return files.key(parameters, LOADS[reference.load].follower, code)
+
+
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
@@ -249,7 +256,22 @@ def _reference(study, folder):
     loads = {}
     for reference in study.references:
         loads.setdefault(reference_key(reference.beam, reference.material, reference.load), reference)
+    finite = [
+        {
+            "name": reference_name(reference.beam, reference.material),
+            "key": finite_key(reference, kind),
+            "beam": _beam(reference.beam),
+            "material": _material(reference.material),
+            "force": reference.force,
+            "plane": kind.rpartition("-")[2],
+            "follower": LOADS[reference.load].follower,
+        }
+        for reference in study.references
+        if LOADS[reference.load].kind == "face"
+        for kind in study.further_references
+    ]
     return {
+        "finite": finite,
         "folder": str(folder / "references"),
         "references": [
             {
