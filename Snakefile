@@ -10,6 +10,7 @@ include: "workflow/rules/reference.smk"
 include: "workflow/rules/sensitivity.smk"
 include: "workflow/rules/solve.smk"
 include: "workflow/rules/moduli.smk"
+include: "workflow/rules/laying.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/tables.smk"
@@ -25,6 +26,7 @@ rule all:
         expand(RESULTS / "done/{stage}_{bundle}.json", stage=["mesh", "solve"], bundle=BUNDLES["solve"]),
         rules.collect.input.curves,
         rules.collect.input.moduli,
+        rules.collect.input.laying,
         rules.collect.output,
         rules.figures_all.input,
         TABLES.values(),

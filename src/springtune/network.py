@@ -270,5 +270,10 @@ class _Pattern:
         kept, slots = self.cells[name]
         return np.bincount(slots, matrices.ravel()[kept], len(self.indices))
 
+    def entries(self, particles, matrices):
+        """As `cell_entries`, of groups of joined particles that change from call to call."""
+        kept, codes = self._codes(particles)
+        return np.bincount(np.searchsorted(self.codes, codes), matrices.ravel()[kept], len(self.indices))
+
     def matrix(self, data):
         return csc_array((data, self.indices, self.pointers), shape=(self.size, self.size))

@@ -21,6 +21,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from . import units
 from .geometry import Beam
+from .laying import LOADINGS, Strip, Trapezoid
 from .loads import LOADS
 from .materials import Material
 from .mesh import MESH_TYPES, QUADS
@@ -39,9 +40,9 @@ MOST_PARTICLES = 5e6
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
 
-OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block")
+OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block", "laying")
 """What is made from a dataset: figures of curves, of errors against mesh size and of deformed networks; tables as the
-paper's; figures and tables that compare definitions; the figure of a pressed block."""
+paper's; figures and tables that compare definitions; the figure of a pressed block, and that of laid strips."""
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one, for scenes under pressure."""
@@ -160,6 +161,39 @@ class Moduli:
 
 
 @dataclass(frozen=True)
+class Laying:
+    """A strip to lay on a trapezoid, see `springtune.laying`.
+
+    Attributes
+    ----------
+    strip : Strip
+    trapezoid : Trapezoid
+    material, support : Material
+        Of the strip and of the trapezoid.
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_size : float
+        Length of an edge [m].
+    loading : str
+        One of `springtune.laying.LOADINGS`.
+    pressure : float
+        Pressure on the strip, or its weight over its upper face [Pa].
+    friction : float
+        Coulomb's coefficient [1].
+    """
+
+    strip: Strip
+    trapezoid: Trapezoid
+    material: Material
+    support: Material
+    definition: str
+    mesh_size: float
+    loading: str
+    pressure: float
+    friction: float
+
+
+@dataclass(frozen=True)
 class Grid:
     """What one grid of a study asks for, whether or not other grids ask for it, too.
 
@@ -244,6 +278,9 @@ class Study:
         What is made from the dataset: of `OUTPUTS`.
     further_references : tuple of str
         Of `FURTHER_REFERENCES`.
+    laying : tuple of Laying
+    laying_references : tuple of Laying
+        Strips of finite elements that the others are compared with: one a loading and friction.
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -272,6 +309,8 @@ class Study:
     mesh_files: dict
     outputs: tuple
     further_references: tuple
+    laying: tuple
+    laying_references: tuple
     grids: tuple
     stiffness_ratios: tuple
     stiffness_table: dict
@@ -480,6 +519,8 @@ MeshType = Annotated[
 ]
 Load = _one_of("load", LOADS)
 Output = _one_of("output", OUTPUTS)
+Loading = _one_of("loading", LOADINGS)
+Friction = _number("a coefficient from 0 to 2, such as 0.3", 0, 2)
 FurtherReference = _one_of("reference", FURTHER_REFERENCES)
 Kinematics = _one_of("kinematics", KINEMATICS)
 DefinitionName = _one_of("definition", DEFINITIONS)
@@ -693,6 +734,43 @@ class PatchConfig(Section):
     height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
 
 
+class TrapezoidConfig(Section):
+    """A symmetric trapezoid that stands on its lower base."""
+
+    lower_base: Length = Field(description="Length of the base on the floor.")
+    upper_base: Length = Field(description="Length of the upper base.")
+    height: Length = Field(description="Height.")
+
+
+class LayingConfig(Section):
+    """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
+
+    The reference of a loading and friction is a strip of linear triangles on a mesh of its own.
+    """
+
+    strip: BeamName = Field(description="Beam that is the strip.")
+    trapezoid: TrapezoidConfig = Field(description="What it is laid on.")
+    material: MaterialName = Field(description="Material of the strip.")
+    support: MaterialName = Field(description="Material of the trapezoid; from 1e4 times as stiff on it is rigid.")
+    definition: Annotated[list[DefinitionName], _OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_size: Annotated[list[Length], _OneOrMore()] = Field(description="Lengths of an edge.")
+    reference_size: Length = Field(
+        "1 mm", validate_default=True, description="Length of an edge of the reference's mesh."
+    )
+    loading: Annotated[list[Loading], _OneOrMore()] = Field(
+        "pressure",
+        validate_default=True,
+        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: the "
+        "ends are drawn down to the floor.",
+    )
+    pressure: Stress = Field(description="Pressure, or weight over the upper face.")
+    friction: Annotated[list[Friction], _OneOrMore()] = Field(
+        "0", validate_default=True, description="Coulomb's coefficients of friction."
+    )
+
+
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
@@ -786,6 +864,7 @@ class StudyConfig(Section):
         description="References at finite strain besides the small-strain one, for scenes under pressure, in the group "
         "`/block`. An incompressible material has none in plane strain.",
     )
+    laying: LayingConfig | None = Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`.")
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )
@@ -805,6 +884,8 @@ SECTIONS = {
     "sensitivity": SensitivityConfig,
     "mesh_files.<name>[]": MeshFileConfig,
     "patch": PatchConfig,
+    "laying": LayingConfig,
+    "laying.trapezoid": TrapezoidConfig,
     "grids.<name>": GridConfig,
 }
 """Model of each section of a study, by its place."""
@@ -909,6 +990,18 @@ def _check_names(config, problems):
             for beam in grid.beam:
                 if beam not in grid.force:
                     problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
+    if config.laying:
+        known(("laying", "strip"), "beam", config.laying.strip, config.beams)
+        for key in ("material", "support"):
+            known(("laying", key), "material", getattr(config.laying, key), config.materials)
+        for name in config.laying.definition:
+            if DEFINITIONS[name].needs or 3 not in DEFINITIONS[name].cells:
+                able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+                message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
+                problems.add(("laying", "definition"), f"{message}; choose of {', '.join(able)}")
+        base = config.laying.trapezoid
+        if not base.upper_base < base.lower_base:
+            problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
     calibrated, paper = config.definitions.calibrated, config.definitions.paper
     if calibrated:
         known(("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
@@ -1007,10 +1100,7 @@ def _expand(config, mesh_files, problems):
     """Grids with their scenes and curves, in canonical order."""
     order = _order(_ranks(config))
     beams = {name: Beam(name, beam.length, beam.height, beam.thickness) for name, beam in config.beams.items()}
-    materials = {
-        name: Material(name, material.young_modulus, material.poisson_ratio)
-        for name, material in config.materials.items()
-    }
+    materials = _materials(config)
     forces, grids = {}, []
     for name, grid in config.grids.items():
         scenes, curves, absent = [], [], set()
@@ -1146,6 +1236,41 @@ def _calibrating(config, scenes, problems):
     return curves
 
 
+def _laying(config, materials):
+    """Strips to lay, and their references."""
+    asked = config.laying
+    if not asked:
+        return (), ()
+    beam, base = config.beams[asked.strip], asked.trapezoid
+    parts = {
+        "strip": Strip(beam.length, beam.height, beam.thickness),
+        "trapezoid": Trapezoid(base.lower_base, base.upper_base, base.height),
+        "material": materials[asked.material],
+        "support": materials[asked.support],
+        "pressure": asked.pressure,
+    }
+    labels = list(product(asked.loading, asked.friction))
+    strips = [
+        Laying(**parts, definition=definition, mesh_size=size, loading=loading, friction=friction)
+        for definition in DEFINITIONS
+        if definition in asked.definition
+        for size in sorted(asked.mesh_size)
+        for loading, friction in labels
+    ]
+    references = [
+        Laying(**parts, definition="delingette", mesh_size=asked.reference_size, loading=loading, friction=friction)
+        for loading, friction in labels
+    ]
+    return tuple(strips), tuple(references)
+
+
+def _materials(config):
+    return {
+        name: Material(name, material.young_modulus, material.poisson_ratio)
+        for name, material in config.materials.items()
+    }
+
+
 def _study(config, grids, problems, about):
     """Study of a config and its grids."""
     ranks = _ranks(config)
@@ -1169,6 +1294,12 @@ def _study(config, grids, problems, about):
     moduli = tuple(dict.fromkeys(one for grid in grids for one in grid.moduli))
     axes["poisson_ratio"] = tuple(sorted({one.poisson_ratio for one in moduli}))
     outputs = tuple(name for name in OUTPUTS if name in config.outputs)
+    laying, laying_references = _laying(config, _materials(config))
+    axes["loading"] = tuple(name for name in LOADINGS if any(one.loading == name for one in laying))
+    axes["friction"] = tuple(sorted({one.friction for one in laying}))
+    if "laying" in outputs and not laying:
+        problems.add(("outputs",), "'laying' shows laid strips and the study has none; add a section 'laying'")
+        problems.stop()
     if "block" in outputs and not any(LOADS[scene.load].kind == "face" for scene in scenes):
         problems.add(("outputs",), "'block' shows scenes under pressure and no grid has them; add load 'pressure'")
         problems.stop()
@@ -1188,6 +1319,8 @@ def _study(config, grids, problems, about):
         patch=Beam("patch", config.patch.length, config.patch.height, 1.0) if moduli else None,
         outputs=outputs,
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
+        laying=laying,
+        laying_references=laying_references,
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in _stated(config)},

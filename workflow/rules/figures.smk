@@ -80,6 +80,24 @@ rule figures_block:
         "python -m springtune.stages.figures_block {input.dataset} {params.folder} > {log} 2>&1"
 
 
+rule figures_laying:
+    message:
+        "Drawing the laid strips"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_laying"),
+    output:
+        FIGURES["laying"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_laying.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_laying.tsv"
+    shell:
+        "python -m springtune.stages.figures_laying {input.dataset} {params.folder} > {log} 2>&1"
+
+
 rule figures_all:
     input:
         FIGURES.values(),

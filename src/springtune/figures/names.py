@@ -40,8 +40,8 @@ def of_study(study):
     Returns
     -------
     dict of str to dict
-        ``sensitivity``, ``size``, ``deformed``, ``definitions`` and ``block``, each a dict of selections by stem; empty
-        where the study does not ask for the kind.
+        ``sensitivity``, ``size``, ``deformed``, ``definitions``, ``block`` and ``laying``, each a dict of selections by
+        stem; empty where the study does not ask for the kind.
     """
     curves = [_labels(curve) for curve in study.curves if curve.kinematics == "nonlinear"]
     scenes = [_labels(scene) for scene in study.scenes if scene.kinematics == "nonlinear"]
@@ -51,6 +51,7 @@ def of_study(study):
         "deformed": selections("deformed", DEFORMED, scenes),
         "definitions": definitions(study.axes["load"], study.axes["mesh_type"]),
         "block": {"block": {}},
+        "laying": {"laying": {}},
     }
     return {kind: chosen if kind in study.outputs else {} for kind, chosen in every.items()}
 

@@ -78,6 +78,8 @@ def run(config, folder, output):
         groups["/moduli"] = _moduli(study, folder, axes)
     if any(LOADS[scene.load].kind == "face" for scene in study.scenes):
         groups["/block"] = _block(study, folder, axes)
+    if study.laying:
+        groups["/laying"] = _laying(study, folder, axes)
     if "deformed" in study.outputs:
         groups["/fields"] = _fields(study, folder, axes)
     dataset.write(output, groups, _attributes(study, config))
@@ -272,6 +274,54 @@ def _face_reference(folder, asked, kind):
             "reference_error_estimate": result["error_estimate"],
         }
     return values
+
+
+def _laying(study, folder, axes):
+    """Laid strips, and those of finite elements that they are compared with."""
+    every = {
+        one: store.read(folder / "laying" / f"{tasks.laying_key(one)}.h5", [tasks.laying_key(one)], ["outline"])
+        for one in (*study.laying, *study.laying_references)
+    }
+    results = {one: next(iter(found.values())) for one, found in every.items()}
+    points = max(len(result.get("outline", ())) for result in results.values())
+    axes = axes | {
+        "definition": tuple(dict.fromkeys(one.definition for one in study.laying)),
+        "mesh_size": tuple(sorted({one.mesh_size for one in study.laying})),
+        "outline_point": tuple(range(points)),
+        "corner": tuple(range(4)),
+    }
+    laid = _Filler(dataset.empty(axes, dataset.LAYING_VARIABLES))
+    for one in study.laying:
+        result = results[one]
+        labels = {"definition": one.definition, "mesh_size": one.mesh_size}
+        labels |= {"loading": one.loading, "friction": one.friction}
+        values = {"status": dataset.STATUS.index(result["status"]), "message": result["message"]}
+        if "area" in result:
+            values |= {
+                "load_share": result["load_share"],
+                "iterations": result["iterations"],
+                "laying_seconds": result["seconds"],
+                "skipped": result["skipped"],
+                "penetration": result["penetration"],
+            }
+        if result["status"] == "solved":
+            values |= {
+                "area_under_strip": result["area"],
+                "area_error": result["area"] / one.trapezoid.area - 1,
+                "elongation": result["elongation"],
+                "contact_force_error": result["force_error"] if not one.friction else np.nan,
+            }
+        laid.put(values, **labels)
+        if "outline" in result:
+            laid.put_rows({"strip_x": result["outline"][:, 0], "strip_y": result["outline"][:, 1]}, **labels)
+    for one in study.laying_references:
+        result, labels = results[one], {"loading": one.loading, "friction": one.friction}
+        if result["status"] == "solved":
+            laid.put({"reference_area": result["area"], "reference_elongation": result["elongation"]}, **labels)
+            laid.put_rows({"reference_x": result["outline"][:, 0], "reference_y": result["outline"][:, 1]}, **labels)
+    corners = study.laying[0].trapezoid.corners
+    laid.put({"trapezoid_x": corners[:, 0], "trapezoid_y": corners[:, 1]})
+    return laid.data
 
 
 def _fields(study, folder, axes):

@@ -24,6 +24,9 @@ BUNDLE_SECONDS = 4.0
 SCENE_SECONDS = {"linear": (1.5e-3, 2e-6), "nonlinear": (3e-3, 2e-5), "curve": (5e-3, 4e-5), "moduli": (4e-3, 1e-5)}
 """Rough cost of a scene, curve or moduli, in any case and per particle; it balances bundles and nothing else."""
 
+LAYING_SECONDS = 2.0
+"""Rough cost of laying a strip on a mesh of 1 mm; it grows with the cube of its fineness."""
+
 SEARCH_SECONDS = {"adjoint": (0.5, 2e-3), "annealed": (0.1, 2e-3), "evolved": (0.1, 2e-3)}
 """Rough cost of definitions that search, which they take besides."""
 
@@ -42,7 +45,7 @@ def write_tasks(study, folder, cores):
     Returns
     -------
     dict of str to list of str
-        Labels of the bundles by stage: ``solve`` (also of `mesh`), ``sensitivity`` and ``moduli``.
+        Labels of the bundles by stage: ``solve`` (also of `mesh`), ``sensitivity``, ``moduli`` and ``laying``.
     """
     bundles = _bundles(study, cores)
     tasks = {"reference": _reference(study, folder), "calibrate": _calibrate(study, folder)}
@@ -52,6 +55,8 @@ def write_tasks(study, folder, cores):
         tasks[f"solve_{label}"] = _solve(study, folder, meshes, scenes)
     for label in bundles["sensitivity"]:
         tasks[f"sensitivity_{label}"] = _sensitivity(study, folder, bundles["solve"][label], curves)
+    for label, strips in bundles["laying"].items():
+        tasks[f"laying_{label}"] = {"folder": str(folder / "laying"), "strips": [_laid(one) for one in strips]}
     for label, patches in bundles["moduli"].items():
         tasks[f"moduli_{label}"] = {"folder": str(folder / "moduli"), "patches": patches}
     for name, content in tasks.items():
@@ -81,7 +86,9 @@ def _bundles(study, cores):
     }
     for patch in patches.values():
         del patch["members"]
+    strips = {one: LAYING_SECONDS * (1e-3 / one.mesh_size) ** 3 for one in (*study.laying, *study.laying_references)}
     return {
+        "laying": _shared_out(strips, str, cores),
         "solve": meshes,
         "sensitivity": [label for label, bundle in meshes.items() if curved & set(bundle)],
         "moduli": {
@@ -286,6 +293,15 @@ def _reference(study, folder):
     }
 
 
+def laying_key(one):
+    """Key of a laid strip."""
+    return files.key(asdict(one), _stage_key("laying", "numpy", "scipy"), definition_digest(one.definition))
+
+
+def _laid(one):
+    return {"key": laying_key(one)} | asdict(one)
+
+
 def patch_name(one):
     """File stem of the moduli of a patch."""
     return f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
@@ -394,6 +410,8 @@ def _products(name, content):
         return [folder / f"{reference['name']}.h5" for reference in content["references"]]
     if stage == "moduli":
         return [folder / f"{patch['name']}.h5" for patch in content["patches"]]
+    if stage == "laying":
+        return [folder / f"{strip['key']}.h5" for strip in content["strips"]]
     if stage in ("sensitivity", "solve"):
         return [folder / f"{family['name']}.h5" for family in content["families"]]
     return []

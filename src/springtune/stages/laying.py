@@ -1,0 +1,50 @@
+"""Stage `laying`: strips laid on a trapezoid."""
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from ..laying import Strip, Trapezoid, lay
+from ..materials import Material
+from ..springs import DefinitionError
+from . import files, store
+
+
+def run(tasks, done):
+    """Lay the strips that are not stored yet.
+
+    A strip that does not lie is stored with its status and message; it never stops the others.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder`` and ``strips``, each with ``key`` and what `springtune.laying.lay` takes.
+    done : str or Path
+        JSON file to write: how many were laid.
+    """
+    tasks = files.read_json(tasks)
+    laid = 0
+    for task in tasks["strips"]:
+        path = Path(tasks["folder"]) / f"{task['key']}.h5"
+        if task["key"] not in store.stored(path):
+            store.add(path, {task["key"]: _lay(task)})
+            laid += 1
+    files.write_json(done, {"laid": laid})
+
+
+def _lay(task):
+    try:
+        found = lay(
+            Strip(**task["strip"]), Trapezoid(**task["trapezoid"]), Material(**task["material"]),
+            Material(**task["support"]), task["definition"], task["mesh_size"], loading=task["loading"],
+            pressure=task["pressure"], friction=task["friction"],
+        )  # fmt: skip
+    except DefinitionError as error:
+        return {"status": "failed", "message": f"{task['definition']}: {error}"}
+    except Exception as error:  # the other strips shall still arrive
+        return {"status": "failed", "message": f"{type(error).__name__}: {error}"}
+    return asdict(found) | {"status": "not_converged" if found.message else "solved"}
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])
