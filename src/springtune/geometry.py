@@ -19,3 +19,32 @@ class Beam:
     length: float
     height: float
     thickness: float
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A strip: length along x, height along y and thickness out of the plane [m]."""
+
+    length: float
+    height: float
+    thickness: float
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """A symmetric trapezoid: its bases and height [m]."""
+
+    lower_base: float
+    upper_base: float
+    height: float
+
+    @property
+    def area(self):
+        """Area [m2]."""
+        return 0.5 * (self.lower_base + self.upper_base) * self.height
+
+    @property
+    def corners(self):
+        """Corners, counter-clockwise, the axis at x = 0: pairs of x and y [m]."""
+        low, high = 0.5 * self.lower_base, 0.5 * self.upper_base
+        return [(-low, 0.0), (low, 0.0), (high, self.height), (-high, self.height)]

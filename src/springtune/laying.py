@@ -24,40 +24,8 @@ from .network import Network
 from .springs import DEFINITIONS
 from .statics import FollowerPressure
 
-LOADINGS = ("pressure", "gravity", "ends")
-"""What lays the strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
-
 RIGID = 1e4
 """Ratio of Young's moduli from which the trapezoid counts as rigid."""
-
-
-@dataclass(frozen=True)
-class Strip:
-    """A strip: length along x, height along y and thickness out of the plane [m]."""
-
-    length: float
-    height: float
-    thickness: float
-
-
-@dataclass(frozen=True)
-class Trapezoid:
-    """A symmetric trapezoid: its bases and height [m]."""
-
-    lower_base: float
-    upper_base: float
-    height: float
-
-    @property
-    def area(self):
-        """Area [m2]."""
-        return 0.5 * (self.lower_base + self.upper_base) * self.height
-
-    @property
-    def corners(self):
-        """Corners, counter-clockwise, the axis at x = 0 [m], shape (4, 2)."""
-        low, high = 0.5 * self.lower_base, 0.5 * self.upper_base
-        return np.array([[-low, 0.0], [low, 0.0], [high, self.height], [-high, self.height]])
 
 
 @dataclass(frozen=True)
@@ -116,7 +84,7 @@ def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="str
     mesh_type : str
         Of the strip and the trapezoid, with an even number of cells along the strip.
     loading : str
-        One of `LOADINGS`.
+        One of `springtune.loads.LOADINGS`.
     pressure : float
         Pressure on the upper face, or weight over it [Pa].
     friction : float
@@ -132,7 +100,7 @@ def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="str
     body, mesh = _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pressure)
     skipped = ["unknowns of the floor"]
     if support.young_modulus >= rigid * material.young_modulus:
-        contact = Contact([body], [Obstacle(trapezoid.corners)], floor=True, size=size, friction=friction)
+        contact = Contact([body], [Obstacle(np.array(trapezoid.corners))], floor=True, size=size, friction=friction)
         skipped.append("the trapezoid's deformation: it is rigid beside the strip")
     else:
         below = _support(strip, trapezoid, support, size)

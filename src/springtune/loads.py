@@ -51,5 +51,8 @@ LOADS = {
 }
 """Loads by name."""
 
+LOADINGS = ("pressure", "gravity", "ends")
+"""What lays a strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
+
 KINDS = ("axial", "bending", "shear", "face")
 """Kinds of load; loads of one kind differ by a factor."""

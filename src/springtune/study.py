@@ -20,9 +20,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import units
-from .geometry import Beam
-from .laying import LOADINGS, Strip, Trapezoid
-from .loads import LOADS
+from .geometry import Beam, Strip, Trapezoid
+from .loads import LOADINGS, LOADS
 from .materials import Material
 from .mesh import MESH_TYPES, QUADS
 from .springs import DEFINITIONS
@@ -175,7 +174,7 @@ class Laying:
     mesh_size : float
         Length of an edge [m].
     loading : str
-        One of `springtune.laying.LOADINGS`.
+        One of `springtune.loads.LOADINGS`.
     pressure : float
         Pressure on the strip, or its weight over its upper face [Pa].
     friction : float
@@ -1295,6 +1294,10 @@ def _study(config, grids, problems, about):
     axes["poisson_ratio"] = tuple(sorted({one.poisson_ratio for one in moduli}))
     outputs = tuple(name for name in OUTPUTS if name in config.outputs)
     laying, laying_references = _laying(config, _materials(config))
+    # Groups of a dataset share their dimensions with its root.
+    laid = {one.definition for one in laying}
+    axes["definition"] = tuple(name for name in DEFINITIONS if name in laid or name in axes["definition"])
+    axes["mesh_size"] = tuple(sorted({*axes["mesh_size"], *(one.mesh_size for one in laying)}))
     axes["loading"] = tuple(name for name in LOADINGS if any(one.loading == name for one in laying))
     axes["friction"] = tuple(sorted({one.friction for one in laying}))
     if "laying" in outputs and not laying:

@@ -8,7 +8,8 @@ from netgen.geom2d import SplineGeometry
 from netgen.meshing import MeshingParameters
 
 from springtune.contact import Body, Contact, ContactError, Obstacle, oriented_outline
-from springtune.laying import Strip, Trapezoid, lay
+from springtune.geometry import Strip, Trapezoid
+from springtune.laying import lay
 from springtune.materials import Material
 from springtune.mesh import MESH_TYPES, Mesh, signed_areas
 from springtune.network import Network

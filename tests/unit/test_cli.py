@@ -44,18 +44,18 @@ class TestScenes:
     def test_says_what_grids_share(self, tmp_path):
         text = (CONFIG / "quick.yaml").read_text().replace("printed: paper_tables.csv\n", "")
         grids = text.partition("grids:\n")[2]
-        for name in ("steel", "compression", "transverse", "shear", "rubber"):
+        for name in ("steel", "compression", "transverse", "shear", "pressed", "rubber"):
             grids = grids.replace(f"  {name}:\n", f"  {name} again:\n")
         path = tmp_path / "twice.yaml"
         path.write_text(f"{text}\n{grids}")
         lines = words(run("scenes", path).stdout)
-        assert "scenes 41 82 asked, 41 of them more than once" in lines
+        assert "scenes 49 98 asked, 49 of them more than once" in lines
         assert "steel 24 24 4 1 8" in lines
         assert "steel again 24 0 4 1 8" in lines
 
     def test_bad_study_is_one_message_and_exit_code_1(self, tmp_path):
         path = tmp_path / "bad.yaml"
-        path.write_text((CONFIG / "quick.yaml").read_text().replace("length:", "lenght:"))
+        path.write_text((CONFIG / "quick.yaml").read_text().replace("length:", "lenght:", 1))
         result = run("scenes", path)
         assert result.exit_code == 1
         assert result.stdout == ""

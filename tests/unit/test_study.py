@@ -133,6 +133,8 @@ class TestExpansion:
             "definition": ("paper", "calibrated", "lattice"),
             "kinematics": ("nonlinear", "linear"),
             "poisson_ratio": (),
+            "loading": (),
+            "friction": (),
         }
 
     def test_names(self, load):
@@ -787,3 +789,74 @@ class TestPrinted:
 def test_remarks_of_the_paper_are_few():
     counted = Counter(bool(cell.remark) for cell in load_study(CONFIG / "paper.yaml").printed)
     assert counted == {True: 12, False: 33}
+
+
+class TestPressureAndLaying:
+    PRESSED = """\
+  pressed:
+    beam: short
+    mesh_type: structured
+    mesh_size: 5 mm
+    material: rubber
+    load: [pressure, follower-pressure]
+    pressure: 0.1 MPa
+    definition: area
+"""
+    LAYING = """\
+laying:
+  strip: short
+  trapezoid: {lower_base: 80 mm, upper_base: 50 mm, height: 9 mm}
+  material: rubber
+  support: steel
+  definition: [area, uniform]
+  mesh_size: [2 mm, 1 mm]
+  pressure: 0.02 MPa
+  friction: [0, 0.3]
+"""
+
+    def test_pressure_is_a_force_on_the_face(self, load):
+        study = load(SMALL + self.PRESSED)
+        forces = {scene.load: scene.force for scene in study.scenes if "pressure" in scene.load}
+        assert forces == pytest.approx({"pressure": -0.1e6 * 0.1 * 2e-3, "follower-pressure": -0.1e6 * 0.1 * 2e-3})
+        # A force that follows is no F/k: it has no curve.
+        assert [curve.load for curve in study.curves if "pressure" in curve.load] == ["pressure"]
+
+    def test_strips_and_their_references(self, load):
+        study = load(SMALL.replace("grids:", f"{self.LAYING}grids:"))
+        assert len(study.laying) == 2 * 2 * 2 and len(study.laying_references) == 2
+        first = study.laying[0]
+        assert (first.definition, first.mesh_size, first.loading, first.friction) == ("uniform", 1e-3, "pressure", 0.0)
+        assert first.strip.length == 0.1 and first.trapezoid.area == pytest.approx(585e-6)
+        assert study.axes["friction"] == (0.0, 0.3)
+        assert {0.001, 0.002} <= set(study.axes["mesh_size"]) and "uniform" in study.axes["definition"]
+        assert {one.definition for one in study.laying_references} == {"delingette"}
+
+    @pytest.mark.parametrize(
+        ("change", "expected"),
+        [
+            (("    pressure: 0.1 MPa\n", ""), "'force' is missing; give a force such as '400 kN'"),
+            (
+                ("    pressure: 0.1 MPa\n", "    pressure: 0.1 MPa\n    force: 1 N\n"),
+                "both 'force' and 'pressure'; remove",
+            ),
+            (("[pressure, follower-pressure]", "traction"), "load 'traction' has no pressed side; give 'force'"),
+            (("0.1 MPa", "0.1 N"), "pressure: '0.1 N' is a force; give a stress"),
+            (("strip: short", "strip: shirt"), "laying.strip: unknown beam 'shirt'; did you mean 'short'?"),
+            (("[area, uniform]", "paper"), "laying.definition: 'paper' is for triangles with a reference or a stated"),
+            (("upper_base: 50 mm", "upper_base: 90 mm"), "laying.trapezoid.upper_base: is not below 'lower_base'"),
+            (("[0, 0.3]", "[0, 3]"), "'3' is out of range; give a coefficient from 0 to 2"),
+            (
+                ("  pressure: 0.02", "  loading: push\n  pressure: 0.02"),
+                "unknown loading 'push'; known: pressure, gravity",
+            ),
+        ],
+    )
+    def test_refusals(self, refusal, change, expected):
+        text = SMALL.replace("grids:", f"{self.LAYING}grids:") + self.PRESSED
+        assert change[0] in text
+        assert expected in refusal(text.replace(*change, 1))
+
+    @pytest.mark.parametrize(("output", "words"), [("block", "load 'pressure'"), ("laying", "section 'laying'")])
+    def test_outputs_need_what_they_show(self, refusal, output, words):
+        message = refusal(SMALL.replace("grids:", f"outputs: {output}\ngrids:"))
+        assert f"outputs: '{output}' shows" in message and words in message

@@ -37,6 +37,26 @@ def test_root_has_the_names_of_the_contract(tree):
     assert list(root.status.attrs["flag_values"]) == [0, 1, 2, 3, 4, 5]
 
 
+def test_block_and_laying_have_the_names_of_the_contract(tree):
+    block, laid = tree["block"].to_dataset(), tree["laying"].to_dataset()
+    place = {"beam": "100x20", "material": "rubber", "mesh_type": "structured", "mesh_size": 5e-3}
+    pressed = block.sel(place | {"kinematics": "linear"})
+    area = pressed.face_displacement.sel(definition="area", load="pressure").item()
+    small = pressed.reference_face_displacement.sel(load="pressure", reference="small-strain-plane-stress").item()
+    finite = pressed.reference_face_displacement.sel(load="pressure", reference="neo-hooke-plane-stress").item()
+    assert area < 0 and area == pytest.approx(small, rel=0.12)  # four rows
+    assert finite == pytest.approx(small, rel=0.1) and finite != small
+    # Linear kinematics know no other place than that at rest: the pressure follows nothing.
+    assert area == pressed.face_displacement.sel(definition="area", load="follower-pressure").item()
+    assert tree.displacement.sel(place).sel(
+        definition="area", load="pressure", kinematics="linear"
+    ).item() == area  # fmt: skip
+    strip = laid.sel(definition="area", mesh_size=2e-3, loading="pressure", friction=0)
+    assert abs(strip.area_error.item()) <= 0.01 and strip.penetration.item() <= 1e-3
+    assert abs(strip.elongation.item() - strip.reference_elongation.item()) <= 0.01
+    assert "rigid" in strip.skipped.item()
+
+
 def test_every_variable_has_units_and_a_long_name(tree):
     for group in tree.subtree:
         for name, variable in group.to_dataset(inherit=False).variables.items():
@@ -57,7 +77,7 @@ def test_what_was_asked_for_is_solved_and_nothing_else(tree):
     meanings = np.array(root.status.attrs["flag_meanings"].split())[root.status.values]
     assert set(np.unique(meanings)) == {"not_requested", "solved"}
     assert (root.displacement.notnull() == (root.status == 1)).all()
-    assert int((root.status == 1).sum()) == 24 + 2 + 6 + 3 + 6
+    assert int((root.status == 1).sum()) == 24 + 2 + 6 + 3 + 8 + 6
     assert (root.residual.where(root.status == 1, 0) <= 1e-10).all()
     assert (root.reference_error_estimate.max() <= 1e-4).all()
 

@@ -284,12 +284,7 @@ def _laying(study, folder, axes):
     }
     results = {one: next(iter(found.values())) for one, found in every.items()}
     points = max(len(result.get("outline", ())) for result in results.values())
-    axes = axes | {
-        "definition": tuple(dict.fromkeys(one.definition for one in study.laying)),
-        "mesh_size": tuple(sorted({one.mesh_size for one in study.laying})),
-        "outline_point": tuple(range(points)),
-        "corner": tuple(range(4)),
-    }
+    axes = axes | {"outline_point": tuple(range(points)), "corner": tuple(range(4))}
     laid = _Filler(dataset.empty(axes, dataset.LAYING_VARIABLES))
     for one in study.laying:
         result = results[one]
@@ -319,7 +314,7 @@ def _laying(study, folder, axes):
         if result["status"] == "solved":
             laid.put({"reference_area": result["area"], "reference_elongation": result["elongation"]}, **labels)
             laid.put_rows({"reference_x": result["outline"][:, 0], "reference_y": result["outline"][:, 1]}, **labels)
-    corners = study.laying[0].trapezoid.corners
+    corners = np.array(study.laying[0].trapezoid.corners)
     laid.put({"trapezoid_x": corners[:, 0], "trapezoid_y": corners[:, 1]})
     return laid.data
 

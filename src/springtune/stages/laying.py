@@ -4,7 +4,8 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from ..laying import Strip, Trapezoid, lay
+from ..geometry import Strip, Trapezoid
+from ..laying import lay
 from ..materials import Material
 from ..springs import DefinitionError
 from . import files, store

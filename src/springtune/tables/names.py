@@ -1,5 +1,7 @@
 """Which tables a study has: one a load, mesh type and material, as in the paper; and those that compare definitions."""
 
+from ..loads import LOADS
+
 TABLE = ("load", "mesh_type", "material")
 
 DEFINITIONS = ("definitions.csv", "moduli.csv", "which_definition.md")
@@ -25,5 +27,7 @@ def of_study(study):
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
     stems = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
+    stems += ["block"] if any(LOADS[scene.load].kind == "face" for scene in study.scenes) else []
+    stems += ["laying"] if study.laying else []
     files = {"tables": [*(f"{name}.csv" for name in stems), "index.html"], "definitions": list(DEFINITIONS)}
     return {kind: names if kind in study.outputs else [] for kind, names in files.items()}

@@ -35,8 +35,13 @@ def write(tree, folder):
         loader=jinja2.PackageLoader("springtune", "tables"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     page = environment.get_template("page.html")
+    groups = {"block": _block, "laying": _laying}
+    further = [table(tree[name].to_dataset()) for name, table in groups.items() if name in tree]
+    written |= {f"{table['stem']}.csv": _csv(table["rows"]) for table in further}
     kinematics = [str(name) for name in root.kinematics.values]
-    written["index.html"] = page.render(tables=tables, kinematics=kinematics, attributes=tree.attrs, missing=np.nan)
+    written["index.html"] = page.render(
+        tables=tables, further=further, kinematics=kinematics, attributes=tree.attrs, missing=np.nan
+    )
     Path(folder).mkdir(parents=True, exist_ok=True)
     for name, text in written.items():
         unfinished = Path(folder) / f"{name}.unfinished"
@@ -91,6 +96,61 @@ def _row(cell, beam, size):
             row[f"{name}_message"] = str(one.message.item())
     row["remark"] = str(cell.paper_remark.item())
     return row
+
+
+def _block(block):
+    """Middle of the pressed face, every definition, mesh, material and kinematics."""
+    rows = []
+    dimensions = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
+    for place in _cells(block.face_displacement, dimensions):
+        cell = block.sel(place)
+        reference = cell.isel(reference=0)
+        rows.append(
+            {name: place[name] for name in ("material", "load", "mesh_type", "definition", "kinematics")}
+            | {
+                "mesh_size_mm": 1e3 * place["mesh_size"],
+                "network_mm": 1e3 * float(cell.face_displacement),
+                "reference_mm": 1e3 * float(reference.reference_face_displacement),
+                "error_percent": 100 * float(reference.face_error),
+            }
+        )
+    note = (
+        "Displacement of the middle of the pressed face along the load, against small strain; other references are in "
+        "the dataset. The paper prints 3.14 mm by finite elements, 4.1 mm for springs of 800 N/m and 3.25 mm for "
+        "1000 N/m."
+    )
+    return {"stem": "block", "title": "The pressed block (section 4.1)", "note": note, "rows": rows}
+
+
+def _laying(laid):
+    """Strips laid on the trapezoid."""
+    rows = []
+    for place in _cells(laid.area_under_strip, ("loading", "friction", "mesh_size", "definition")):
+        cell = laid.sel(place)
+        rows.append(
+            {name: place[name] for name in ("loading", "friction", "definition")}
+            | {
+                "mesh_size_mm": 1e3 * place["mesh_size"],
+                "area_mm2": 1e6 * float(cell.area_under_strip),
+                "area_error_percent": 100 * float(cell.area_error),
+                "elongation_percent": 100 * float(cell.elongation),
+                "reference_elongation_percent": 100 * float(cell.reference_elongation),
+                "penetration_per_mesh_size": float(cell.penetration),
+            }
+        )
+    note = (
+        "Area between strip and floor and elongation of the strip's lower fibre. The paper prints 600.04 mm² (+2.57 %) "
+        "and 4.17 % for its network, 585.62 mm² and 0.54 % for finite elements; the trapezoid has 585 mm²."
+    )
+    return {"stem": "laying", "title": "The laid strip (section 4.2)", "note": note, "rows": rows}
+
+
+def _cells(values, dimensions):
+    """Labels of the cells that have a value."""
+    stacked = values.transpose(*dimensions)
+    labels = [stacked[name].values.tolist() for name in dimensions]
+    for place in np.argwhere(np.isfinite(stacked.values)):
+        yield {name: label[i] for name, label, i in zip(dimensions, labels, place)}
 
 
 def _csv(rows):
