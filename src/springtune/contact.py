@@ -44,6 +44,9 @@ SMALLEST_STEP = 1e-4
 SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
 """Resistance to any motion that is tried in turn to make a tangent definite, over its mean diagonal."""
 
+CHANGES = 4
+"""How often a Newton step may change which contacts it takes for closed."""
+
 FRICTION_TOLERANCE = 1e-6
 """As `TOLERANCE`, where friction lags a step behind."""
 
@@ -417,28 +420,32 @@ class Contact:
         return [part + answer @ forces for part, answer in zip(free, answers)], forces
 
     def _closed(self, tangents, missing, rows, gaps, closed):
-        """Newton step with the contacts that were closed; None where others close, or one of them pulls.
+        """Newton step with the contacts that were closed; None where it is not clear which ones are.
 
         Its tangent needs to be definite on what the closed contacts leave free, no more: the step of a true Newton
-        method, where `_opening` adds resistance.
+        method, where `_opening` adds resistance. Contacts that pull are opened and those that close are added, a few
+        times over.
         """
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
-        conditions = csc_array(np.vstack([row[:, closed] for row in rows]))
-        count = conditions.shape[1]
-        # Two corners may close one gap: a hair of compliance lets them share its force.
-        corner = -1e-10 / scale * eye_array(count, format="csc")
-        matrix = block_array([[block_diag(tangents), -conditions], [-conditions.T, corner]], format="csc")
-        right = np.concatenate([*missing, gaps[closed]])
-        answer = splu(matrix).solve(right)
+        stacked, stiffness = np.vstack(rows), block_diag(tangents)
         sizes = np.cumsum([len(part) for part in missing])
-        steps = np.split(answer[: sizes[-1]], sizes[:-1])
-        forces = np.zeros(len(gaps))
-        forces[closed] = answer[sizes[-1] :]
-        left = gaps + sum(row.T @ part for row, part in zip(rows, steps))
-        pulls = forces < -1e-9 * max(np.abs(forces).max(initial=0.0), 1e-300)
-        if not np.isfinite(answer).all() or pulls.any() or (left < -1e-9 * self.size)[~closed].any():
-            return None
-        return steps, np.maximum(forces, 0.0)
+        for _ in range(CHANGES):
+            conditions = csc_array(stacked[:, closed])
+            # Two corners may close one gap: a hair of compliance lets them share its force.
+            corner = -1e-10 / scale * eye_array(conditions.shape[1], format="csc")
+            matrix = block_array([[stiffness, -conditions], [-conditions.T, corner]], format="csc")
+            answer = splu(matrix).solve(np.concatenate([*missing, gaps[closed]]))
+            if not np.isfinite(answer).all():
+                return None
+            forces = np.zeros(len(gaps))
+            forces[closed] = answer[sizes[-1] :]
+            left = gaps + stacked.T @ answer[: sizes[-1]]
+            pulls = closed & (forces < -1e-9 * np.abs(forces).max(initial=0.0))
+            closes = ~closed & (left < -1e-9 * self.size)
+            if not pulls.any() and not closes.any():
+                return np.split(answer[: sizes[-1]], sizes[:-1]), np.maximum(forces, 0.0)
+            closed = (closed & ~pulls) | closes
+        return None
 
     def _known(self, contacts):
         """Contact forces of the step before on the corners that are still near [N], shape (n_contacts,)."""
