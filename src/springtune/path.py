@@ -158,8 +158,9 @@ def trace(problem, weights, targets):
         middle = left[len(left) // 2]
         found = problem.newton(targets[middle], problem.rest.predict(targets[middle]), MAX_STEPS)
         refused[middle] = True
-        if not found.converged:
-            break
+        if not found.converged:  # nor will loads beyond it; nearer ones may
+            refused |= np.abs(targets) >= np.abs(targets[middle])
+            continue
         values[middle], errors[middle] = np.tensordot(found.displacements, weights, axes=2), found.residual
         if len(left) > 1:
             try:
