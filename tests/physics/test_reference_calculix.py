@@ -30,13 +30,13 @@ def calculix(folder, beam, material, force, size, kind="axial"):
     # Corners counter-clockwise, then the middles of the sides from the first corner on.
     steps = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
     elements = np.stack([first + di * count + dj for di, dj in steps], axis=1)
-    shear = kind == "shear"
-    end = number[used & (j == 2 * rows if shear else i == 2 * columns)]
-    clamp = number[used & (j == 0 if shear else i == 0)]
-    along = 2 if kind == "bending" else 1
+    shear, face = kind == "shear", kind == "face"
+    end = number[used & (j == 2 * rows if shear or face else i == 2 * columns)]
+    clamp = number[used & (j == 0 if shear or face else i == 0)]
+    along = 2 if kind in ("bending", "face") else 1
     rollers = "END, 2, 2\n" if shear else ""
     # An even traction on quadratic sides: 1/6, 4/6, 1/6 of a side's share.
-    sides = columns if shear else rows
+    sides = columns if shear or face else rows
     weights = np.zeros(2 * sides + 1)
     for side in range(sides):
         weights[2 * side : 2 * side + 3] += np.array([1, 4, 1]) / (6 * sides)
@@ -71,6 +71,8 @@ U
     subprocess.run(["ccx", "beam"], cwd=folder, check=True, capture_output=True)
     table = re.findall(r"^\s*(\d+)\s+(\S+)\s+(\S+)\s+\S+\s*$", (folder / "beam.dat").read_text(), re.MULTILINE)
     found = {int(row[0]): float(row[along]) for row in table}
+    if face:  # its middle
+        return found[end[len(end) // 2]]
     return sum(weight * found[node] for node, weight in zip(end, weights, strict=True))
 
 
@@ -107,3 +109,10 @@ def test_transverse_loads(tmp_path, kind, nu, close):
     # Even elements of 2 mm, too stiff at the corners of the clamp; in shear it is four times as long.
     assert theirs == pytest.approx(ours.displacement, rel=close)
     assert theirs < ours.displacement
+
+
+def test_pressed_block(tmp_path):
+    material = Material("rubber", 1e6, 0.49)
+    theirs = calculix(tmp_path, BEAM, material, -20.0, 2.5e-3, "face")
+    ours = solve_small_strain(BEAM, material, -20.0, kind="face")
+    assert theirs == pytest.approx(ours.displacement, rel=3e-4)
