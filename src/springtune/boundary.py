@@ -49,9 +49,8 @@ def weights(mesh, kind):
         Sum 1 along the force, zero across.
     """
     edges, across = loaded_edges(mesh, kind)
-    share = np.abs(mesh.points[edges[:, 1], across] - mesh.points[edges[:, 0], across])
     field = np.zeros(mesh.points.shape)
-    np.add.at(field[:, 1 if kind in ("bending", "face") else 0], edges, 0.5 * share[:, None])
+    field[:, 1 if kind in ("bending", "face") else 0] = mesh.side_shares(edges, across)
     return field / field.sum()
 
 

@@ -15,6 +15,7 @@ a rigid one has no unknowns at all, a floor neither.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import nnls
@@ -105,7 +106,7 @@ class Body:
         self.outline = oriented_outline(network.mesh)
         self.neighbours = neighbours(self.outline)
         self.displacements = np.zeros(network.held.shape)
-        self.factorisations, self._factor = 0, None
+        self._factorised = self._solve = None
 
     @property
     def points(self):
@@ -131,32 +132,34 @@ class Body:
         more : sparse matrix, optional
             Stiffness to add [N/m].
         """
-        network = self.network
-        tangent = network.tangent(None if self.moves_little else self.displacements)
-        if self.pressure is not None and not self.moves_little:
-            s = share * self.force / self.reference
-            turning = network._pattern.cell_entries(self.pressure.edges, self.pressure.derivative)
-            tangent = network._pattern.matrix(tangent.data - s * turning)
-            # A pressure on a side with free ends is not quite conservative; the minimum needs a symmetric matrix.
-            tangent = 0.5 * (tangent + tangent.T)
-        tangent = self.reference * tangent
-        return (tangent if more is None else tangent + more).tocsc()
+        if self.moves_little:
+            tangent = self._rest_tangent
+        else:
+            follower = None if self.pressure is None else (share * self.force / self.reference, self.pressure)
+            tangent = self.network.tangent(self.displacements, follower)
+            if follower:
+                # A pressure on a side with free ends is not quite conservative; the minimum needs a symmetric matrix.
+                tangent = 0.5 * (tangent + tangent.T)
+            tangent = (self.reference * tangent).tocsc()
+        return tangent if more is None else (tangent + more).tocsc()
+
+    @cached_property
+    def _rest_tangent(self):
+        return (self.reference * self.network.tangent()).tocsc()
 
     def factorise(self, tangent):
-        """Function that solves with a tangent [m/N], made definite where it is not."""
-        if self._factor is not None:
-            return self._factor
+        """Function that solves with a tangent [m/N], made definite where it is not; the last one is kept."""
+        if self._factorised is tangent:
+            return self._solve
         scale = float(np.abs(tangent.diagonal()).mean())
         # A little resistance to any motion: free bodies are held by contact alone, which the tangent does not know.
         for added in SHIFTS:
             matrix = (tangent + added * scale * eye_array(tangent.shape[0], format="csc")).tocsc()
             factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-            self.factorisations += 1
             if not (factor.U.diagonal() < 0).any():
                 break
-        if self.moves_little:
-            self._factor = factor.solve
-        return factor.solve
+        self._factorised, self._solve = tangent, factor.solve
+        return self._solve
 
 
 @dataclass
@@ -257,7 +260,7 @@ class Contact:
         self.bodies, self.obstacles = list(bodies), list(obstacles)
         self.floor, self.size, self.friction = floor, size, friction
         self.all = self.bodies + self.obstacles
-        self.iterations, self.share, self.steps = 0, 0.0, 0
+        self.iterations, self.share = 0, 0.0
         self.contacts, self.forces = None, np.zeros(0)
         self._anchor = [body.displacements.copy() for body in self.bodies]
 
@@ -324,7 +327,7 @@ class Contact:
             met = np.flatnonzero(contacts.targets == number)
             for end, weight in ((0, 1 - contacts.shares[met]), (1, contacts.shares[met])):
                 full[contacts.edges[met, end], :, met] -= weight[:, None] * directions[met]
-            columns.append(full.reshape(body.network.held.size, count)[body.network._pattern.places])
+            columns.append(full.reshape(body.network.held.size, count)[~body.network.held.ravel()])
         return columns
 
     @property
@@ -361,7 +364,6 @@ class Contact:
                     raise ContactError(f"no equilibrium beyond {100 * self.share:.3g} % of the load")
                 continue
             self.share += step
-            self.steps += 1
             self._anchor = [body.displacements.copy() for body in self.bodies]
             if count <= 12:
                 step *= 2.0
@@ -481,9 +483,7 @@ class Contact:
             unit = np.eye(2)
             change = np.block([[-unit, unit], [-unit, 0 * unit]])
             matrices = -forces[met][:, None, None] * (change.T @ curvature @ change)
-            # Twice the same edge may be met; the pattern is that of the springs.
-            pattern = body.network._pattern
-            parts[number] = pattern.matrix(pattern.entries(edges, matrices))
+            parts[number] = body.network.stiffness_of(edges, matrices)
         return parts
 
     def _friction(self, contacts, forces):
@@ -505,10 +505,9 @@ class Contact:
 
     def contact_force(self):
         """Sum of the contact forces on the bodies from obstacles and floor [N], shape (2,)."""
-        total = np.zeros(2)
         bodies = len(self.bodies)
         outer = (self.contacts.owners < bodies) & ((self.contacts.targets < 0) | (self.contacts.targets >= bodies))
-        total += (self.forces[outer, None] * self.contacts.normals[outer]).sum(axis=0)
+        total = (self.forces[outer, None] * self.contacts.normals[outer]).sum(axis=0)
         inner = (self.contacts.owners >= bodies) & (self.contacts.targets >= 0)
         return total - (self.forces[inner, None] * self.contacts.normals[inner]).sum(axis=0)
 

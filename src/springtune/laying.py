@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .contact import Body, Contact, ContactError, Obstacle
-from .mesh import MESH_TYPES, Mesh, signed_areas
+from .mesh import MESH_TYPES, Mesh
 from .network import Network
 from .springs import DEFINITIONS
 from .statics import FollowerPressure
@@ -146,10 +146,8 @@ def _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pre
         top = mesh.outline_edges(1, mesh.points[:, 1].max())
         arguments = {"pressure": FollowerPressure(mesh, top, 0), "force": -total}
     elif loading == "gravity":
-        shares = np.zeros(len(mesh.points))
-        for count, corners in mesh.cells.items():
-            np.add.at(shares, corners, signed_areas(mesh.points, corners)[:, None] / count)
-        arguments = {"forces": np.stack([0 * shares, -total * shares / shares.sum()], axis=1)}
+        weights = -total * mesh.particle_areas / mesh.area
+        arguments = {"forces": np.stack([np.zeros(len(weights)), weights], axis=1)}
     else:
         low = np.abs(mesh.points[:, 1] - trapezoid.height) <= 1e-9 * trapezoid.height
         ends = low & (np.abs(np.abs(mesh.points[:, 0]) - 0.5 * strip.length) <= 1e-9 * strip.length)

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .mesh import ROW_HEIGHT, lattice, row_height
+from .mesh import ISOSCELES, ROW_HEIGHT, lattice, row_height
 from .network import Network
 
 
@@ -39,8 +39,7 @@ def patch_mesh(made, mesh_type, length, height, size):
     Mesh
     """
     heights = {"structured": ROW_HEIGHT * size}
-    for name in ("isosceles-0.3", "isosceles-0.5"):
-        heights[name] = row_height(size, float(name.partition("-")[2]))
+    heights |= {name: row_height(size, nu) for name, nu in ISOSCELES.items()}
     if mesh_type not in heights:
         return made(length, height, size)
     cells, rows = max(1, round(length / size)), max(1, round(height / heights[mesh_type]))
@@ -165,7 +164,5 @@ def lateral_forces(mesh):
     forces = np.zeros(mesh.points.shape)
     y = mesh.points[:, 1]
     for value, sign in ((y.min(), -1.0), (y.max(), 1.0)):
-        edges = mesh.outline_edges(1, value)
-        share = np.abs(mesh.points[edges[:, 1], 0] - mesh.points[edges[:, 0], 0])
-        np.add.at(forces[:, 1], edges, sign * 0.5 * share[:, None])
+        forces[:, 1] += sign * mesh.side_shares(mesh.outline_edges(1, value), 0)
     return forces

@@ -118,13 +118,15 @@ class Network:
         springs = 0.5 * float(self.stiffness @ elongations**2)
         return springs + sum(energy.value(displacements) for energy in self.energies)
 
-    def tangent(self, displacements=None):
-        """Derivative of the resistance by the unknowns [1], a sparse symmetric matrix.
+    def tangent(self, displacements=None, follower=None):
+        """Derivative of the resistance by the unknowns [1], a sparse matrix, symmetric but for a pressure's part.
 
         Parameters
         ----------
         displacements : ndarray of float, shape (n_points, 2), optional
             Where it is taken; at rest without.
+        follower : tuple of float and FollowerPressure, optional
+            A pressure and what it acts on, whose own derivative is taken off.
         """
         if displacements is None:
             vectors, ratio = self.rest_vectors, np.ones(len(self.rest_lengths))
@@ -142,7 +144,21 @@ class Network:
         for number, energy in enumerate(self.energies):
             matrices = self._rest_tangents[number] if displacements is None else energy.tangent(displacements)
             data += self._pattern.cell_entries(energy.corners, matrices)
+        if follower is not None:
+            s, load = follower
+            data -= s * self._pattern.cell_entries(load.edges, load.derivative)
         return self._pattern.matrix(data)
+
+    def stiffness_of(self, particles, matrices):
+        """Sparse matrix [as `matrices`] of stiffnesses of groups of joined particles, in the place of the tangent's.
+
+        Parameters
+        ----------
+        particles : ndarray of int, shape (n, m)
+            Particles of each group, any two of which are joined by a spring.
+        matrices : ndarray of float, shape (n, 2 m, 2 m)
+        """
+        return self._pattern.matrix(self._pattern.entries(particles, matrices))
 
     @cached_property
     def rest_factor(self):
@@ -157,7 +173,7 @@ class Network:
         displacements : ndarray of float, shape (n_points, 2), optional
             Where it is taken; at rest without.
         follower : tuple of float and FollowerPressure, optional
-            A pressure and what it acts on, whose own derivative is taken off.
+            As in `tangent`.
 
         Returns
         -------
@@ -168,10 +184,7 @@ class Network:
         SingularError
             If the tangent is singular.
         """
-        matrix = self.tangent(displacements)
-        if follower is not None:
-            s, load = follower
-            matrix = self._pattern.matrix(matrix.data - s * self._pattern.cell_entries(load.edges, load.derivative))
+        matrix = self.tangent(displacements, follower)
         try:
             lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError as error:

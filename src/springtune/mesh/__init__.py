@@ -8,21 +8,23 @@ from .free import free
 from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
 from .squares import alternating, braced, right
 
+ISOSCELES = {f"isosceles-{nu:g}": nu for nu in (0.3, 0.5)}
+"""Mesh types of rows whose shape sets a Poisson's ratio, and that ratio [1]."""
+
 MESH_TYPES = {
     "structured": structured,
     "free": free,
     "right": right,
     "alternating": alternating,
     "braced": braced,
-    "isosceles-0.3": partial(isosceles, poisson_ratio=0.3),
-    "isosceles-0.5": partial(isosceles, poisson_ratio=0.5),
-}
+} | {name: partial(isosceles, poisson_ratio=nu) for name, nu in ISOSCELES.items()}
 """Mesh type -> function (length, height, size) that makes it."""
 
 QUADS = ("braced",)
 """Mesh types of quadrilaterals; the others are of triangles."""
 
 __all__ = [
+    "ISOSCELES",
     "MESH_TYPES",
     "QUADS",
     "ROW_HEIGHT",

@@ -116,6 +116,21 @@ class Mesh:
             total += np.bincount(self.cell_edges[count].ravel(), np.ravel(part), len(total))
         return total
 
+    @cached_property
+    def particle_areas(self):
+        """Share of each particle in the area of its cells [m2], shape (n_points,)."""
+        shares = np.zeros(len(self.points))
+        for count, corners in self.cells.items():
+            np.add.at(shares, corners, signed_areas(self.points, corners)[:, None] / count)
+        return shares
+
+    def side_shares(self, edges, axis):
+        """Share of each particle in the extent of edges along an axis [m], shape (n_points,): half of each edge's."""
+        shares = np.zeros(len(self.points))
+        extent = np.abs(self.points[edges[:, 1], axis] - self.points[edges[:, 0], axis])
+        np.add.at(shares, edges, 0.5 * extent[:, None])
+        return shares
+
     def outline_edges(self, coordinate, value):
         """Outline edges that lie on a line ``x = value`` or ``y = value``.
 

@@ -9,7 +9,7 @@ from .cells import Mesh, no_cells, signed_areas
 CELLS = {"triangle": 3, "quad": 4}
 """Corners of the cells that can be read, by meshio's name."""
 
-PLANE = ("line", "vertex")
+LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
 
@@ -69,7 +69,7 @@ def read_mesh(path, unit=1.0):
     for block in content.cells:
         if block.type in CELLS:
             cells.setdefault(CELLS[block.type], []).append(block.data)
-        elif block.type not in PLANE:
+        elif block.type not in LEFT_OUT:
             raise MeshError(f"{path}: has cells '{block.type}'; write linear triangles and quadrilaterals only")
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")

@@ -3,8 +3,6 @@
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from ..mesh import signed_areas
-
 
 def interpolate(x, y, displacements, points):
     """Displacements between the points of a grid, by cubic splines.
@@ -50,8 +48,7 @@ def field_error(mesh, displacements, reference):
     float
         Integrals are sums over the particles, each with its share of the area of its cells.
     """
-    shares = np.zeros(len(mesh.points))
-    for count, corners in mesh.cells.items():
-        np.add.at(shares, corners, signed_areas(mesh.points, corners)[:, None] / count)
-    difference, size = (shares @ (field**2).sum(axis=1) for field in (displacements - reference, reference))
+    difference, size = (
+        mesh.particle_areas @ (field**2).sum(axis=1) for field in (displacements - reference, reference)
+    )
     return float(np.sqrt(difference / size))
