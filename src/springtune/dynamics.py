@@ -1,0 +1,637 @@
+"""Masses, dampers and time: networks in motion.
+
+A network whose loads, stiffnesses and energies are over a reference stiffness k moves as
+``(m/k) u'' + (c/k) u' + r(u) = s p``: masses enter as inertia m/k [s2], dampers as c/k [s], and frequencies and steps
+are in seconds all the same.
+
+Explicit schemes never assemble or factorise anything but, for a linear network, its rows. Their steps are bounded before
+the run by `Motion.step_limit`; where the bound is not kept, and in every other case of a run that came to nothing, the
+status and the message of a `Run` say so.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import cg, eigsh, splu
+
+from .network import Network
+from .statics import TOLERANCE
+
+EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
+"""Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
+it comes with, to first order; that of central differences half a step earlier. `central-difference` takes damping in
+proportion to mass implicitly; dampers along springs lag by half a step in all of them."""
+
+IMPLICIT = ("backward-euler", "implicit-midpoint")
+"""Implicit schemes: the first one in the manner of SOFA, one linear solve a step, the second one of second order."""
+
+INTEGRATORS = (*EXPLICIT, *IMPLICIT)
+
+LAGGED = ("symplectic-euler", "central-difference-lagged")
+"""Schemes in which all damping lags, and narrows the step."""
+
+REST = 1e-8
+"""Out-of-balance force over the load, and speed over that of free fall, at which a run is at rest."""
+
+CHECK = 64
+"""Steps between looks at an explicit run: a look costs about two steps."""
+
+BLOWN_UP = 1e3
+"""Displacement over the largest of the network's extents beyond which a run has left its model."""
+
+
+def masses(mesh, density, thickness):
+    """Lumped mass of each particle [kg], shape (n_points,): a cell of area A gives ``rho A t / n`` to its n corners.
+
+    The total is exact; the centre is that of the body for triangles and parallelograms (the paper's equation 1).
+
+    Parameters
+    ----------
+    mesh : Mesh
+    density : float
+        [kg/m3]
+    thickness : float
+        [m]
+    """
+    return density * thickness * mesh.particle_areas
+
+
+def centre(mesh, masses):
+    """Centre of mass [m], shape (2,)."""
+    return masses @ mesh.points / masses.sum()
+
+
+def rayleigh(ratios, frequencies):
+    r"""Damping in proportion to mass and stiffness that has given ratios at two frequencies.
+
+    .. math:: \xi(\omega) = \frac{\alpha}{2 \omega} + \frac{\beta \omega}{2}
+
+    Parameters
+    ----------
+    ratios : tuple of float
+        Damping ratios [1].
+    frequencies : tuple of float
+        Their angular frequencies [rad/s].
+
+    Returns
+    -------
+    mass_damping, stiffness_damping : float
+        alpha [1/s] and beta [s].
+
+    Raises
+    ------
+    ValueError
+        If the frequencies are equal, or the damping that comes out is negative: the run would gain energy.
+    """
+    (first, second), (low, high) = ratios, frequencies
+    if low == high:
+        raise ValueError(f"two damping targets at one frequency, {low:g} rad/s; give two frequencies")
+    alpha, beta = np.linalg.solve([[0.5 / low, 0.5 * low], [0.5 / high, 0.5 * high]], [first, second])
+    if alpha < 0 or beta < 0:
+        raise ValueError(
+            f"ratios {first:g} and {second:g} at {low:g} and {high:g} rad/s need negative damping (alpha = {alpha:.3g} "
+            f"1/s, beta = {beta:.3g} s); give ratios nearer to each other or frequencies farther apart"
+        )
+    return float(alpha), float(beta)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What became of a run.
+
+    Attributes
+    ----------
+    displacements, velocities : ndarray of float, shape (n_points, 2)
+        Where it ended [m], [m/s].
+    status : str
+        ``"rest"``, ``"moving"`` (all steps are done), ``"diverged"`` or ``"inverted"``.
+    message : str
+        What went wrong and what to do; empty where nothing did.
+    steps : int
+    time : float
+        [s]
+    residual : float
+        Out-of-balance force over the load at the end [1]; over the reference stiffness without a load [m].
+    samples : ndarray of float, shape (n, 4)
+        Time [s], energy over the reference stiffness [m2], and momentum over it [m s]; only where asked for.
+    """
+
+    displacements: np.ndarray
+    velocities: np.ndarray
+    status: str
+    message: str
+    steps: int
+    time: float
+    residual: float
+    samples: np.ndarray
+
+
+class Motion:
+    """A network with masses, dampers and a load.
+
+    Parameters
+    ----------
+    network : Network
+    inertia : ndarray of float, shape (n_points,)
+        Mass of each particle over the reference stiffness [s2].
+    load : ndarray of float, shape (n_points, 2), optional
+        Force on each particle over the reference stiffness [m]; none without.
+    mass_damping : float, optional
+        Damping over mass, alpha [1/s].
+    dampers : ndarray of float, shape (n_springs,), optional
+        Damping of each spring along its direction over the reference stiffness [s]; ``beta * network.stiffness`` is
+        damping in proportion to the springs' stiffness.
+    linear : bool, optional
+        Whether the network has linear kinematics.
+
+    Raises
+    ------
+    ValueError
+        If a particle that can move has no mass, or a damping is negative.
+    """
+
+    def __init__(self, network, inertia, load=None, mass_damping=0.0, dampers=None, linear=False):
+        self.network, self.linear = network, linear
+        self.load = np.zeros(network.held.shape) if load is None else load
+        self.mass_damping, self.dampers = mass_damping, dampers
+        self.inertia = np.repeat(np.asarray(inertia, dtype=float)[:, None], 2, axis=1)
+        bad = int((~(self.inertia > 0) & ~network.held).any(axis=1).sum())
+        if bad:
+            raise ValueError(f"{bad} particles can move and have no mass; remove particles without cells from the mesh")
+        if mass_damping < 0 or (dampers is not None and (dampers < 0).any()):
+            raise ValueError("a damping is negative, and a run would gain energy; give 0 or more")
+
+    # -- before a run -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def mass(self):
+        """Inertia of each unknown [s2], shape (unknowns,)."""
+        return self.network.reduce(self.inertia)
+
+    @cached_property
+    def stiffness_matrix(self):
+        """Tangent at rest [1]."""
+        return self.network.tangent()
+
+    @cached_property
+    def damper_matrix(self):
+        """Matrix of the dampers along springs at rest [s]; None without any."""
+        if self.dampers is None:
+            return None
+        return Network(self.network.mesh, self.network.held, self.dampers, like=self.network).tangent()
+
+    @cached_property
+    def particle_bound(self):
+        """Bound of the highest frequency from each particle's springs alone [rad/s]: above `omega_max`, never below.
+
+        ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `local_bounds`.
+        """
+        return float(np.sqrt((local_bounds(self.network) / self.inertia)[~self.network.held].max()))
+
+    @cached_property
+    def omega_max(self):
+        """Highest frequency at rest [rad/s], by Lanczos' method: nothing is factorised."""
+        root = diags_array(1.0 / np.sqrt(self.mass))
+        return float(np.sqrt(_largest(root @ self.stiffness_matrix @ root)[0]))
+
+    def step_limit(self, integrator):
+        r"""Largest stable step about rest [s]; infinite for implicit schemes.
+
+        Without damping that lags it is :math:`2/\omega_{max}`. With such damping, steps h are stable as long as
+        :math:`4 M - 2 h C - h^2 K` has no negative eigenvalue; for one mode of damping ratio xi that is
+        :math:`(2/\omega)(\sqrt{1 + \xi^2} - \xi)`.
+
+        Parameters
+        ----------
+        integrator : str
+            One of `INTEGRATORS`.
+        """
+        if integrator in IMPLICIT:
+            return np.inf
+        alpha = self.mass_damping if integrator in LAGGED else 0.0
+        if self.dampers is None:
+            # All modes share alpha, so the highest one goes first.
+            xi = 0.5 * alpha / self.omega_max
+            return 2 / self.omega_max * (np.sqrt(1 + xi**2) - xi)
+        root = diags_array(1.0 / np.sqrt(self.mass))
+        stiffness, damping = (root @ matrix @ root for matrix in (self.stiffness_matrix, self.damper_matrix))
+        step, start = 2 / self.omega_max, None
+        for _ in range(40):
+            # At the vector that is worst at one step, the step at which it would just be stable.
+            _, start = _largest(2 * step * damping + step**2 * stiffness, start)
+            k, c = start @ (stiffness @ start), start @ (damping @ start) + alpha
+            previous, step = step, (np.sqrt(c * c + 4 * k) - c) / k
+            if abs(step - previous) <= 1e-9 * step:
+                break
+        return float(step)
+
+    @cached_property
+    def loaded_frequency(self):
+        """Lowest frequency that the load excites [rad/s]: of the mode with the largest share in the static answer.
+
+        By Lanczos' method from that answer, which a symmetric load keeps among the modes that it excites; one
+        factorisation.
+        """
+        factor, load = self.network.rest_factor, self.network.reduce(self.load)
+        if not load.any():
+            raise ValueError("no load, so no mode is loaded; give a load or a damping")
+        basis = []
+        vector = factor.solve(load)
+        for _ in range(min(12, len(load))):
+            for _ in range(2):
+                for other in basis:
+                    vector = vector - (other @ (self.mass * vector)) * other
+            size = np.sqrt(vector @ (self.mass * vector))
+            if size <= 1e-12 * (np.sqrt(basis[0] @ (self.mass * basis[0])) if basis else 0.0):
+                break
+            basis.append(vector / size)
+            vector = factor.solve(self.mass * basis[-1])
+        basis = np.array(basis)
+        squares, shapes = np.linalg.eigh(basis @ (self.stiffness_matrix @ basis.T))
+        shares = (shapes.T @ (basis @ load)) ** 2 / squares
+        return float(np.sqrt(squares[int(np.argmax(shares))]))
+
+    def critical(self):
+        """This motion with damping in proportion to mass that is critical for the lowest loaded mode."""
+        return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
+
+    # -- mechanics --------------------------------------------------------------------------------------------------
+
+    def missing(self, displacements):
+        """Load less resistance [m], shape (unknowns,)."""
+        resist = self.network.linear_resistance if self.linear else self.network.resistance
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.network.reduce(self.load) - resist(displacements)
+
+    def energy(self, displacements, velocities):
+        """Kinetic energy, plus that of the network, less the work of the load, over the reference stiffness [m2]."""
+        kinetic = 0.5 * float((self.inertia * velocities**2).sum())
+        if self.linear:
+            stored = 0.5 * float((displacements * self.network.linear_forces(displacements)).sum())
+        else:
+            stored = self.network.energy(displacements)
+        return kinetic + stored - float((self.load * displacements).sum())
+
+    def residual(self, displacements):
+        """Out-of-balance force over the load [1], or without a load, over the reference stiffness [m]."""
+        size = np.linalg.norm(self.network.reduce(self.load))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.linalg.norm(self.missing(displacements)) / (size or 1.0))
+
+    # -- a run ------------------------------------------------------------------------------------------------------
+
+    def run(self, integrator, step, steps, start=None, velocities=None, *, rest=None, sample=0, precision="float64",
+            stiffness_damping=0.0, iterations=None, tolerance=1e-5):  # fmt: skip
+        """Move for a number of steps, or until rest.
+
+        Parameters
+        ----------
+        integrator : str
+            One of `INTEGRATORS`.
+        step : float
+            [s]
+        steps : int
+            At most so many.
+        start, velocities : ndarray of float, shape (n_points, 2), optional
+            Where it starts [m], [m/s]; at rest without.
+        rest : float, optional
+            Ends the run where the out-of-balance force is at most this share of the load, and the particles are as
+            slow; it goes on without.
+        sample : int, optional
+            Steps between samples of energy and momentum; none without.
+        precision : str, optional
+            ``"float64"`` or ``"float32"``, of explicit schemes.
+        stiffness_damping : float, optional
+            Rayleigh's beta of ``backward-euler`` [s].
+        iterations : int, optional
+            Conjugate-gradient iterations of each step of ``backward-euler``, in place of a factorisation.
+        tolerance : float, optional
+            Relative residual at which they end earlier; SOFA's default.
+
+        Returns
+        -------
+        Run
+        """
+        if integrator not in INTEGRATORS:
+            raise ValueError(f"unknown integrator '{integrator}'; known: {', '.join(INTEGRATORS)}")
+        if not (step > 0 and np.isfinite(step)):
+            raise ValueError(f"a step of {step} s; give one above zero")
+        shape = self.network.held.shape
+        u = np.zeros(shape) if start is None else np.array(start, dtype=float)
+        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
+        v[self.network.held] = 0.0
+        if integrator in EXPLICIT:
+            stepper = _Explicit(self, integrator, step, precision)
+        elif integrator == "backward-euler":
+            stepper = _BackwardEuler(self, step, stiffness_damping, iterations, tolerance)
+        else:
+            stepper = _Midpoint(self, step)
+        stepper.begin(u, v)
+        pace = sample or (CHECK if integrator in EXPLICIT else 1)
+        extent = BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
+        done, samples, status, message = 0, [], "moving", ""
+        while True:
+            u, v = stepper.state()
+            size = np.abs(u).max()
+            if not np.isfinite(size) or size > extent or not np.isfinite(v).all():
+                status, message = "diverged", self._why(integrator, step, done)
+                break
+            if stepper.failed:
+                status, message = "diverged", f"{stepper.failed} in step {done}; take a smaller step"
+                break
+            if sample:
+                momentum = (self.inertia * v).sum(axis=0)
+                samples.append([done * step, self.energy(u, v), *momentum])
+            if rest is not None and done and self._at_rest(u, v, rest):
+                status = "rest"
+                break
+            if done >= steps:
+                break
+            count = min(pace, steps - done)
+            stepper.advance(count)
+            done += count
+        residual = self.residual(u)
+        if status != "diverged" and self.network.inverted(u):
+            status, message = (
+                "inverted",
+                f"triangles are inverted after {done} steps; use a smaller load or finer steps",
+            )
+        if status == "moving" and rest is not None:
+            message = f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
+        return Run(u, v, status, message, done, done * step, residual, np.array(samples).reshape(-1, 4))
+
+    def _at_rest(self, u, v, rest):
+        if self.residual(u) > rest:
+            return False
+        # Speed that the load would give its particles in free fall through the static displacement.
+        work = abs(float((self.load * u).sum())) or 1.0
+        return 0.5 * float((self.inertia * v**2).sum()) <= rest**2 * work
+
+    def _why(self, integrator, step, done):
+        limit = self.step_limit(integrator)
+        if step > limit:
+            return (
+                f"diverged within {done} steps: a step of {step:.3g} s is above the stable one of {limit:.3g} s; "
+                f"take at most {0.9 * limit:.2g} s"
+            )
+        return f"diverged within {done} steps though the step is stable about rest; use a smaller step or load"
+
+
+def local_bounds(network):
+    """Sums of stiffness about each direction of each particle over the reference stiffness, shape (n_points, 2).
+
+    The largest of them over the masses is a bound of the highest frequency squared: by Gershgorin's theorem, in blocks
+    of particles for springs, in rows of the rest tangent where there are other energies.
+    """
+    if network.energies:
+        return network.expand(np.asarray(abs(network.tangent()).sum(axis=1)).ravel())
+    sums = sum(2 * np.bincount(ends, np.abs(network.stiffness), len(network.held)) for ends in network.mesh.edges.T)
+    return np.repeat(sums[:, None], 2, axis=1)
+
+
+class _Stepper:
+    """State of a run and how it advances."""
+
+    failed = ""
+
+    def begin(self, u, v):
+        self.u, self.v = u, v
+
+    def state(self):
+        return self.u, self.v
+
+
+class _Explicit(_Stepper):
+    def __init__(self, motion, integrator, step, precision):
+        self.motion, self.step = motion, step
+        self.half = integrator != "symplectic-euler"
+        self.kind = np.dtype(precision).type
+        network = motion.network
+        with np.errstate(divide="ignore"):
+            inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
+        half = 0.5 * motion.mass_damping * step
+        if integrator in LAGGED:
+            keep, gain = np.full(inverse.shape, 1 - 2 * half), step * inverse
+        else:
+            keep, gain = np.full(inverse.shape, (1 - half) / (1 + half)), step * inverse / (1 + half)
+        self.inverse = inverse
+        dampers = np.zeros(0) if motion.dampers is None else motion.dampers
+        if motion.linear:
+            from .kernels import advance_matrix as advance
+
+            matrix = motion.stiffness_matrix  # symmetric: its columns are its rows
+            damping = np.zeros(0) if motion.dampers is None else motion.damper_matrix.data
+            self._as = network.reduce
+            self._back = network.expand
+            index = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+            arrays = (matrix.data, damping, *map(network.reduce, (keep, gain, motion.load)))
+        elif network.energies:
+            advance, index, arrays = self._advance_energies, (), (keep, gain, motion.load)
+            self._as = self._back = np.array
+        else:
+            from .kernels import advance_springs as advance
+
+            self._as = self._back = np.array
+            index = (network.first.astype(np.int32), network.second.astype(np.int32))
+            arrays = (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, keep, gain, motion.load)
+        self._function, self._index = advance, index
+        self._arrays = [np.ascontiguousarray(part, dtype=self.kind) for part in arrays]
+
+    def begin(self, u, v):
+        if self.half:  # the velocity half a step before the start
+            v = v - 0.5 * self.step * self._acceleration(u, v)
+        self.u = np.ascontiguousarray(self._as(u), dtype=self.kind)
+        self.v = np.ascontiguousarray(self._as(v), dtype=self.kind)
+        self.force = np.zeros_like(self.u)
+
+    def _acceleration(self, u, v):
+        motion = self.motion
+        force = motion.network.expand(motion.missing(u) - _damper_forces(motion, u, v))
+        return force * self.inverse - motion.mass_damping * v
+
+    def advance(self, steps):
+        self._function(*self._index, *self._arrays, self.u, self.v, self.force, self.kind(self.step), steps)
+
+    def _advance_energies(self, keep, gain, load, u, v, force, step, steps):
+        """As the kernels, of a network whose energies are not compiled."""
+        motion = self.motion
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(steps):
+                at, speed = u.astype(float), v.astype(float)
+                missing = motion.missing(at) - _damper_forces(motion, at, speed)
+                v *= keep
+                v += gain * motion.network.expand(missing)
+                u += step * v
+
+    def state(self):
+        u, v = self._back(self.u).astype(float), self._back(self.v).astype(float)
+        if self.half and np.isfinite(v).all() and np.isfinite(u).all():
+            with np.errstate(over="ignore", invalid="ignore"):
+                v = v + 0.5 * self.step * self._acceleration(u, v)
+        return u, v
+
+
+def _damper_forces(motion, u, v):
+    """Forces of the dampers along springs, shape (unknowns,)."""
+    if motion.dampers is None:
+        return 0.0
+    network = motion.network
+    if motion.linear:
+        return motion.damper_matrix @ network.reduce(v)
+    along = network.rest_vectors + network.stretch(u)
+    rate = np.einsum("ij,ij->i", along, network.stretch(v)) / np.einsum("ij,ij->i", along, along)
+    return -network.gather((motion.dampers * rate)[:, None] * along)
+
+
+class _BackwardEuler(_Stepper):
+    r"""One linear solve a step, as SOFA's EulerImplicitSolver does.
+
+    .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
+    """
+
+    def __init__(self, motion, step, stiffness_damping, iterations, tolerance):
+        self.motion, self.step, self.beta = motion, step, stiffness_damping
+        self.iterations, self.tolerance = iterations, tolerance
+        self.solve = None
+
+    def advance(self, steps):
+        motion, network, h = self.motion, self.motion.network, self.step
+        for _ in range(steps):
+            if self.solve is None or not motion.linear:
+                self.stiffness = motion.stiffness_matrix if motion.linear else network.tangent(self.u)
+                extra = motion.damper_matrix
+                mass = diags_array(motion.mass * (1 + h * motion.mass_damping))
+                matrix = mass + h * (h + self.beta) * self.stiffness + (0 if extra is None else h * extra)
+                self.solve = self._solver(csc_array(matrix))
+            v = network.reduce(self.v)
+            right = motion.missing(self.u) - (h + self.beta) * (self.stiffness @ v)
+            right -= motion.mass_damping * motion.mass * v
+            if motion.dampers is not None:
+                right -= motion.damper_matrix @ v
+            v = v + self.solve(h * right)
+            self.v = network.expand(v)
+            self.u = self.u + h * self.v
+
+    def _solver(self, matrix):
+        if self.iterations is None:
+            return _factorized(matrix).solve
+        # SOFA's test is of the residual over the right-hand side, as here.
+        return lambda right: cg(matrix, right, rtol=self.tolerance, maxiter=self.iterations)[0]
+
+
+class _Midpoint(_Stepper):
+    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``."""
+
+    def __init__(self, motion, step):
+        self.motion, self.step = motion, step
+        self.factor = None
+
+    def advance(self, steps):
+        motion, network, h = self.motion, self.motion.network, self.step
+        inertia = 2 / h * motion.mass
+        damping = motion.mass_damping * motion.mass
+        load = float(np.linalg.norm(network.reduce(motion.load)))
+        for _ in range(steps):
+            v = network.reduce(self.v)
+            middle, last, fresh = v.copy(), np.inf, self.factor is None
+            for _ in range(40):
+                at = self.u + 0.5 * h * network.expand(middle)
+                missing = motion.missing(at) - inertia * (middle - v) - damping * middle
+                missing -= _damper_forces(motion, at, network.expand(middle))
+                with np.errstate(over="ignore", invalid="ignore"):
+                    size = float(np.linalg.norm(missing))
+                    scale = float(np.linalg.norm(inertia * v)) + float(np.linalg.norm(motion.missing(self.u))) + load
+                if size <= 1e-12 * scale or scale == 0:
+                    break
+                if not np.isfinite(size):
+                    self.failed = "Newton's method diverged"
+                    return
+                if self.factor is None or (size > 0.1 * last and not fresh):
+                    stiffness = motion.stiffness_matrix if motion.linear else network.tangent(at)
+                    extra = 0 if motion.dampers is None else motion.damper_matrix
+                    self.factor = _factorized(csc_array(diags_array(inertia + damping) + extra + 0.5 * h * stiffness))
+                    fresh = True
+                elif size >= last:
+                    if size <= 1e-9 * scale:  # rounding
+                        break
+                    fresh = False
+                middle = middle + self.factor.solve(missing)
+                last = size
+            else:
+                self.failed = "Newton's method did not converge"
+                return
+            self.u = self.u + h * network.expand(middle)
+            self.v = network.expand(2 * middle - v)
+
+
+def _factorized(matrix):
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+def _largest(matrix, start=None):
+    """Largest eigenvalue of a symmetric matrix and its vector."""
+    size = matrix.shape[0]
+    if size < 40:
+        values, vectors = np.linalg.eigh(matrix.toarray())
+        return values[-1], vectors[:, -1]
+    # A fixed start, rough enough to have a share of the highest mode: the same numbers in every run.
+    start = np.random.default_rng(0).standard_normal(size) if start is None else start
+    values, vectors = eigsh(matrix, 1, which="LA", v0=start, tol=1e-8, ncv=min(size - 1, 40))
+    return values[0], vectors[:, 0]
+
+
+# -- dynamic relaxation ------------------------------------------------------------------------------------------------
+
+RELAX_CHECK = 40
+"""Steps between new estimates of the lowest frequency."""
+
+
+def relax(network, load, *, linear=False, tolerance=TOLERANCE, max_steps=200_000):
+    r"""Equilibrium by dynamic relaxation: explicit steps with masses and damping made for it; nothing is factorised.
+
+    Masses of twice the row sums of stiffness make a step of 1 stable and all local frequencies alike; the damping is
+    critical for the frequency :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` of the motion at
+    hand (Underwood, Dynamic relaxation, in: Computational methods for transient analysis, 1983, ch. 5).
+
+    Parameters
+    ----------
+    network : Network
+    load : ndarray of float, shape (n_points, 2)
+        Force on each particle over the reference stiffness [m].
+    linear : bool, optional
+    tolerance : float, optional
+        Out-of-balance force over the load at which it ends.
+    max_steps : int, optional
+
+    Returns
+    -------
+    Run
+        Its time and velocities are those of the made-up masses.
+    """
+    # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
+    inertia = 0.3 * local_bounds(network).max(axis=1, initial=0.0, where=~network.held)
+    motion = Motion(network, inertia, load, linear=linear)
+    u = np.zeros(network.held.shape)
+    v = np.zeros_like(u)
+    done, before = 0, None
+    while done < max_steps:
+        found = motion.run("central-difference", 1.0, RELAX_CHECK, u, v)
+        done += found.steps
+        if found.status == "diverged":
+            return replace(found, steps=done, message="dynamic relaxation diverged; use load steps or Newton's method")
+        u, v = found.displacements, found.velocities
+        if found.residual <= tolerance:
+            inverted = network.inverted(u)
+            message = "triangles are inverted; use a smaller load" if inverted else ""
+            return replace(found, status="inverted" if inverted else "rest", message=message, steps=done)
+        resistance = -motion.missing(u)
+        if before is not None:
+            moved = network.reduce(u) - before[0]
+            work, weight = moved @ (resistance - before[1]), moved @ (network.reduce(motion.inertia) * moved)
+            if work > 0 and weight > 0:
+                motion.mass_damping = 2 * np.sqrt(work / weight)
+        before = network.reduce(u), resistance
+    message = f"not at rest after {max_steps} steps, residual {found.residual:.1e}; take more steps"
+    return replace(found, status="moving", message=message, steps=done)

@@ -1,0 +1,327 @@
+"""Networks in motion: closed forms, limits of the step, orders of convergence, invariants."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from springtune import dynamics
+from springtune.boundary import held, weights
+from springtune.dynamics import EXPLICIT, INTEGRATORS, Motion, centre, masses, rayleigh, relax
+from springtune.materials import Material
+from springtune.mesh import MESH_TYPES, Mesh, lattice
+from springtune.network import Network
+from springtune.springs import DEFINITIONS
+from springtune.springs.lattice import uniform
+from springtune.statics import StaticProblem
+
+STEEL = Material("steel", 210e9, 0.3)
+DENSITY = 7850.0
+THICKNESS = 1e-3
+
+
+def beam(definition="lattice", force=20e3, size=5e-3, mesh_type="structured", length=0.1, **options):
+    """A clamped beam of steel, pulled at its end, with its true masses."""
+    mesh = MESH_TYPES[mesh_type](length, 0.02, size)
+    springs = DEFINITIONS[definition].springs(mesh, STEEL, THICKNESS)
+    network = Network(mesh, held(mesh, "axial"), springs.relative, springs.energies)
+    inertia = masses(mesh, DENSITY, THICKNESS) / springs.reference
+    return Motion(network, inertia, force / springs.reference * weights(mesh, "axial"), **options)
+
+
+def with_(motion, **options):
+    kept = {"load": motion.load, "linear": motion.linear, "dampers": motion.dampers,
+            "mass_damping": motion.mass_damping}  # fmt: skip
+    return Motion(motion.network, motion.inertia[:, 0], **(kept | options))
+
+
+def oscillator(**options):
+    """One particle on one spring along x: a mass of 1 and a stiffness of 1 over the reference, omega = 1."""
+    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    directions = np.array([[True, True], [False, True], [True, True]])
+    stiffness = np.where((mesh.edges == [0, 1]).all(axis=1), 1.0, 0.0)
+    return Motion(Network(mesh, directions, stiffness), np.ones(3), linear=True, **options)
+
+
+# -- masses and dampers ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+def test_masses_have_the_total_and_the_centre_of_the_beam(mesh_type):
+    mesh = MESH_TYPES[mesh_type](0.1, 0.02, 4e-3)
+    found = masses(mesh, DENSITY, THICKNESS)
+    assert found.sum() == pytest.approx(DENSITY * 0.1 * 0.02 * THICKNESS, rel=1e-12)
+    assert centre(mesh, found) == pytest.approx([0.05, 0.01], rel=1e-12)
+
+
+def test_a_quarter_of_a_trapezoid_to_each_corner_moves_its_centre():
+    """The paper's "same inertia centre" holds for parallelograms only: bases 4 and 1, height 1."""
+    mesh = Mesh(np.array([[0, 0], [4, 0], [1, 1], [0, 1]], dtype=float), np.zeros((0, 3), dtype=int),
+                np.array([[0, 1, 2, 3]]))  # fmt: skip
+    assert centre(mesh, masses(mesh, 1.0, 1.0)) == pytest.approx([1.25, 0.5])
+    halves = Mesh(mesh.points, np.array([[0, 1, 2], [0, 2, 3]]))
+    assert centre(halves, masses(halves, 1.0, 1.0)) == pytest.approx([1.4, 0.4])
+
+
+@given(st.floats(0.01, 0.5), st.floats(1.0, 1e6), st.floats(1.5, 50.0))
+def test_rayleigh_damping_meets_its_targets(ratio, low, factor):
+    alpha, beta = rayleigh((ratio, ratio), (low, low * factor))
+    for omega in (low, low * factor):
+        assert alpha / (2 * omega) + beta * omega / 2 == pytest.approx(ratio, rel=1e-9)
+
+
+def test_rayleigh_refuses_what_would_gain_energy():
+    with pytest.raises(ValueError, match="negative damping"):
+        rayleigh((0.01, 0.9), (10.0, 20.0))
+    with pytest.raises(ValueError, match="one frequency"):
+        rayleigh((0.1, 0.1), (10.0, 10.0))
+
+
+def test_a_free_particle_without_mass_is_refused():
+    motion = beam()
+    inertia = motion.inertia[:, 0].copy()
+    inertia[-1] = 0.0
+    with pytest.raises(ValueError, match="have no mass"):
+        Motion(motion.network, inertia)
+
+
+def test_a_negative_damping_is_refused():
+    with pytest.raises(ValueError, match="negative"):
+        oscillator(mass_damping=-1.0)
+
+
+# -- frequencies and steps ---------------------------------------------------------------------------------------------
+
+
+def test_infinite_equilateral_lattice_has_a_highest_frequency_of_6_k_over_m():
+    """A torus of 12 x 12 cells has the wave that is highest (formulas.md, Bloch scan)."""
+    n = 12
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    steps = ((1, 0, 1.0, 0.0), (0, 1, 0.5, np.sqrt(0.75)), (-1, 1, -0.5, np.sqrt(0.75)))
+    edges, vectors = [], []
+    for di, dj, x, y in steps:
+        edges.append(np.stack([i * n + j, (i + di) % n * n + (j + dj) % n], axis=1))
+        vectors.append(np.tile([x, y], (n * n, 1)))
+    edges = np.concatenate(edges)
+    mesh = SimpleNamespace(points=np.zeros((n * n, 2)), edges=edges, edge_lengths=np.ones(len(edges)))
+    network = Network(mesh, np.zeros((n * n, 2), dtype=bool), np.ones(len(edges)))
+    network.rest_vectors = np.concatenate(vectors)
+    motion = Motion(network, np.full(n * n, 1 / 7.0))
+    assert motion.omega_max**2 == pytest.approx(6 * 7.0, rel=1e-6)
+    assert motion.particle_bound**2 == pytest.approx(2 * 6 * 7.0)
+
+
+@pytest.mark.parametrize("definition", ["uniform", "lattice", "area", "delingette"])
+@pytest.mark.parametrize("mesh_type", ["structured", "free"])
+def test_the_bound_by_particles_is_above_the_highest_frequency(definition, mesh_type):
+    motion = beam(definition, mesh_type=mesh_type)
+    dense = motion.stiffness_matrix.toarray() / np.sqrt(np.outer(motion.mass, motion.mass))
+    assert motion.omega_max**2 == pytest.approx(np.linalg.eigvalsh(dense)[-1], rel=1e-8)
+    assert motion.omega_max <= motion.particle_bound <= 2 * motion.omega_max
+
+
+@pytest.mark.parametrize("xi, expected", [(0.05, 0.951), (0.3, 0.744), (1.0, 0.414)])
+def test_limit_of_one_mode_with_lagged_damping(xi, expected):
+    """Numbers of formulas.md; and dampers along springs, by the general way, agree with the formula."""
+    lagged = oscillator(mass_damping=2 * xi).step_limit("central-difference-lagged")
+    assert lagged / 2 == pytest.approx(expected, abs=5e-4)
+    assert oscillator(mass_damping=2 * xi).step_limit("central-difference") == pytest.approx(2.0)
+    dampers = 2 * xi * oscillator().network.stiffness
+    assert oscillator(dampers=dampers).step_limit("central-difference") == pytest.approx(lagged, rel=1e-9)
+
+
+DAMPINGS = {
+    "none": lambda motion: {},
+    "mass": lambda motion: {"mass_damping": 0.6 * motion.omega_max},
+    "springs": lambda motion: {"dampers": 0.3 / motion.omega_max * motion.network.stiffness},
+    "uneven": lambda motion: {
+        "mass_damping": 0.1 * motion.omega_max,
+        "dampers": 0.5 / motion.omega_max * np.random.default_rng(1).uniform(0, 1, len(motion.network.first)),
+    },
+}
+
+
+@pytest.mark.parametrize("linear", [True, False])
+@pytest.mark.parametrize("damping", DAMPINGS)
+@pytest.mark.parametrize("integrator", EXPLICIT)
+def test_limit_of_the_step_is_within_one_percent(integrator, damping, linear):
+    """Below it 1e4 steps from noise stay bounded; above it they diverge."""
+    motion = beam(force=0.0, linear=linear)
+    motion = with_(motion, **DAMPINGS[damping](motion))
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(motion.load.shape) * ~motion.network.held
+    limit = motion.step_limit(integrator)
+    stable = motion.run(integrator, 0.99 * limit, 10_000, noise)
+    assert stable.status == "moving" and np.abs(stable.displacements).max() <= 20 * np.abs(noise).max()
+    growing = motion.run(integrator, 1.01 * limit, 10_000, noise)
+    grown = growing.status != "moving" or np.abs(growing.displacements).max() > 1e3 * np.abs(noise).max()
+    assert grown
+    if linear:
+        assert growing.status == "diverged" and "take at most" in growing.message
+
+
+def test_limit_of_a_network_with_energies_besides_springs():
+    motion = beam("delingette", force=0.0)
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(motion.load.shape) * ~motion.network.held
+    limit = motion.step_limit("central-difference")
+    for linear in (True, False):
+        moving = with_(motion, linear=linear)
+        assert moving.run("central-difference", 0.99 * limit, 2000, noise).status == "moving"
+        assert moving.run("central-difference", 1.01 * limit, 2000, noise).status in ("diverged", "inverted")
+
+
+def test_lowest_loaded_mode_is_the_bars():
+    """Omega = pi c / (2 L) of a clamped bar, c = sqrt(E / rho); its bending modes are lower and not loaded."""
+    motion = beam(size=2e-3)
+    expected = np.pi * np.sqrt(210e9 / DENSITY) / (2 * 0.1)
+    assert motion.loaded_frequency == pytest.approx(expected, rel=0.02)
+    dense = motion.stiffness_matrix.toarray() / np.sqrt(np.outer(motion.mass, motion.mass))
+    lowest = np.sqrt(np.linalg.eigvalsh(dense)[0])
+    assert lowest < 0.5 * motion.loaded_frequency
+
+
+# -- runs --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("linear", [True, False])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_static_limit_is_the_static_solution(integrator, linear):
+    motion = with_(beam(linear=linear)).critical()
+    problem = StaticProblem(motion.network, weights(motion.network.mesh, "axial"))
+    s = motion.load.sum()
+    static = (problem.linear(s) if linear else problem.nonlinear(s)).displacements
+    step = 0.8 * motion.step_limit("symplectic-euler") if integrator in EXPLICIT else 1 / motion.loaded_frequency
+    found = motion.run(integrator, step, 100_000, rest=1e-9)
+    assert found.status == "rest" and not found.message
+    assert np.abs(found.displacements - static).max() <= 1e-6 * np.abs(static).max()
+
+
+@pytest.mark.parametrize("definition", ["lattice", "delingette"])
+@pytest.mark.parametrize("linear", [True, False])
+def test_dynamic_relaxation_ends_in_the_static_solution(definition, linear):
+    motion = beam(definition)
+    problem = StaticProblem(motion.network, weights(motion.network.mesh, "axial"))
+    s = motion.load.sum()
+    static = (problem.linear(s) if linear else problem.nonlinear(s)).displacements
+    found = relax(motion.network, motion.load, linear=linear)
+    assert found.status == "rest" and found.residual <= 1e-10
+    assert np.abs(found.displacements - static).max() <= 1e-6 * np.abs(static).max()
+
+
+@pytest.mark.parametrize(
+    "integrator, order",
+    [("symplectic-euler", 1), ("central-difference", 2), ("central-difference-lagged", 1), ("backward-euler", 1),
+     ("implicit-midpoint", 2)],
+)  # fmt: skip
+@pytest.mark.parametrize("linear", [True, False])
+def test_order_of_convergence(integrator, order, linear):
+    """A damped beam of a few cells, stretched and let go, against a much finer run."""
+    motion = with_(beam(size=0.01, length=0.04, linear=linear), load=None)
+    motion = with_(motion, mass_damping=0.2 * motion.omega_max)
+    points = motion.network.mesh.points
+    start = 0.05 * points * [1.0, -0.3] * ~motion.network.held
+    time = 12 / motion.omega_max
+    exact = motion.run("implicit-midpoint", time / 8192, 8192, start).displacements
+    errors = [np.abs(motion.run(integrator, time / n, n, start).displacements - exact).max() for n in (512, 1024)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize("integrator", ["symplectic-euler", "central-difference", "implicit-midpoint"])
+def test_symplectic_schemes_conserve_energy(integrator):
+    """Half the limit, 1e5 explicit steps: the mean energy of the last tenth is that of the first to 1e-3."""
+    motion = beam(size=0.01)
+    start = StaticProblem(motion.network, weights(motion.network.mesh, "axial")).nonlinear(motion.load.sum())
+    free = with_(motion, load=None)
+    step = 0.5 * free.step_limit("central-difference")
+    steps = 100_000 if integrator in EXPLICIT else 3_000
+    found = free.run(integrator, step, steps, start.displacements, sample=10)
+    energy = found.samples[:, 1]
+    tenth = len(energy) // 10
+    assert abs(energy[-tenth:].mean() / energy[:tenth].mean() - 1) <= 1e-3
+    # Nor does it wander: all of it stays in a band that narrows with the step.
+    assert np.ptp(energy) <= {"symplectic-euler": 0.5, "central-difference": 0.05, "implicit-midpoint": 0.02}[
+        integrator
+    ] * energy.mean()  # fmt: skip
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_free_body_keeps_its_momentum(integrator):
+    mesh = lattice(6, 4)
+    network = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), uniform(mesh))
+    motion = Motion(network, np.ones(len(mesh.points)), dampers=0.1 * uniform(mesh))
+    random = np.random.default_rng(3)
+    velocities = 0.01 * random.standard_normal(mesh.points.shape)
+    found = motion.run(integrator, 0.3, 400, velocities=velocities, sample=50)
+    momentum = found.samples[:, 2:]
+    # Newton's method of the midpoint rule ends at 1e-12 of the forces.
+    assert np.abs(momentum - momentum[0]).max() <= 1e-9
+
+
+def test_time_to_rest_is_shortest_near_critical_damping():
+    motion = beam(linear=True)
+    omega = motion.loaded_frequency
+    step = 0.9 * motion.step_limit("central-difference")
+    steps = {
+        ratio: with_(motion, mass_damping=2 * ratio * omega).run("central-difference", step, 40_000, rest=1e-3).steps
+        for ratio in (0.25, 0.5, 1.0, 2.0, 4.0)
+    }
+    assert min(steps, key=steps.get) == 1.0
+
+
+def test_truncated_conjugate_gradients_stop_short_and_say_so():
+    """Few iterations a step: after the steps in which the direct solver is at rest, they are not."""
+    motion = beam(size=1e-3, linear=True)
+    step = 0.01
+    direct = motion.run("backward-euler", step, 60, rest=1e-6)
+    cut = motion.run("backward-euler", step, 60, rest=1e-6, iterations=10)
+    assert direct.status == "rest"
+    assert cut.status == "moving" and "not at rest" in cut.message and cut.residual > 1e-3
+
+
+def test_single_precision_keeps_six_digits():
+    motion = beam(linear=False).critical()
+    step = 0.8 * motion.step_limit("central-difference")
+    double = motion.run("central-difference", step, 3000).displacements
+    single = motion.run("central-difference", step, 3000, precision="float32").displacements
+    assert 0 < np.abs(single - double).max() <= 1e-4 * np.abs(double).max()
+
+
+@pytest.mark.parametrize("integrator", EXPLICIT)
+def test_explicit_runs_factorise_nothing(integrator, monkeypatch):
+    def refuse(*arguments, **options):
+        raise AssertionError("factorised")
+
+    monkeypatch.setattr(dynamics, "splu", refuse)
+    monkeypatch.setattr("springtune.network.splu", refuse)
+    motion = beam()
+    assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200).status == "moving"
+    assert relax(motion.network, motion.load).status == "rest"
+
+
+def test_a_rest_criterion_ends_a_run():
+    motion = beam().critical()
+    step = 0.8 * motion.step_limit("central-difference")
+    assert motion.run("central-difference", step, 100_000, rest=1e-4).steps < 5000
+
+
+def test_a_turning_point_is_no_rest():
+    """An undamped beam stands still for an instant and passes through balance in another: neither is rest."""
+    motion = beam(linear=True)
+    step = 0.9 * motion.step_limit("central-difference")
+    found = motion.run("central-difference", step, 20_000, rest=0.05)
+    assert found.status == "moving" and "not at rest" in found.message
+
+
+def test_a_run_through_inverted_triangles_is_reported():
+    """Pushed far beyond what springs carry, they pass through each other and come to rest: no answer."""
+    motion = beam(force=-2e6, size=0.01).critical()
+    found = motion.run("central-difference", 0.3 * motion.step_limit("central-difference"), 20_000, rest=1e-6)
+    assert found.status in ("inverted", "diverged") and found.message
+
+
+def test_unknown_integrators_and_steps_are_refused():
+    with pytest.raises(ValueError, match="known: symplectic-euler"):
+        oscillator().run("leapfrog", 0.1, 1)
+    with pytest.raises(ValueError, match="above zero"):
+        oscillator().run("symplectic-euler", 0.0, 1)
