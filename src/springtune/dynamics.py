@@ -4,7 +4,7 @@ A network whose loads, stiffnesses and energies are over a reference stiffness k
 ``(m/k) u'' + (c/k) u' + r(u) = s p``: masses enter as inertia m/k [s2], dampers as c/k [s], and frequencies and steps
 are in seconds all the same.
 
-Explicit schemes never assemble or factorise anything but, for a linear network, its rows. Their steps are bounded before
+Explicit schemes never factorise, and assemble nothing but the rows of a linear network. Their steps are bounded before
 the run by `Motion.step_limit`; where the bound is not kept, and in every other case of a run that came to nothing, the
 status and the message of a `Run` say so.
 """
@@ -186,9 +186,9 @@ class Motion:
     def particle_bound(self):
         """Bound of the highest frequency from each particle's springs alone [rad/s]: above `omega_max`, never below.
 
-        ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `local_bounds`.
+        ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `Network.local_stiffness`.
         """
-        return float(np.sqrt((local_bounds(self.network) / self.inertia)[~self.network.held].max()))
+        return float(np.sqrt((self.network.local_stiffness / self.inertia)[~self.network.held].max()))
 
     @cached_property
     def omega_max(self):
@@ -254,7 +254,7 @@ class Motion:
         return float(np.sqrt(squares[int(np.argmax(shares))]))
 
     def critical(self):
-        """This motion with damping in proportion to mass that is critical for the lowest loaded mode."""
+        """As it is, with damping in proportion to mass that is critical for the lowest loaded mode."""
         return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
 
     # -- mechanics --------------------------------------------------------------------------------------------------
@@ -356,7 +356,7 @@ class Motion:
         if status != "diverged" and self.network.inverted(u):
             status, message = (
                 "inverted",
-                f"triangles are inverted after {done} steps; use a smaller load or finer steps",
+                f"triangles are inverted after {done} steps; use less load or smaller steps",
             )
         if status == "moving" and rest is not None:
             message = f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
@@ -377,18 +377,6 @@ class Motion:
                 f"take at most {0.9 * limit:.2g} s"
             )
         return f"diverged within {done} steps though the step is stable about rest; use a smaller step or load"
-
-
-def local_bounds(network):
-    """Sums of stiffness about each direction of each particle over the reference stiffness, shape (n_points, 2).
-
-    The largest of them over the masses is a bound of the highest frequency squared: by Gershgorin's theorem, in blocks
-    of particles for springs, in rows of the rest tangent where there are other energies.
-    """
-    if network.energies:
-        return network.expand(np.asarray(abs(network.tangent()).sum(axis=1)).ravel())
-    sums = sum(2 * np.bincount(ends, np.abs(network.stiffness), len(network.held)) for ends in network.mesh.edges.T)
-    return np.repeat(sums[:, None], 2, axis=1)
 
 
 class _Stepper:
@@ -611,7 +599,7 @@ def relax(network, load, *, linear=False, tolerance=TOLERANCE, max_steps=200_000
         Its time and velocities are those of the made-up masses.
     """
     # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
-    inertia = 0.3 * local_bounds(network).max(axis=1, initial=0.0, where=~network.held)
+    inertia = 0.3 * network.local_stiffness.max(axis=1, initial=0.0, where=~network.held)
     motion = Motion(network, inertia, load, linear=linear)
     u = np.zeros(network.held.shape)
     v = np.zeros_like(u)

@@ -1,8 +1,8 @@
-"""Compiled inner loops of explicit time steps.
+r"""Compiled inner loops of explicit time steps.
 
 Both advance displacements u and velocities v in place by many steps of
 
-.. math:: v \\leftarrow d \\, v + g \\, (p - r(u) - c(v)), \\qquad u \\leftarrow u + h \\, v
+.. math:: v \leftarrow d \, v + g \, (p - r(u) - c(v)), \qquad u \leftarrow u + h \, v
 
 with d and g given for each direction: g holds the step over the mass, 0 where a direction is held, so that nothing is
 allocated or branched on. In single precision all arrays and the step are single.

@@ -149,6 +149,19 @@ class Network:
             data -= s * self._pattern.cell_entries(load.edges, load.derivative)
         return self._pattern.matrix(data)
 
+    @cached_property
+    def local_stiffness(self):
+        """Sums of stiffness about each direction of each particle over the reference stiffness, shape (n_points, 2).
+
+        No eigenvalue of the stiffness over the masses is above the largest of them over its mass: by Gershgorin's
+        theorem, in blocks of particles for springs, in rows of the rest tangent where there are other energies.
+        """
+        if self.energies:
+            return self.expand(np.asarray(abs(self.tangent()).sum(axis=1)).ravel())
+        count, size = len(self.held), np.abs(self.stiffness)
+        sums = 2 * (np.bincount(self.first, size, count) + np.bincount(self.second, size, count))
+        return np.repeat(sums[:, None], 2, axis=1)
+
     def stiffness_of(self, particles, matrices):
         """Sparse matrix [as `matrices`] of stiffnesses of groups of joined particles, in the place of the tangent's.
 
@@ -190,6 +203,16 @@ class Network:
         except RuntimeError as error:
             raise SingularError(str(error)) from error
         return Factor(lu)
+
+    def largest_stretch(self, displacements):
+        """Largest change of a spring's length over that at rest [1]."""
+        vectors = self.rest_vectors + self.stretch(displacements)
+        return float(np.abs(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)) / self.rest_lengths - 1.0).max())
+
+    def largest_change(self, displacements):
+        """Largest change of a spring's vector over its length at rest [1]."""
+        changes = self.stretch(displacements)
+        return float(np.sqrt(np.einsum("ij,ij->i", changes, changes) / self.rest_lengths**2).max())
 
     def inverted(self, displacements):
         """Whether any cell of the mesh is turned inside out."""

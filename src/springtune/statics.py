@@ -13,10 +13,23 @@ from .network import SingularError
 from .path import Expansion
 
 TOLERANCE = 1e-10
-"""Largest residual of an equilibrium, relative to the load."""
+"""Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
 
 MAX_ITERATIONS = 12
 MAX_HALVINGS = 12
+CORRECTION = 1e-6
+"""Largest estimated error of a solution's displacements: a residual alone says nothing where the stiffness is
+ill-conditioned."""
+
+FRESH = 1e-4
+"""Residual up to which the tangent of an iterate has the inertia of the solution."""
+
+FAR = 0.15
+"""Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
+
+SURPRISE = 0.1
+"""Distance of a spring's vector from where it was expected, over its length, beyond which a load step is halved."""
+
 KEEP_TANGENT = 0.03
 """Share of the residual that a step may leave for its tangent to serve once more."""
 
@@ -39,8 +52,12 @@ class Equilibrium:
         Norm of the out-of-balance force over that of the load [1].
     factor : Factor or None
         The last factorised tangent.
+    factor_residual : float
+        Residual where it was taken.
     reason : str
         Why it did not converge, empty where it did.
+    unstable_share : float
+        Share of the load at which the path to it is unstable [1]; NaN where no such place is known.
     load_share : float
         Largest share of the load at which there is a good equilibrium [1]; 1 where it converged.
     last : ndarray of float, shape (n_points, 2), or None
@@ -52,7 +69,9 @@ class Equilibrium:
     iterations: int
     residual: float
     factor: object
+    factor_residual: float = 0.0
     reason: str = ""
+    unstable_share: float = np.nan
     load_share: float = 1.0
     last: np.ndarray | None = None
 
@@ -141,15 +160,46 @@ class StaticProblem:
         displacements = s * self.slope
         missing = s * self.load - self.network.linear_resistance(displacements)
         residual = float(np.linalg.norm(missing)) / (abs(s) * self.load_norm)
-        converged = residual <= TOLERANCE
-        reason = "" if converged else f"linear solve left a residual of {residual:.1e}"
-        return Equilibrium(displacements, converged, 1, residual, self.rest_factor, reason)
+        correction = self._correction(self.rest_factor, missing, displacements)
+        good = correction <= CORRECTION
+        reason = "" if good else f"ill-conditioned: {correction:.1e} of the displacements is uncertain"
+        return Equilibrium(displacements, not reason, 1, residual, self.rest_factor, reason=reason)
+
+    def _correction(self, factor, missing, displacements):
+        """Estimated error of displacements over their size [1].
+
+        The Newton step that is left, and what rounding of the displacements does to the forces.
+        """
+        rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
+        return _norm(factor.solve(missing + signs * rounding)) / (_norm(displacements.ravel()) or 1.0)
+
+    def negative_pivots(self, s, found):
+        """Number of negative eigenvalues of the tangent at an equilibrium; 0 where it is stable.
+
+        The last factorised tangent answers, unless it was taken too far from the solution.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        found : Equilibrium
+
+        Raises
+        ------
+        SingularError
+            If the tangent is singular, as it is at a limit point.
+        """
+        if found.factor_residual <= FRESH:
+            return found.factor.negative_pivots
+        return self.network.factorize(found.displacements, self.follower and (s, self.follower)).negative_pivots
 
     def nonlinear(self, s):
         """Equilibrium of the network with its springs' full length law.
 
         Newton's method from the series about rest; where that fails, from the linear solution, which next to buckling
-        is the nearer guess; where that fails, in load steps from rest.
+        is the nearer guess; where that fails, in load steps from rest. So are solutions with springs stretched beyond
+        `FAR` of their length: there may be other equilibria, and the one asked for is on the path from rest.
 
         Parameters
         ----------
@@ -168,8 +218,16 @@ class StaticProblem:
             found = self.newton(s, start(s))
             iterations += found.iterations
             if found.converged:
-                return replace(found, iterations=iterations)
+                if self.network.largest_stretch(found.displacements) <= FAR:
+                    return replace(found, iterations=iterations)
+                break
         return self._in_steps(s, iterations)
+
+    def _unstable(self, s, found):
+        try:
+            return self.negative_pivots(s, found) > 0
+        except SingularError:
+            return True
 
     def newton(self, s, start, max_iterations=MAX_ITERATIONS):
         """Newton's method with the exact tangent and a line search on the norm of the residual.
@@ -198,16 +256,16 @@ class StaticProblem:
             missing = s * load - network.resistance(displacements)
             return missing, _norm(missing) / scale
 
-        displacements, factor, factorised, steps = start, None, 0, 0
+        displacements, factor, factorised, steps, taken = start, None, 0, 0, 0.0
         missing, residual = balance(displacements)
         if not np.isfinite(residual) or network.inverted(displacements):
             displacements = np.zeros_like(start)
             missing, residual = s * self.load, 1.0
 
         def end(reason=""):
-            return Equilibrium(displacements, not reason, steps, residual, factor, reason)
+            return Equilibrium(displacements, not reason, steps, residual, factor, taken, reason)
 
-        keep = False
+        keep, stalled = False, 0
         while True:
             if not keep:
                 if factorised == max_iterations:
@@ -216,7 +274,7 @@ class StaticProblem:
                     factor = network.factorize(displacements, self.follower and (s, self.follower))
                 except SingularError:
                     return end("singular tangent")
-                factorised += 1
+                factorised, taken = factorised + 1, residual
             step = network.expand(factor.solve(missing))
             length = 1.0
             for _ in range(MAX_HALVINGS):
@@ -230,28 +288,44 @@ class StaticProblem:
                 if keep:  # the tangent is of an earlier iterate
                     keep = False
                     continue
+                correction = self._correction(factor, missing, displacements)
+                if correction <= CORRECTION:  # rounding hides a smaller residual
+                    return end()
+                if _norm(step) <= CORRECTION * _norm(displacements):
+                    return end(f"ill-conditioned: {correction:.1e} of the displacements is uncertain")
                 return end("line search found no descent")
             steps += 1
             keep = trial_residual <= KEEP_TANGENT * residual
             displacements, missing, residual = trial, trial_missing, trial_residual
             if residual <= TOLERANCE:
-                return end()
+                correction = self._correction(factor, missing, displacements)
+                if correction <= CORRECTION:
+                    return end()
+                if stalled == 3:
+                    return end(f"ill-conditioned: {correction:.1e} of the displacements is uncertain")
+                stalled += 1
 
     def _in_steps(self, s, iterations, smallest=1 / 64):
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
         done, step = 0.0, 0.25  # of the load
         last = before = np.zeros(self.network.held.shape)
-        last_step = None
+        last_step, unstable = None, np.nan
         while True:
             step = min(step, 1.0 - done)
-            guess = last if last_step is None else last + (last - before) * (step / last_step)
+            guess = step * s * self.slope if last_step is None else last + (last - before) * (step / last_step)
             found = self.newton((done + step) * s, guess)
             iterations += found.iterations
-            if found.converged:
+            # Where springs are far from where the path pointed, some of them have snapped.
+            missed = self.network.largest_change(found.displacements - guess) > SURPRISE
+            if found.converged and (step <= smallest or not missed):
+                if missed and np.isnan(unstable):
+                    unstable = done
                 before, last, last_step = last, found.displacements, step
                 done += step
                 if done >= 1.0:
-                    return replace(found, iterations=iterations)
+                    return replace(found, iterations=iterations, unstable_share=unstable)
+                if np.isnan(unstable) and self._unstable(done * s, found):
+                    unstable = done
                 step *= 1.5
             elif step <= smallest:
                 reason = f"{found.reason} beyond {100 * done:.3g} % of the load"

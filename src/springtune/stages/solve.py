@@ -12,7 +12,7 @@ from ..boundary import FACE_POSITIONS, held, loaded_edges, measured, weights
 from ..materials import Material
 from ..mesh import read_mesh
 from ..moduli import lateral_forces
-from ..network import Network
+from ..network import Network, SingularError
 from ..reference.field import field_error, interpolate
 from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import Case
@@ -172,9 +172,17 @@ class Solver:
             result |= self._face(found.displacements)
         if reference is not None:
             result["field_error"] = field_error(self.mesh, found.displacements, scene["force"] * reference)
-        result["negative_pivots"] = pivots = found.factor.negative_pivots
+        try:
+            result["negative_pivots"] = pivots = problem.negative_pivots(s, found)
+        except SingularError:
+            return result | {"status": "unstable", "message": "limit point: the tangent is singular"}
         if pivots:
             message = f"unstable equilibrium: the tangent has {pivots} negative pivot{'s' if pivots > 1 else ''}"
+            result |= {"status": "unstable", "message": message}
+        elif found.unstable_share < 1:
+            message = (
+                f"the path to it is unstable at {100 * found.unstable_share:.3g} % of the load: the beam leaves it"
+            )
             result |= {"status": "unstable", "message": message}
         else:
             result |= {"status": "solved", "message": ""}
