@@ -11,6 +11,7 @@ include: "workflow/rules/sensitivity.smk"
 include: "workflow/rules/solve.smk"
 include: "workflow/rules/moduli.smk"
 include: "workflow/rules/laying.smk"
+include: "workflow/rules/stability.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/tables.smk"
@@ -27,6 +28,7 @@ rule all:
         rules.collect.input.curves,
         rules.collect.input.moduli,
         rules.collect.input.laying,
+        rules.collect.input.stability,
         rules.collect.output,
         rules.figures_all.input,
         TABLES.values(),

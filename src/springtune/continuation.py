@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .network import SingularError
-from .path import _buckling_share
+from .path import smallest_share
 from .statics import TOLERANCE
 
 FEW, MANY = 3, 8
@@ -119,45 +119,39 @@ def _correct(problem, factorize, forces, u, at, du, ds, scale, most=12):
     return None
 
 
-def buckling_load(problem, guess, tolerance=1e-4):
+def buckling_load(problem, guess):
     """Load at which the path from rest loses its stability [m]: force over the reference stiffness.
+
+    A linear buckling analysis about two equilibria shortly below the critical load of the one about rest; the number of
+    negative pivots of the tangent shortly below and above its answer proves it.
 
     Parameters
     ----------
     problem : StaticProblem
     guess : float
         A load of its magnitude and sign.
-    tolerance : float, optional
-        Relative.
 
     Returns
     -------
     float
-        NaN where there is none up to a hundred times the guess.
+        NaN where there is none up to a hundred times the guess, or none that could be proved.
     """
-    small = 1e-3 * guess
-    share = _buckling_share(problem, small)
-    if not share < 1e5:
+    network, small = problem.network, 1e-3 * guess
+    critical = smallest_share(network, None, small * problem.slope, problem.rest_factor) * small
+    if not abs(critical) < 100 * abs(guess):
         return np.nan
-    low, high = 0.0, None
-    at = share * small
-    while high is None or high - low > tolerance * high:
-        factor = at / guess
-        found = problem.nonlinear(at)
-        try:
-            stable = found.converged and problem.negative_pivots(at, found) == 0
-        except SingularError:
-            stable = False
-        if stable:
-            low = factor
-        else:
-            high = factor
-        if high is None:
-            if factor > 100:
-                return np.nan
-            at = 1.05 * factor * guess
-        else:
-            at = (low + high) / 2 * guess if low else 0.95 * factor * guess
-            if high < 1e-6:
-                return np.nan
-    return 0.5 * (low + high) * guess
+    first, second = (problem.newton(share * critical, share * critical * problem.slope) for share in (0.85, 0.95))
+    if not (first.converged and second.converged):
+        return np.nan
+    step = 0.1 * critical
+    share = smallest_share(network, first.displacements, second.displacements)
+    critical = 0.85 * critical + share * step
+
+    def pivots(factor):
+        # The path is all but straight between the two equilibria and here.
+        along = (factor * critical - (critical - share * step)) / step
+        return network.factorize(
+            first.displacements + along * (second.displacements - first.displacements)
+        ).negative_pivots
+
+    return critical if pivots(0.99) < pivots(1.01) else np.nan

@@ -17,23 +17,8 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg, eigsh, splu
 
 from .network import Network
+from .schemes import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED
 from .statics import TOLERANCE
-
-EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
-"""Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
-it comes with, to first order; that of central differences half a step earlier. `central-difference` takes damping in
-proportion to mass implicitly; dampers along springs lag by half a step in all of them."""
-
-IMPLICIT = ("backward-euler", "implicit-midpoint")
-"""Implicit schemes: the first one in the manner of SOFA, one linear solve a step, the second one of second order."""
-
-INTEGRATORS = (*EXPLICIT, *IMPLICIT)
-
-LAGGED = ("symplectic-euler", "central-difference-lagged")
-"""Schemes in which all damping lags, and narrows the step."""
-
-REST = 1e-8
-"""Out-of-balance force over the load, and speed over that of free fall, at which a run is at rest."""
 
 CHECK = 64
 """Steps between looks at an explicit run: a look costs about two steps."""

@@ -15,8 +15,11 @@ class Material:
         Young's modulus E [Pa].
     poisson_ratio : float
         Poisson's ratio nu [1]; 0.5 is legal, since sheets are in plane stress.
+    density : float or None
+        Density rho [kg/m3]; statics need none.
     """
 
     name: str
     young_modulus: float
     poisson_ratio: float
+    density: float | None = None

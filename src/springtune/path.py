@@ -192,7 +192,8 @@ def stable_until(problem, targets):
     """
     by_load = np.argsort(np.abs(targets))
     loads = np.abs(targets)[by_load]
-    critical = _buckling_share(problem, targets[by_load[-1]]) * loads[-1]
+    share = smallest_share(problem.network, None, problem.rest.predict(targets[by_load[-1]]), problem.rest_factor)
+    critical = share * loads[-1]
     result = np.zeros(len(targets), dtype=bool)
     if critical > 2.0 * loads[-1]:
         result[:] = True
@@ -217,17 +218,29 @@ def stable_until(problem, targets):
     return result
 
 
-def _buckling_share(problem, s):
-    """Share of a load at which the beam buckles, were the tangent linear in the load up to there.
+def smallest_share(network, first, second, factor=None):
+    """Where on the line from one tangent to another the first eigenvalue vanishes: 0 at the first, 1 at the second.
 
-    The tangent at share x of the load is then ``K0 + x (K - K0)``, singular first at one over the largest eigenvalue of
-    ``(K0 - K) v = mu K0 v``.
+    The tangent there is ``K1 + x (K2 - K1)``, singular first at one over the largest eigenvalue of
+    ``(K1 - K2) v = mu K1 v``.
+
+    Parameters
+    ----------
+    network : Network
+    first, second : ndarray of float, shape (n_points, 2)
+        Displacements [m]; None at rest.
+    factor : Factor, optional
+        First tangent factorised.
+
+    Returns
+    -------
+    float
+        Infinite where there is no such place.
     """
-    network = problem.network
-    rest = network.tangent()
-    loaded = network.tangent(problem.rest.predict(s))
-    inverse = LinearOperator(rest.shape, problem.rest_factor.solve, dtype=float)
+    here, there = network.tangent(first), network.tangent(second)
+    factor = factor or network.factorize(first)
+    inverse = LinearOperator(here.shape, factor.solve, dtype=float)
     # A fixed start, across the beam, since buckling bends it: the same numbers in every run.
     start = network.reduce(network.mesh.points[:, ::-1] ** 2 * [0.0, 1.0] + 1e-3 * network.mesh.points)
-    largest = eigsh(rest - loaded, 1, rest, which="LA", Minv=inverse, v0=start, tol=1e-3, return_eigenvectors=False)[0]
+    largest = eigsh(here - there, 1, here, which="LA", Minv=inverse, v0=start, tol=1e-4, return_eigenvectors=False)[0]
     return 1.0 / largest if largest > 0 else np.inf

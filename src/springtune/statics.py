@@ -160,15 +160,24 @@ class StaticProblem:
         displacements = s * self.slope
         missing = s * self.load - self.network.linear_resistance(displacements)
         residual = float(np.linalg.norm(missing)) / (abs(s) * self.load_norm)
-        correction = self._correction(self.rest_factor, missing, displacements)
+        correction = self.correction(self.rest_factor, missing, displacements)
         good = correction <= CORRECTION
         reason = "" if good else f"ill-conditioned: {correction:.1e} of the displacements is uncertain"
         return Equilibrium(displacements, not reason, 1, residual, self.rest_factor, reason=reason)
 
-    def _correction(self, factor, missing, displacements):
+    def correction(self, factor, missing, displacements):
         """Estimated error of displacements over their size [1].
 
         The Newton step that is left, and what rounding of the displacements does to the forces.
+
+        Parameters
+        ----------
+        factor : Factor
+            Tangent factorised near them.
+        missing : ndarray of float, shape (unknowns,)
+            Load less resistance [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
         """
         rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
         signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
@@ -193,6 +202,38 @@ class StaticProblem:
         if found.factor_residual <= FRESH:
             return found.factor.negative_pivots
         return self.network.factorize(found.displacements, self.follower and (s, self.follower)).negative_pivots
+
+    def judge(self, s, found):
+        """What an equilibrium is worth.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        found : Equilibrium
+
+        Returns
+        -------
+        status : str
+            ``"solved"``, ``"unstable"`` or ``"not_converged"``.
+        message : str
+            Why it is not solved; empty where it is.
+        negative_pivots : int or float
+            Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
+        """
+        if not found.converged:
+            return "not_converged", f"{found.reason}; last residual {found.residual:.1e}", np.nan
+        try:
+            pivots = self.negative_pivots(s, found)
+        except SingularError:
+            return "unstable", "limit point: the tangent is singular", np.nan
+        if pivots:
+            many = "s" if pivots > 1 else ""
+            return "unstable", f"unstable equilibrium: the tangent has {pivots} negative pivot{many}", pivots
+        if found.unstable_share < 1:
+            share = f"{100 * found.unstable_share:.3g} %"
+            return "unstable", f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
+        return "solved", "", pivots
 
     def nonlinear(self, s):
         """Equilibrium of the network with its springs' full length law.
@@ -288,7 +329,7 @@ class StaticProblem:
                 if keep:  # the tangent is of an earlier iterate
                     keep = False
                     continue
-                correction = self._correction(factor, missing, displacements)
+                correction = self.correction(factor, missing, displacements)
                 if correction <= CORRECTION:  # rounding hides a smaller residual
                     return end()
                 if _norm(step) <= CORRECTION * _norm(displacements):
@@ -298,7 +339,7 @@ class StaticProblem:
             keep = trial_residual <= KEEP_TANGENT * residual
             displacements, missing, residual = trial, trial_missing, trial_residual
             if residual <= TOLERANCE:
-                correction = self._correction(factor, missing, displacements)
+                correction = self.correction(factor, missing, displacements)
                 if correction <= CORRECTION:
                     return end()
                 if stalled == 3:

@@ -24,6 +24,7 @@ from .geometry import Beam, Strip, Trapezoid
 from .loads import LOADINGS, LOADS
 from .materials import Material
 from .mesh import MESH_TYPES, QUADS
+from .schemes import AXES, EXPERIMENTS, ONCE
 from .springs import DEFINITIONS
 from .springs.lattice import COEFFICIENT
 
@@ -39,9 +40,10 @@ MOST_PARTICLES = 5e6
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
 
-OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block", "laying")
+OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block", "laying", "stability")
 """What is made from a dataset: figures of curves, of errors against mesh size and of deformed networks; tables as the
-paper's; figures and tables that compare definitions; the figure of a pressed block, and that of laid strips."""
+paper's; figures and tables that compare definitions; the figure of a pressed block, that of laid strips, and figures
+and the page of the experiments on stability."""
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one, for scenes under pressure."""
@@ -193,6 +195,35 @@ class Laying:
 
 
 @dataclass(frozen=True)
+class Experiment:
+    """An experiment on numerical stability, see `springtune.stability`.
+
+    Attributes
+    ----------
+    name : str
+        Key of `springtune.schemes.EXPERIMENTS`.
+    beam : Beam
+    material : Material
+        With a density.
+    force : float
+        Traction [N].
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_type : str
+    mesh_sizes : tuple of float
+        Lengths of an edge [m], ascending.
+    """
+
+    name: str
+    beam: Beam
+    material: Material
+    force: float
+    definition: str
+    mesh_type: str
+    mesh_sizes: tuple
+
+
+@dataclass(frozen=True)
 class Grid:
     """What one grid of a study asks for, whether or not other grids ask for it, too.
 
@@ -280,6 +311,7 @@ class Study:
     laying : tuple of Laying
     laying_references : tuple of Laying
         Strips of finite elements that the others are compared with: one a loading and friction.
+    stability : tuple of Experiment
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -310,6 +342,7 @@ class Study:
     further_references: tuple
     laying: tuple
     laying_references: tuple
+    stability: tuple
     grids: tuple
     stiffness_ratios: tuple
     stiffness_table: dict
@@ -510,6 +543,7 @@ Length = _quantity("length")
 Force = _quantity("force", "the load's name carries the sign: give a magnitude")
 Stiffness = _quantity("stiffness")
 Stress = _quantity("stress")
+Density = _quantity("density")
 PoissonRatio = _number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
 Ratio = _number("a number above 0", 0, math.inf, above=True)
 Points = _number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
@@ -519,6 +553,7 @@ MeshType = Annotated[
 Load = _one_of("load", LOADS)
 Output = _one_of("output", OUTPUTS)
 Loading = _one_of("loading", LOADINGS)
+ExperimentName = _one_of("experiment", EXPERIMENTS)
 Friction = _number("a coefficient from 0 to 2, such as 0.3", 0, 2)
 FurtherReference = _one_of("reference", FURTHER_REFERENCES)
 Kinematics = _one_of("kinematics", KINEMATICS)
@@ -657,6 +692,7 @@ class MaterialConfig(Section):
     poisson_ratio: PoissonRatio = Field(
         description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress."
     )
+    density: Density | None = Field(None, description="Density rho; for dynamics, statics need none.")
 
 
 class StatedStiffness(Section):
@@ -770,6 +806,27 @@ class LayingConfig(Section):
     )
 
 
+class StabilityConfig(Section):
+    """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    force: Force = Field(description="Traction on the right end.")
+    definition: Annotated[list[DefinitionName], _OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
+        "experiment is not about definitions."
+    )
+    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type of triangles.")
+    mesh_size: Annotated[list[Length], _OneOrMore()] = Field(
+        description="Lengths of an edge; most experiments take the coarsest."
+    )
+    experiment: Annotated[list[ExperimentName], _OneOrMore()] = Field(
+        list(EXPERIMENTS),
+        validate_default=False,
+        description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
+    )
+
+
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
@@ -856,7 +913,8 @@ class StudyConfig(Section):
         validate_default=False,
         description="What is made from the dataset: figures of sensitivity curves, of errors against mesh size, of "
         "deformed networks (and the group `/fields` behind them), tables as the paper's; `definitions`: figures and "
-        "tables that compare definitions. Figures are of nonlinear kinematics.",
+        "tables that compare definitions; `block`, `laying`, `stability`: figures of these groups. Figures of scenes "
+        "are of nonlinear kinematics.",
     )
     further_references: Annotated[list[FurtherReference], _OneOrMore()] = Field(
         [],
@@ -864,6 +922,9 @@ class StudyConfig(Section):
         "`/block`. An incompressible material has none in plane strain.",
     )
     laying: LayingConfig | None = Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`.")
+    stability: StabilityConfig | None = Field(
+        None, description="Experiments on numerical stability; they make the group `/stability`."
+    )
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )
@@ -885,6 +946,7 @@ SECTIONS = {
     "patch": PatchConfig,
     "laying": LayingConfig,
     "laying.trapezoid": TrapezoidConfig,
+    "stability": StabilityConfig,
     "grids.<name>": GridConfig,
 }
 """Model of each section of a study, by its place."""
@@ -1001,6 +1063,8 @@ def _check_names(config, problems):
         base = config.laying.trapezoid
         if not base.upper_base < base.lower_base:
             problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
+    if config.stability:
+        _check_stability(config, known, problems)
     calibrated, paper = config.definitions.calibrated, config.definitions.paper
     if calibrated:
         known(("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
@@ -1018,6 +1082,30 @@ def _check_names(config, problems):
     if not config.sensitivity.start < config.sensitivity.stop:
         start, stop = config.sensitivity.start, config.sensitivity.stop
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
+
+
+def _check_stability(config, known, problems):
+    """Names and numbers of the experiments on stability."""
+    asked = config.stability
+    known(("stability", "beam"), "beam", asked.beam, config.beams)
+    known(("stability", "material"), "material", asked.material, config.materials)
+    if asked.material in config.materials and config.materials[asked.material].density is None:
+        message = f"'{asked.material}' has no density; add one to it under materials, such as density: 7850 kg/m^3"
+        problems.add(("stability", "material"), message)
+    for name in asked.definition:
+        if DEFINITIONS[name].needs or 3 not in DEFINITIONS[name].cells:
+            able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+            message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
+            problems.add(("stability", "definition"), f"{message}; choose of {', '.join(able)}")
+    made = [name for name in MESH_TYPES if name not in QUADS]
+    if asked.mesh_type not in made:
+        message = f"'{asked.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
+        problems.add(("stability", "mesh_type"), message)
+    if asked.beam in config.beams:
+        side = min(config.beams[asked.beam].length, config.beams[asked.beam].height)
+        if max(asked.mesh_size) > 0.3 * side:
+            message = f"{1e3 * max(asked.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
+            problems.add(("stability", "mesh_size"), message)
 
 
 def _mesh_types(config):
@@ -1263,9 +1351,27 @@ def _laying(config, materials):
     return tuple(strips), tuple(references)
 
 
+def _stability(config, materials):
+    """Experiments on stability: one a definition, or one in all."""
+    asked = config.stability
+    if not asked:
+        return ()
+    beam = config.beams[asked.beam]
+    beam = Beam(asked.beam, beam.length, beam.height, beam.thickness)
+    return tuple(
+        Experiment(
+            name, beam, materials[asked.material], asked.force, definition, asked.mesh_type,
+            tuple(sorted(asked.mesh_size)),
+        )
+        for name in EXPERIMENTS
+        if name in asked.experiment
+        for definition in (asked.definition[:1] if name in ONCE else asked.definition)
+    )  # fmt: skip
+
+
 def _materials(config):
     return {
-        name: Material(name, material.young_modulus, material.poisson_ratio)
+        name: Material(name, material.young_modulus, material.poisson_ratio, material.density)
         for name, material in config.materials.items()
     }
 
@@ -1294,14 +1400,20 @@ def _study(config, grids, problems, about):
     axes["poisson_ratio"] = tuple(sorted({one.poisson_ratio for one in moduli}))
     outputs = tuple(name for name in OUTPUTS if name in config.outputs)
     laying, laying_references = _laying(config, _materials(config))
+    stability = _stability(config, _materials(config))
     # Groups of a dataset share their dimensions with its root.
-    laid = {one.definition for one in laying}
-    axes["definition"] = tuple(name for name in DEFINITIONS if name in laid or name in axes["definition"])
-    axes["mesh_size"] = tuple(sorted({*axes["mesh_size"], *(one.mesh_size for one in laying)}))
+    others = {one.definition for one in (*laying, *stability)}
+    axes["definition"] = tuple(name for name in DEFINITIONS if name in others or name in axes["definition"])
+    further = {one.mesh_size for one in laying} | {size for one in stability for size in one.mesh_sizes}
+    axes["mesh_size"] = tuple(sorted({*axes["mesh_size"], *further}))
+    axes |= AXES if stability else {}
     axes["loading"] = tuple(name for name in LOADINGS if any(one.loading == name for one in laying))
     axes["friction"] = tuple(sorted({one.friction for one in laying}))
     if "laying" in outputs and not laying:
         problems.add(("outputs",), "'laying' shows laid strips and the study has none; add a section 'laying'")
+        problems.stop()
+    if "stability" in outputs and not stability:
+        problems.add(("outputs",), "'stability' shows experiments and the study has none; add a section 'stability'")
         problems.stop()
     if "block" in outputs and not any(LOADS[scene.load].kind == "face" for scene in scenes):
         problems.add(("outputs",), "'block' shows scenes under pressure and no grid has them; add load 'pressure'")
@@ -1324,6 +1436,7 @@ def _study(config, grids, problems, about):
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         laying=laying,
         laying_references=laying_references,
+        stability=stability,
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in _stated(config)},

@@ -38,6 +38,7 @@ KINDS = {
         Kind("force", "N", "400 kN"),
         Kind("stiffness", "N/m", "170e6 N/m"),
         Kind("stress", "Pa", "210 GPa"),
+        Kind("density", "kg/m^3", "7850 kg/m^3"),
     )
 }
 """Kinds of quantity by name."""
@@ -47,6 +48,7 @@ COMMON = {
     "force": {"N": "1", "mN": "1e-3", "kN": "1e3", "MN": "1e6"},
     "stiffness": {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6", "N/cm": "1e2"},
     "stress": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/m^2": "1", "N/mm^2": "1e6"},
+    "density": {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"},
 }
 """Usual units of each kind and their size in its SI unit."""
 
@@ -112,7 +114,9 @@ def parse(text, kind):
 
 def _spelling(unit):
     """One spelling of a unit: micro and squares are written in several ways."""
-    return unicodedata.normalize("NFKC", unit.replace("²", "^2")).replace("μ", "u").replace("**", "^")
+    return (
+        unicodedata.normalize("NFKC", unit.replace("²", "^2").replace("³", "^3")).replace("μ", "u").replace("**", "^")
+    )
 
 
 def _article(kind):

@@ -57,6 +57,26 @@ def test_block_and_laying_have_the_names_of_the_contract(tree):
     assert "rigid" in strip.skipped.item()
 
 
+def test_stability_has_the_names_of_the_contract(tree):
+    data = tree["stability"].to_dataset()
+    ratio = data.dt_limit_measured / data.dt_limit_predicted
+    assert int(ratio.notnull().sum()) == 3 * 2 * 3  # explicit schemes, dampers, ratios
+    assert abs(ratio - 1).max() <= 0.01
+    place = {"definition": "delingette", "mesh_size": 5e-3}
+    undamped = data.dt_limit_predicted.sel(place | {"damping_ratio": 0.0, "damper": "mass"})
+    assert data.dt_particle_bound.sel(place) <= undamped.min()
+    assert data.negative_pivots.dims == ("definition", "strain_load", "strain")
+    assert data.negative_pivots.sel(definition="delingette", strain_load="axial", strain=-0.05) >= 1
+    solved = data.strain_status == 1
+    assert solved.any() and data.strain_displacement.where(solved).notnull().sum() == solved.sum()
+    assert (data.strain_message.where(data.strain_status.isin([3, 4]), "why") != "").all()
+    assert (data.contrast_status.sel(stiffness_contrast=1e12) == 3).all()
+    euler = data.buckling_load.sel(definition="delingette") / data.euler_load.sel(definition="delingette")
+    assert abs(euler - 1).max() <= 0.02
+    assert data.dt_limit_predicted.attrs["units"] == "s" and "flag_meanings" in data.strain_status.attrs
+    assert "energy" not in data  # not asked for
+
+
 def test_every_variable_has_units_and_a_long_name(tree):
     for group in tree.subtree:
         for name, variable in group.to_dataset(inherit=False).variables.items():

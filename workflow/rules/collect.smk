@@ -8,6 +8,7 @@ rule collect:
         curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
         scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES["solve"]),
         laying=expand(RESULTS / "done/laying_{bundle}.json", bundle=BUNDLES["laying"]),
+        stability=expand(RESULTS / "done/stability_{bundle}.json", bundle=BUNDLES["stability"]),
         moduli=expand(RESULTS / "done/moduli_{bundle}.json", bundle=BUNDLES["moduli"]),
         printed=STUDY.printed_path or [],
         code=modules("collect"),

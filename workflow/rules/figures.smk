@@ -98,6 +98,24 @@ rule figures_laying:
         "python -m springtune.stages.figures_laying {input.dataset} {params.folder} > {log} 2>&1"
 
 
+rule figures_stability:
+    message:
+        "Drawing the experiments on stability"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_stability"),
+    output:
+        FIGURES["stability"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_stability.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_stability.tsv"
+    shell:
+        "python -m springtune.stages.figures_stability {input.dataset} {params.folder} > {log} 2>&1"
+
+
 rule figures_all:
     input:
         FIGURES.values(),

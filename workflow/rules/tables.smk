@@ -40,3 +40,21 @@ rule tables_definitions:
         RESULTS / "benchmarks/tables_definitions.tsv"
     shell:
         "python -m springtune.stages.tables_definitions {input.dataset} {params.folder} > {log} 2>&1"
+
+
+rule tables_stability:
+    message:
+        "Writing the page of the experiments on stability"
+    input:
+        dataset=rules.collect.output,
+        code=modules("tables_stability"),
+    output:
+        TABLES["stability"],
+    params:
+        folder=str(RESULTS / "tables"),
+    log:
+        RESULTS / "logs/tables_stability.log",
+    benchmark:
+        RESULTS / "benchmarks/tables_stability.tsv"
+    shell:
+        "python -m springtune.stages.tables_stability {input.dataset} {params.folder} > {log} 2>&1"

@@ -40,8 +40,8 @@ def of_study(study):
     Returns
     -------
     dict of str to dict
-        ``sensitivity``, ``size``, ``deformed``, ``definitions``, ``block`` and ``laying``, each a dict of selections by
-        stem; empty where the study does not ask for the kind.
+        ``sensitivity``, ``size``, ``deformed``, ``definitions``, ``block``, ``laying`` and ``stability``, each a dict
+        of selections by stem; empty where the study does not ask for the kind.
     """
     curves = [_labels(curve) for curve in study.curves if curve.kinematics == "nonlinear"]
     scenes = [_labels(scene) for scene in study.scenes if scene.kinematics == "nonlinear"]
@@ -52,6 +52,7 @@ def of_study(study):
         "definitions": definitions(study.axes["load"], study.axes["mesh_type"]),
         "block": {"block": {}},
         "laying": {"laying": {}},
+        "stability": stability(study),
     }
     return {kind: chosen if kind in study.outputs else {} for kind, chosen in every.items()}
 
@@ -61,6 +62,24 @@ def definitions(loads, mesh_types):
     found = {"definitions_moduli": {}}
     found |= {f"definitions_size_{load}": {"load": load} for load in loads}
     return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
+
+
+STABILITY = {
+    "stability_limits": "limits",
+    "stability_maps": "maps",
+    "stability_energy": "drift",
+    "stability_rest": "rest",
+    "stability_meshes": "slivers",
+    "stability_strains": "strains",
+    "stability_buckling": "buckling",
+}
+"""Figures of the experiments on stability and the one that each needs."""
+
+
+def stability(study):
+    """Selections of the figures of the experiments on stability."""
+    done = {one.name for one in study.stability}
+    return {stem: {} for stem, experiment in STABILITY.items() if experiment in done}
 
 
 def _labels(item):

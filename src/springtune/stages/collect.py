@@ -23,7 +23,18 @@ from ..springs.lattice import predicted_stiffness
 from ..study import load_study
 from . import files, store, tasks
 
-SOFTWARE = ("h5netcdf", "h5py", "meshio", "netgen-mesher", "numpy", "scikit-fem", "scipy", "snakemake", "xarray")
+SOFTWARE = (
+    "h5netcdf",
+    "h5py",
+    "meshio",
+    "netgen-mesher",
+    "numba",
+    "numpy",
+    "scikit-fem",
+    "scipy",
+    "snakemake",
+    "xarray",
+)
 
 
 COPIED = (
@@ -64,6 +75,7 @@ def run(config, folder, output):
         values = {
             "material_young_modulus": material.young_modulus,
             "material_poisson_ratio": material.poisson_ratio,
+            "material_density": np.nan if material.density is None else material.density,
         }
         root.put(values, material=material.name)
     _printed(study, root)
@@ -80,6 +92,8 @@ def run(config, folder, output):
         groups["/block"] = _block(study, folder, axes)
     if study.laying:
         groups["/laying"] = _laying(study, folder, axes)
+    if study.stability:
+        groups["/stability"] = _stability(study, folder, axes)
     if "deformed" in study.outputs:
         groups["/fields"] = _fields(study, folder, axes)
     dataset.write(output, groups, _attributes(study, config))
@@ -317,6 +331,27 @@ def _laying(study, folder, axes):
     corners = np.array(study.laying[0].trapezoid.corners)
     laid.put({"trapezoid_x": corners[:, 0], "trapezoid_y": corners[:, 1]})
     return laid.data
+
+
+def _stability(study, folder, axes):
+    """Results of the experiments on stability."""
+    names = tuple(dict.fromkeys(one.name for one in study.stability))
+    variables = dataset.STABILITY_VARIABLES
+    results = {}
+    for one in study.stability:
+        key = tasks.experiment_key(one)
+        results[one] = store.read(folder / "stability" / f"{key}.h5", [key], variables)[key]
+    there = {name for result in results.values() for name in result} | {"experiment_seconds", "experiment_message"}
+    asked = {name: row for name, row in variables.items() if name in there}
+    data = dataset.empty(axes | {"experiment": names}, asked)
+    for one, result in results.items():
+        place = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
+        result["experiment_seconds"] = result.pop("seconds", np.nan)
+        result["experiment_message"] = result.pop("failure", "")
+        for name, values in result.items():
+            array = data[name]
+            array.loc[{dimension: place[dimension] for dimension in array.dims if dimension in place}] = values
+    return data
 
 
 def _fields(study, folder, axes):

@@ -12,7 +12,7 @@ from ..boundary import FACE_POSITIONS, held, loaded_edges, measured, weights
 from ..materials import Material
 from ..mesh import read_mesh
 from ..moduli import lateral_forces
-from ..network import Network, SingularError
+from ..network import Network
 from ..reference.field import field_error, interpolate
 from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import Case
@@ -161,9 +161,9 @@ class Solver:
             "spring_ratio": springs.spring_ratio,
             "load_share": found.load_share if scene["kinematics"] == "nonlinear" else np.nan,
         }
+        status, message, pivots = problem.judge(s, found)
+        result |= {"status": status, "message": message}
         if not found.converged:
-            message = f"{found.reason}; last residual {found.residual:.1e}"
-            result |= {"status": "not_converged", "message": message}
             if found.last is not None:
                 result["last_displacement"] = float(np.tensordot(found.last, self.measured(scene["kind"]), axes=2))
             return result
@@ -172,20 +172,7 @@ class Solver:
             result |= self._face(found.displacements)
         if reference is not None:
             result["field_error"] = field_error(self.mesh, found.displacements, scene["force"] * reference)
-        try:
-            result["negative_pivots"] = pivots = problem.negative_pivots(s, found)
-        except SingularError:
-            return result | {"status": "unstable", "message": "limit point: the tangent is singular"}
-        if pivots:
-            message = f"unstable equilibrium: the tangent has {pivots} negative pivot{'s' if pivots > 1 else ''}"
-            result |= {"status": "unstable", "message": message}
-        elif found.unstable_share < 1:
-            message = (
-                f"the path to it is unstable at {100 * found.unstable_share:.3g} % of the load: the beam leaves it"
-            )
-            result |= {"status": "unstable", "message": message}
-        else:
-            result |= {"status": "solved", "message": ""}
+        result["negative_pivots"] = pivots
         return result | ({"displacements": found.displacements} if self.keep_fields else {})
 
     def _springs(self, scene, stiffness, reference):

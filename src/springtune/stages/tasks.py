@@ -27,6 +27,17 @@ SCENE_SECONDS = {"linear": (1.5e-3, 2e-6), "nonlinear": (3e-3, 2e-5), "curve": (
 LAYING_SECONDS = 2.0
 """Rough cost of laying a strip on a mesh of 1 mm; it grows with the cube of its fineness."""
 
+EXPERIMENT_SECONDS = {
+    "limits": 10.0,
+    "maps": 8.0,
+    "drift": 9.0,
+    "rest": 2.0,
+    "sizes": 3.0,
+    "strains": 2.0,
+    "buckling": 2.0,
+}
+"""Rough cost of the experiments on stability that take more than half a second."""
+
 SEARCH_SECONDS = {"adjoint": (0.5, 2e-3), "annealed": (0.1, 2e-3), "evolved": (0.1, 2e-3)}
 """Rough cost of definitions that search, which they take besides."""
 
@@ -45,7 +56,8 @@ def write_tasks(study, folder, cores):
     Returns
     -------
     dict of str to list of str
-        Labels of the bundles by stage: ``solve`` (also of `mesh`), ``sensitivity``, ``moduli`` and ``laying``.
+        Labels of the bundles by stage: ``solve`` (also of `mesh`), ``sensitivity``, ``moduli``, ``laying`` and
+        ``stability``.
     """
     bundles = _bundles(study, cores)
     tasks = {"reference": _reference(study, folder), "calibrate": _calibrate(study, folder)}
@@ -57,6 +69,9 @@ def write_tasks(study, folder, cores):
         tasks[f"sensitivity_{label}"] = _sensitivity(study, folder, bundles["solve"][label], curves)
     for label, strips in bundles["laying"].items():
         tasks[f"laying_{label}"] = {"folder": str(folder / "laying"), "strips": [_laid(one) for one in strips]}
+    for label, experiments in bundles["stability"].items():
+        folder_of = str(folder / "stability")
+        tasks[f"stability_{label}"] = {"folder": folder_of, "experiments": [_experiment(one) for one in experiments]}
     for label, patches in bundles["moduli"].items():
         tasks[f"moduli_{label}"] = {"folder": str(folder / "moduli"), "patches": patches}
     for name, content in tasks.items():
@@ -87,8 +102,10 @@ def _bundles(study, cores):
     for patch in patches.values():
         del patch["members"]
     strips = {one: LAYING_SECONDS * (1e-3 / one.mesh_size) ** 3 for one in (*study.laying, *study.laying_references)}
+    experiments = {one: EXPERIMENT_SECONDS.get(one.name, 0.5) for one in study.stability}
     return {
         "laying": _shared_out(strips, str, cores),
+        "stability": _shared_out(experiments, str, cores),
         "solve": meshes,
         "sensitivity": [label for label, bundle in meshes.items() if curved & set(bundle)],
         "moduli": {
@@ -242,7 +259,9 @@ def _beam(beam):
 
 
 def _material(material):
-    return asdict(material) | {"name": ""}
+    known = asdict(material) | {"name": ""}
+    del known["density"]  # statics depend on none
+    return known
 
 
 def _by_mesh(items):
@@ -300,6 +319,17 @@ def laying_key(one):
 
 def _laid(one):
     return {"key": laying_key(one)} | asdict(one)
+
+
+def experiment_key(one):
+    """Key of an experiment on stability."""
+    parameters = asdict(one) | {"beam": _beam(one.beam), "material": asdict(one.material) | {"name": ""}}
+    code = _stage_key("stability", "numpy", "scipy", "numba")
+    return files.key(parameters, code, definition_digest(one.definition))
+
+
+def _experiment(one):
+    return {"key": experiment_key(one)} | asdict(one)
 
 
 def patch_name(one):
@@ -412,6 +442,8 @@ def _products(name, content):
         return [folder / f"{patch['name']}.h5" for patch in content["patches"]]
     if stage == "laying":
         return [folder / f"{strip['key']}.h5" for strip in content["strips"]]
+    if stage == "stability":
+        return [folder / f"{one['key']}.h5" for one in content["experiments"]]
     if stage in ("sensitivity", "solve"):
         return [folder / f"{family['name']}.h5" for family in content["families"]]
     return []

@@ -8,13 +8,17 @@ DEFINITIONS = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""
 
 
+STABILITY = "stability.md"
+"""Page of the experiments on stability."""
+
+
 def stem(selection, number=None):
     """Stem of a table's file: the paper's number where it has one, else the labels."""
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
 
 
 def of_study(study):
-    """Files of the tables of a study, by kind: ``tables`` and ``definitions``, empty where it does not ask for them.
+    """Files of the tables of a study, by kind; empty where it does not ask for them.
 
     Parameters
     ----------
@@ -23,11 +27,13 @@ def of_study(study):
     Returns
     -------
     dict of str to list of str
+        ``tables``, ``definitions`` and ``stability``.
     """
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
     stems = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
     stems += ["block"] if any(LOADS[scene.load].kind == "face" for scene in study.scenes) else []
     stems += ["laying"] if study.laying else []
-    files = {"tables": [*(f"{name}.csv" for name in stems), "index.html"], "definitions": list(DEFINITIONS)}
+    files = {"tables": [*(f"{name}.csv" for name in stems), "index.html"]}
+    files |= {"definitions": list(DEFINITIONS), "stability": [STABILITY]}
     return {kind: names if kind in study.outputs else [] for kind, names in files.items()}

@@ -1,0 +1,105 @@
+"""The section `stability` of a study, and its stage."""
+
+import re
+
+import numpy as np
+import pytest
+
+from springtune import stability
+from springtune.dataset import DIMENSIONS, FLAGS, STABILITY_VARIABLES, STATUS
+from springtune.geometry import Beam
+from springtune.materials import Material
+from springtune.schemes import AXES, BEHAVIOURS, EXPERIMENTS, ONCE
+from springtune.stages import code, store
+from springtune.stages.files import write_json
+from springtune.stages.stability import run
+from springtune.study import StudyError, load_study
+
+STUDY = """
+title: One experiment
+beams: {b: {length: 100 mm, height: 20 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}}
+stability:
+  beam: b
+  material: steel
+  force: 20 kN
+  definition: [lattice, delingette]
+  mesh_size: [5 mm, 2.5 mm]
+grids:
+  one: {beam: b, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 20 kN,
+        definition: uniform, sensitivity: false}
+"""
+
+
+def written(folder, text):
+    path = folder / "one.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_experiments_are_one_a_definition_or_one_in_all(tmp_path):
+    found = load_study(written(tmp_path, STUDY))
+    names = [one.name for one in found.stability]
+    assert all(names.count(name) == (1 if name in ONCE else 2) for name in EXPERIMENTS)
+    assert found.stability[0].mesh_sizes == (2.5e-3, 5e-3) and found.stability[0].material.density == 7850.0
+    assert set(found.axes["definition"]) == {"uniform", "lattice", "delingette"}
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        (", density: 7850 kg/m^3", "", "'steel' has no density; add one"),
+        ("density: 7850 kg/m^3", "density: 7850 kg", "give a density such as '7850 kg/m^3'"),
+        ("[lattice, delingette]", "calibrated", "choose of"),
+        ("mesh_size: [5 mm, 2.5 mm]", "mesh_size: 15 mm", "15 mm leaves few particles inside"),
+        ("force: 20 kN\n  definition", "force: 20 kN\n  mesh_type: braced\n  definition", "no mesh type of triangles"),
+        ("force: 20 kN\n  definition", "force: 20 kN\n  experiment: limit\n  definition", "did you mean 'limits'"),
+        ("  beam: b\n  material: steel", "  beam: c\n  material: steel", "unknown beam 'c'"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(tmp_path, old, new, message):
+    assert old in STUDY
+    with pytest.raises(StudyError, match=re.escape(message)):
+        load_study(written(tmp_path, STUDY.replace(old, new, 1)))
+
+
+def test_output_without_experiments_is_refused(tmp_path):
+    text = STUDY[: STUDY.index("stability:")] + "outputs: stability\n" + STUDY[STUDY.index("grids:") :]
+    with pytest.raises(StudyError, match="add a section 'stability'"):
+        load_study(written(tmp_path, text))
+
+
+def test_every_variable_has_its_dimensions_described():
+    own = {name for dimensions, *_ in STABILITY_VARIABLES.values() for name in dimensions}
+    assert own <= set(DIMENSIONS)
+    assert own - {"definition", "mesh_size", "experiment"} == set(AXES)
+    assert FLAGS["behaviour"] == BEHAVIOURS
+    assert all(STATUS[flag] == name for name, flag in stability.STATUS.items())
+
+
+@pytest.mark.parametrize("name", ["contrast", "slivers", "perturbation", "poisson", "strains", "buckling"])
+def test_results_have_the_shapes_of_the_dataset(name):
+    setup = stability.Setup(
+        Beam("b", 0.06, 0.02, 1e-3), Material("steel", 210e9, 0.3, 7850.0), 2e4, "lattice", "structured", (5e-3,)
+    )
+    for variable, values in stability.run(name, setup).items():
+        dimensions = [one for one in STABILITY_VARIABLES[variable][0] if one not in ("definition", "mesh_size")]
+        assert np.shape(values) == tuple(len(AXES[one]) for one in dimensions), variable
+
+
+def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
+    """`braced` has no triangles: the study refuses it, and the stage survives it."""
+    setup = {"beam": {"name": "", "length": 0.1, "height": 0.02, "thickness": 1e-3}, "force": 1.0,
+             "material": {"name": "", "young_modulus": 1e6, "poisson_ratio": 0.3, "density": 1e3},
+             "definition": "lattice", "mesh_type": "braced", "mesh_sizes": [5e-3]}  # fmt: skip
+    tasks = {"folder": str(tmp_path), "experiments": [{"key": "one", "name": "slivers"} | setup]}
+    write_json(tmp_path / "tasks.json", tasks)
+    run(tmp_path / "tasks.json", tmp_path / "done.json")
+    assert store.read(tmp_path / "one.h5", ["one"])["one"]["failure"]
+
+
+def test_static_stages_know_no_dynamics():
+    """A static scene assembles no masses: its stage does not even import them, and density is in none of its keys."""
+    for stage in ("solve", "sensitivity", "moduli", "laying"):
+        assert not any(file.endswith(("dynamics.py", "kernels.py")) for file in code.modules(stage))
+    assert any(file.endswith("dynamics.py") for file in code.modules("stability"))

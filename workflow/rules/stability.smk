@@ -1,0 +1,14 @@
+rule stability:
+    message:
+        "Experiments on stability, bundle {wildcards.bundle}"
+    input:
+        tasks=RESULTS / "tasks/stability_{bundle}.json",
+        code=modules("stability"),
+    output:
+        RESULTS / "done/stability_{bundle}.json",
+    log:
+        RESULTS / "logs/stability_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/stability_{bundle}.tsv"
+    shell:
+        "python -m springtune.stages.stability {input.tasks} {output} > {log} 2>&1"
