@@ -11,8 +11,11 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from .network import SingularError
 
-ORDER = 16
-"""Order of a series that gives a whole curve."""
+ORDER = 14
+"""Order of a series that gives a whole curve, as a rule."""
+
+HIGH_ORDER = 16
+"""Order of one that the rule does not serve."""
 
 CURVE_TOLERANCE = 1e-7
 """Largest estimated relative error of a displacement on a sensitivity curve."""
@@ -51,20 +54,29 @@ class Expansion:
     """
 
     def __init__(self, network, load, s, displacements, factor, order=ORDER):
-        self.s, self.order = s, order
+        self.s, self.order = s, 0
+        self._network, self._load, self._factor = network, load, factor
         springs = len(network.rest_lengths)
-        d = np.zeros((order + 1, springs, 2))
-        length = np.zeros((order + 1, springs))
-        inverse = np.zeros((order + 1, springs))
-        self.coefficients = np.zeros((order + 1, *network.held.shape))
+        self._d = np.zeros((1, springs, 2))
+        self._length, self._inverse = np.zeros((1, springs)), np.zeros((1, springs))
+        self.coefficients = np.zeros((1, *network.held.shape))
         if displacements is not None:
             self.coefficients[0] = displacements
-        d[0] = network.rest_vectors + network.stretch(self.coefficients[0])
-        length[0] = np.sqrt(np.einsum("ij,ij->i", d[0], d[0]))
-        inverse[0] = 1.0 / length[0]
+        self._d[0] = network.rest_vectors + network.stretch(self.coefficients[0])
+        self._length[0] = np.sqrt(np.einsum("ij,ij->i", self._d[0], self._d[0]))
+        self._inverse[0] = 1.0 / self._length[0]
+        self.extend(order)
+
+    def extend(self, order):
+        """Add the orders up to one."""
+        network, more = self._network, order - self.order
+        d, length, inverse, coefficients = (
+            np.concatenate([array, np.zeros((more, *array.shape[1:]))])
+            for array in (self._d, self._length, self._inverse, self.coefficients)
+        )
         weight = network.stiffness * network.rest_lengths
-        for n in range(1, order + 1):
-            right = load
+        for n in range(self.order + 1, order + 1):
+            right = self._load
             if n > 1:
                 # What lower orders give of order n, as if d[n] were 0.
                 square = np.einsum("nij,nij->i", d[1:n], d[n - 1 : 0 : -1])
@@ -73,11 +85,12 @@ class Expansion:
                 inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
                 known = np.einsum("ni,nij->ij", inverse[1 : n + 1], d[n - 1 :: -1])
                 right = -network.gather(weight[:, None] * known)
-            self.coefficients[n] = network.expand(factor.solve(right))
-            d[n] = network.stretch(self.coefficients[n])
+            coefficients[n] = network.expand(self._factor.solve(right))
+            d[n] = network.stretch(coefficients[n])
             change = np.einsum("ij,ij->i", d[0], d[n]) * inverse[0]
             length[n] += change
             inverse[n] -= inverse[0] ** 2 * change
+        self._d, self._length, self._inverse, self.coefficients, self.order = d, length, inverse, coefficients, order
 
     def predict(self, s):
         """Displacements at ``s`` [m], shape (n_points, 2), from the series cut off before its smallest term."""
@@ -149,6 +162,9 @@ def trace(problem, weights, targets):
     """
     targets = np.asarray(targets, dtype=float)
     values, errors = problem.rest.measure(weights, targets)
+    if (errors > CURVE_TOLERANCE).any():
+        problem.rest.extend(HIGH_ORDER)
+        values, errors = problem.rest.measure(weights, targets)
     by_load = np.argsort(np.abs(targets))
     refused = np.zeros(len(targets), dtype=bool)
     for _ in range(MAX_SOLVES):
@@ -167,7 +183,7 @@ def trace(problem, weights, targets):
                 factor = problem.network.factorize(found.displacements)
             except SingularError:
                 continue
-            local = Expansion(problem.network, problem.load, targets[middle], found.displacements, factor)
+            local = Expansion(problem.network, problem.load, targets[middle], found.displacements, factor, HIGH_ORDER)
             better_values, better_errors = local.measure(weights, targets)
             better = better_errors < errors
             values[better], errors[better] = better_values[better], better_errors[better]

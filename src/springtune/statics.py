@@ -21,7 +21,7 @@ CORRECTION = 1e-6
 """Largest estimated error of a solution's displacements: a residual alone says nothing where the stiffness is
 ill-conditioned."""
 
-FRESH = 1e-4
+FRESH = 2e-3
 """Residual up to which the tangent of an iterate has the inertia of the solution."""
 
 FAR = 0.15
@@ -33,8 +33,8 @@ SURPRISE = 0.1
 KEEP_TANGENT = 0.03
 """Share of the residual that a step may leave for its tangent to serve once more."""
 
-START_ORDER = 6
-"""Orders of the series that starts Newton's method: together they cost a quarter of a factorisation."""
+START_ORDER = 3
+"""Orders of the series that starts Newton's method: together they cost half of a factorisation."""
 
 
 @dataclass(frozen=True)
