@@ -12,6 +12,7 @@ include: "workflow/rules/solve.smk"
 include: "workflow/rules/moduli.smk"
 include: "workflow/rules/laying.smk"
 include: "workflow/rules/stability.smk"
+include: "workflow/rules/benchmark.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/tables.smk"
@@ -29,6 +30,7 @@ rule all:
         rules.collect.input.moduli,
         rules.collect.input.laying,
         rules.collect.input.stability,
+        rules.collect.input.benchmark,
         rules.collect.output,
         rules.figures_all.input,
         TABLES.values(),

@@ -48,6 +48,9 @@ DIMENSIONS = {
     "rows": "triangles over the height of the column",
     "arch_point": "point of the arch's path",
     "experiment": "experiment on stability",
+    "scene": "scene of the benchmark",
+    "method": "definition / mesh type, or another method",
+    "curve_count": "number of stiffnesses of a sensitivity curve",
 }
 UNITS = {"mesh_size": "m", "scale": "m", "sliver_angle": "degree"}
 """Units of the coordinates that have one; the others are labels or ratios."""
@@ -71,6 +74,7 @@ ROOT_VARIABLES = {
     "load_share": (SCENE, "1", "largest share of the load with a good equilibrium, nonlinear", np.nan),
     "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
     "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
+    "solver": (SCENE, "1", "factorisation or multigrid, chosen by the number of unknowns", ""),
     "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
     "definition_evaluations": (SCENE, "1", "solves that deriving the springs' parameters took", np.nan),
     "spring_ratio": (SCENE, "1", "largest spring stiffness over the smallest", np.nan),
@@ -271,6 +275,36 @@ STABILITY_VARIABLES = {
     "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", np.nan),
     "experiment_seconds": (("experiment", "definition"), "s", "time of an experiment", np.nan),
     "experiment_message": (("experiment", "definition"), "1", "why an experiment has no results", ""),
+}
+
+CASE = ("scene", "method", "mesh_size")
+RACE = ("scene",)
+
+BENCHMARK_VARIABLES = {
+    "displacement": (CASE, "m", "displacement of the loaded side along the force", np.nan),
+    "error": (CASE, "1", "signed error of the displacement, over the reference's", np.nan),
+    "seconds": (CASE, "s", "time from nothing to the displacement, median of warm runs", np.nan),
+    "seconds_spread": (CASE, "s", "longest less shortest of the warm runs", np.nan),
+    "cold_seconds": (CASE, "s", "time of the first run, imports included", np.nan),
+    "meshing_seconds": (CASE, "s", "time to make the mesh", np.nan),
+    "assembling_seconds": (CASE, "s", "time to derive parameters and assemble", np.nan),
+    "factorising_seconds": (CASE, "s", "time to factorise, or of what is paid once", np.nan),
+    "solving_seconds": (CASE, "s", "time to solve", np.nan),
+    "peak_memory": (CASE, "B", "largest memory of the process above that at its start", np.nan),
+    "unknowns": (CASE, "1", "number of unknowns", np.nan),
+    "pareto": (CASE, "1", "1 where no method of the scene is both more accurate and faster", 0),
+    "status": (CASE, "1", "what became of the case", 0),
+    "message": (CASE, "1", "why there are no numbers", ""),
+    "error_rate": (("scene", "method"), "1", "exponent of the error in the mesh size", np.nan),
+    "cost_exponent": (("scene", "method"), "1", "exponent of the seconds in the unknowns, from 3000 on", np.nan),
+    "reference_displacement": (RACE, "m", "displacement of the converged reference", np.nan),
+    "reference_error_estimate": (RACE, "1", "estimated relative error of the reference", np.nan),
+    "reference_seconds": (RACE, "s", "time of the reference", np.nan),
+    "machine_load": (RACE, "1", "load of the machine at the start, processes", np.nan),
+    "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", np.nan),
+    "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", np.nan),
+    "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", np.nan),
+    "linear_seconds": ((), "s", "time of one linear solve there", np.nan),
 }
 
 FIELD = (*SCENE, "particle")

@@ -1,6 +1,9 @@
-"""Names of the time integrators, see `springtune.dynamics`, and of the experiments on stability."""
+"""Names of time integrators, of the experiments on stability and of the methods of the benchmark."""
 
 import numpy as np
+
+from .mesh import QUADS
+from .springs import DEFINITIONS
 
 EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
 """Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
@@ -58,3 +61,32 @@ AXES = {
     "arch_point": tuple(range(200)),
 }
 """Values of the experiments' own dimensions. ``cg_iterations`` 0 is a direct solver."""
+
+RIVALS = (
+    "relaxation",
+    "backward-euler",
+    "truncated-backward-euler",
+    "linear-triangles",
+    "quadratic-triangles",
+    "tensor-mass",
+    "condensation",
+    "boundary-elements",
+    "free-form",
+    "calculix-cps3",
+    "calculix-cps8",
+)
+"""Methods of the benchmark besides definitions, see `springtune.rivals`."""
+
+CURVE_COUNTS = (1, 11, 61, 201)
+"""Numbers of stiffnesses of the benchmark's sensitivity curves."""
+
+
+def method_names(definitions, mesh_types, rivals):
+    """Names of the methods: ``definition/mesh type``, those that go together, and rivals."""
+    names = []
+    for name in definitions:
+        for mesh_type in mesh_types:
+            count = 4 if mesh_type in QUADS else 3
+            if count in DEFINITIONS[name].cells and not DEFINITIONS[name].needs:
+                names.append(f"{name}/{mesh_type}")
+    return (*names, *rivals)

@@ -181,7 +181,7 @@ class StaticProblem:
         """
         rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
         signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
-        return _norm(factor.solve(missing + signs * rounding)) / (_norm(displacements.ravel()) or 1.0)
+        return _norm(factor.estimate(missing + signs * rounding)) / (_norm(displacements.ravel()) or 1.0)
 
     def negative_pivots(self, s, found):
         """Number of negative eigenvalues of the tangent at an equilibrium; 0 where it is stable.

@@ -24,7 +24,7 @@ from .geometry import Beam, Strip, Trapezoid
 from .loads import LOADINGS, LOADS
 from .materials import Material
 from .mesh import MESH_TYPES, QUADS
-from .schemes import AXES, EXPERIMENTS, ONCE
+from .schemes import AXES, CURVE_COUNTS, EXPERIMENTS, ONCE, RIVALS, method_names
 from .springs import DEFINITIONS
 from .springs.lattice import COEFFICIENT
 
@@ -40,10 +40,10 @@ MOST_PARTICLES = 5e6
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
 
-OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block", "laying", "stability")
+OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block", "laying", "stability", "benchmark")
 """What is made from a dataset: figures of curves, of errors against mesh size and of deformed networks; tables as the
 paper's; figures and tables that compare definitions; the figure of a pressed block, that of laid strips, and figures
-and the page of the experiments on stability."""
+and the pages of the experiments on stability and of the benchmark."""
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one, for scenes under pressure."""
@@ -224,6 +224,40 @@ class Experiment:
 
 
 @dataclass(frozen=True)
+class Race:
+    """A scene of the benchmark, see `springtune.benchmark`.
+
+    Attributes
+    ----------
+    name : str
+    beam : Beam
+    material : Material
+        With a density.
+    load : str
+        Key of `springtune.loads.LOADS`.
+    force : float
+        Force on the loaded side, tension positive [N].
+    methods : tuple of str
+    mesh_sizes : tuple of float
+        Lengths of an edge [m], ascending.
+    most_seconds, most_thorough : float
+        Seconds that a run may take: of most methods, and of those below.
+    thorough : tuple of str
+    """
+
+    name: str
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+    methods: tuple
+    mesh_sizes: tuple
+    most_seconds: float
+    most_thorough: float
+    thorough: tuple
+
+
+@dataclass(frozen=True)
 class Grid:
     """What one grid of a study asks for, whether or not other grids ask for it, too.
 
@@ -312,6 +346,7 @@ class Study:
     laying_references : tuple of Laying
         Strips of finite elements that the others are compared with: one a loading and friction.
     stability : tuple of Experiment
+    benchmark : tuple of Race
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -343,6 +378,7 @@ class Study:
     laying: tuple
     laying_references: tuple
     stability: tuple
+    benchmark: tuple
     grids: tuple
     stiffness_ratios: tuple
     stiffness_table: dict
@@ -553,6 +589,8 @@ MeshType = Annotated[
 Load = _one_of("load", LOADS)
 Output = _one_of("output", OUTPUTS)
 Loading = _one_of("loading", LOADINGS)
+Rival = _one_of("method", RIVALS)
+Seconds = _number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)
 ExperimentName = _one_of("experiment", EXPERIMENTS)
 Friction = _number("a coefficient from 0 to 2, such as 0.3", 0, 2)
 FurtherReference = _one_of("reference", FURTHER_REFERENCES)
@@ -827,6 +865,41 @@ class StabilityConfig(Section):
     )
 
 
+class BenchmarkSceneConfig(Section):
+    """A scene of the benchmark."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
+    force: Force = Field(description="Magnitude of the force.")
+
+
+class BenchmarkConfig(Section):
+    """Run time against error: every definition on every mesh type, and other methods; one method at a time."""
+
+    scenes: Annotated[dict[str, BenchmarkSceneConfig], _Named("scene")] = Field(description="Scenes.")
+    definition: Annotated[list[DefinitionName], _OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_type: Annotated[list[MeshType], _OneOrMore()] = Field(description="Mesh types of the definitions.")
+    method: Annotated[list[Rival], _OneOrMore()] = Field(
+        list(RIVALS),
+        validate_default=False,
+        description="Other methods: finite elements, CalculiX where it is on the machine, motion to rest, and what the "
+        "paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
+    )
+    mesh_size: Annotated[list[Length], _OneOrMore()] = Field(description="Lengths of an edge.")
+    most_seconds: Seconds = Field(
+        "0.2",
+        validate_default=True,
+        description="Seconds that a run may take; a finer size that would take more is left out.",
+    )
+    thorough: Annotated[list[Text], _OneOrMore()] = Field(
+        [], validate_default=False, description="Methods that may take more, such as `delingette/structured`."
+    )
+    most_thorough: Seconds = Field("8", validate_default=True, description="Seconds that a run of those may take.")
+
+
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
@@ -913,8 +986,8 @@ class StudyConfig(Section):
         validate_default=False,
         description="What is made from the dataset: figures of sensitivity curves, of errors against mesh size, of "
         "deformed networks (and the group `/fields` behind them), tables as the paper's; `definitions`: figures and "
-        "tables that compare definitions; `block`, `laying`, `stability`: figures of these groups. Figures of scenes "
-        "are of nonlinear kinematics.",
+        "tables that compare definitions; `block`, `laying`, `stability`, `benchmark`: figures of these groups. "
+        "Figures of scenes are of nonlinear kinematics.",
     )
     further_references: Annotated[list[FurtherReference], _OneOrMore()] = Field(
         [],
@@ -924,6 +997,9 @@ class StudyConfig(Section):
     laying: LayingConfig | None = Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`.")
     stability: StabilityConfig | None = Field(
         None, description="Experiments on numerical stability; they make the group `/stability`."
+    )
+    benchmark: BenchmarkConfig | None = Field(
+        None, description="Run time against error; it makes the group `/benchmark`."
     )
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
@@ -947,6 +1023,8 @@ SECTIONS = {
     "laying": LayingConfig,
     "laying.trapezoid": TrapezoidConfig,
     "stability": StabilityConfig,
+    "benchmark": BenchmarkConfig,
+    "benchmark.scenes.<name>": BenchmarkSceneConfig,
     "grids.<name>": GridConfig,
 }
 """Model of each section of a study, by its place."""
@@ -1063,6 +1141,8 @@ def _check_names(config, problems):
         base = config.laying.trapezoid
         if not base.upper_base < base.lower_base:
             problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
+    if config.benchmark:
+        _check_benchmark(config, known, problems)
     if config.stability:
         _check_stability(config, known, problems)
     calibrated, paper = config.definitions.calibrated, config.definitions.paper
@@ -1082,6 +1162,38 @@ def _check_names(config, problems):
     if not config.sensitivity.start < config.sensitivity.stop:
         start, stop = config.sensitivity.start, config.sensitivity.stop
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
+
+
+def _check_benchmark(config, known, problems):
+    """Names and numbers of the benchmark."""
+    asked = config.benchmark
+    for name, scene in asked.scenes.items():
+        place = ("benchmark", "scenes", name)
+        known((*place, "beam"), "beam", scene.beam, config.beams)
+        known((*place, "material"), "material", scene.material, config.materials)
+        if scene.material in config.materials and config.materials[scene.material].density is None:
+            message = f"'{scene.material}' has no density; add one to it under materials, such as density: 7850 kg/m^3"
+            problems.add((*place, "material"), message)
+        if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
+            problems.add((*place, "load"), f"'{scene.load}' is not raced; choose traction, bending or pressure")
+        if scene.beam in config.beams:
+            side = min(config.beams[scene.beam].length, config.beams[scene.beam].height)
+            if max(asked.mesh_size) > side / 2:
+                large = f"{1e3 * max(asked.mesh_size):g} mm"
+                message = f"{large} is too large for '{scene.beam}'; give at most {500 * side:g} mm"
+                problems.add(("benchmark", "mesh_size"), message)
+    for name in asked.definition:
+        if DEFINITIONS[name].needs:
+            able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)
+            problems.add(("benchmark", "definition"), f"'{name}' needs more than mesh and material; choose of {able}")
+    for name in asked.mesh_type:
+        if name not in MESH_TYPES:
+            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {_nearest(name, MESH_TYPES)}")
+    methods = method_names(asked.definition, asked.mesh_type, asked.method)
+    for name in asked.thorough:
+        if name not in methods:
+            message = f"'{name}' is no method of this benchmark; {_nearest(name, methods)}"
+            problems.add(("benchmark", "thorough"), message)
 
 
 def _check_stability(config, known, problems):
@@ -1369,6 +1481,24 @@ def _stability(config, materials):
     )  # fmt: skip
 
 
+def _benchmark(config, materials):
+    """Scenes of the benchmark."""
+    asked = config.benchmark
+    races = []
+    for name, scene in asked.scenes.items() if asked else ():
+        beam = config.beams[scene.beam]
+        races.append(
+            Race(
+                name, Beam(scene.beam, beam.length, beam.height, beam.thickness), materials[scene.material],
+                scene.load, LOADS[scene.load].sign * scene.force,
+                method_names([one for one in DEFINITIONS if one in asked.definition], asked.mesh_type,
+                             [one for one in RIVALS if one in asked.method]),
+                tuple(sorted(asked.mesh_size)), asked.most_seconds, asked.most_thorough, tuple(asked.thorough),
+            )
+        )  # fmt: skip
+    return tuple(races)
+
+
 def _materials(config):
     return {
         name: Material(name, material.young_modulus, material.poisson_ratio, material.density)
@@ -1404,13 +1534,21 @@ def _study(config, grids, problems, about):
     # Groups of a dataset share their dimensions with its root.
     others = {one.definition for one in (*laying, *stability)}
     axes["definition"] = tuple(name for name in DEFINITIONS if name in others or name in axes["definition"])
-    further = {one.mesh_size for one in laying} | {size for one in stability for size in one.mesh_sizes}
+    benchmark = _benchmark(config, _materials(config))
+    if benchmark:
+        axes |= {"scene": tuple(race.name for race in benchmark), "method": benchmark[0].methods}
+        axes["curve_count"] = CURVE_COUNTS
+    further = {one.mesh_size for one in laying}
+    further |= {size for one in (*stability, *benchmark) for size in one.mesh_sizes}
     axes["mesh_size"] = tuple(sorted({*axes["mesh_size"], *further}))
     axes |= AXES if stability else {}
     axes["loading"] = tuple(name for name in LOADINGS if any(one.loading == name for one in laying))
     axes["friction"] = tuple(sorted({one.friction for one in laying}))
     if "laying" in outputs and not laying:
         problems.add(("outputs",), "'laying' shows laid strips and the study has none; add a section 'laying'")
+        problems.stop()
+    if "benchmark" in outputs and not benchmark:
+        problems.add(("outputs",), "'benchmark' shows races and the study has none; add a section 'benchmark'")
         problems.stop()
     if "stability" in outputs and not stability:
         problems.add(("outputs",), "'stability' shows experiments and the study has none; add a section 'stability'")
@@ -1437,6 +1575,7 @@ def _study(config, grids, problems, about):
         laying=laying,
         laying_references=laying_references,
         stability=stability,
+        benchmark=benchmark,
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in _stated(config)},

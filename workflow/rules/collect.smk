@@ -9,6 +9,7 @@ rule collect:
         scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES["solve"]),
         laying=expand(RESULTS / "done/laying_{bundle}.json", bundle=BUNDLES["laying"]),
         stability=expand(RESULTS / "done/stability_{bundle}.json", bundle=BUNDLES["stability"]),
+        benchmark=expand(RESULTS / "done/benchmark_{race}.json", race=BUNDLES["benchmark"]),
         moduli=expand(RESULTS / "done/moduli_{bundle}.json", bundle=BUNDLES["moduli"]),
         printed=STUDY.printed_path or [],
         code=modules("collect"),

@@ -116,6 +116,24 @@ rule figures_stability:
         "python -m springtune.stages.figures_stability {input.dataset} {params.folder} > {log} 2>&1"
 
 
+rule figures_benchmark:
+    message:
+        "Drawing the benchmark"
+    input:
+        dataset=rules.collect.output,
+        code=modules("figures_benchmark"),
+    output:
+        FIGURES["benchmark"],
+    params:
+        folder=str(RESULTS / "figures"),
+    log:
+        RESULTS / "logs/figures_benchmark.log",
+    benchmark:
+        RESULTS / "benchmarks/figures_benchmark.tsv"
+    shell:
+        "python -m springtune.stages.figures_benchmark {input.dataset} {params.folder} > {log} 2>&1"
+
+
 rule figures_all:
     input:
         FIGURES.values(),

@@ -58,3 +58,21 @@ rule tables_stability:
         RESULTS / "benchmarks/tables_stability.tsv"
     shell:
         "python -m springtune.stages.tables_stability {input.dataset} {params.folder} > {log} 2>&1"
+
+
+rule tables_benchmark:
+    message:
+        "Writing the page of the benchmark"
+    input:
+        dataset=rules.collect.output,
+        code=modules("tables_benchmark"),
+    output:
+        TABLES["benchmark"],
+    params:
+        folder=str(RESULTS / "tables"),
+    log:
+        RESULTS / "logs/tables_benchmark.log",
+    benchmark:
+        RESULTS / "benchmarks/tables_benchmark.tsv"
+    shell:
+        "python -m springtune.stages.tables_benchmark {input.dataset} {params.folder} > {log} 2>&1"

@@ -53,6 +53,7 @@ def of_study(study):
         "block": {"block": {}},
         "laying": {"laying": {}},
         "stability": stability(study),
+        "benchmark": {stem: {} for stem in benchmark(study.axes.get("scene", ()))},
     }
     return {kind: chosen if kind in study.outputs else {} for kind, chosen in every.items()}
 
@@ -74,6 +75,11 @@ STABILITY = {
     "stability_buckling": "buckling",
 }
 """Figures of the experiments on stability and the one that each needs."""
+
+
+def benchmark(scenes):
+    """Stems of the figures of the benchmark."""
+    return [*(f"benchmark_{scene}" for scene in scenes), "benchmark_rates", "benchmark_costs", "benchmark_curve"]
 
 
 def stability(study):

@@ -14,7 +14,7 @@ from ..springs import DEFINITIONS
 
 PACKAGE = Path(__file__).parents[1]
 
-CHOOSING = ("solve", "moduli", "laying", "stability")
+CHOOSING = ("solve", "moduli", "laying", "stability", "benchmark")
 """Stages that run definitions by name: which modules those are no import in them says."""
 
 

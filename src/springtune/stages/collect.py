@@ -49,6 +49,7 @@ COPIED = (
     "definition_evaluations",
     "spring_ratio",
     "load_share",
+    "solver",
 )
 """What of a scene's result goes into the dataset as it is."""
 
@@ -94,6 +95,8 @@ def run(config, folder, output):
         groups["/laying"] = _laying(study, folder, axes)
     if study.stability:
         groups["/stability"] = _stability(study, folder, axes)
+    if study.benchmark:
+        groups["/benchmark"] = _benchmark(study, folder, axes)
     if "deformed" in study.outputs:
         groups["/fields"] = _fields(study, folder, axes)
     dataset.write(output, groups, _attributes(study, config))
@@ -348,6 +351,19 @@ def _stability(study, folder, axes):
         place = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
         result["experiment_seconds"] = result.pop("seconds", np.nan)
         result["experiment_message"] = result.pop("failure", "")
+        for name, values in result.items():
+            array = data[name]
+            array.loc[{dimension: place[dimension] for dimension in array.dims if dimension in place}] = values
+    return data
+
+
+def _benchmark(study, folder, axes):
+    """Errors and seconds of the scenes of the benchmark."""
+    data = dataset.empty(axes, dataset.BENCHMARK_VARIABLES)
+    for race in study.benchmark:
+        key = tasks.race_key(race)
+        result = store.read(folder / "benchmark" / f"{key}.h5", [key], dataset.BENCHMARK_VARIABLES)[key]
+        place = {"scene": race.name, "mesh_size": list(race.mesh_sizes)}
         for name, values in result.items():
             array = data[name]
             array.loc[{dimension: place[dimension] for dimension in array.dims if dimension in place}] = values

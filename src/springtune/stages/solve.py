@@ -159,6 +159,7 @@ class Solver:
             "definition_seconds": seconds,
             "definition_evaluations": springs.evaluations,
             "spring_ratio": springs.spring_ratio,
+            "solver": found.factor.name if found.factor else "",
             "load_share": found.load_share if scene["kinematics"] == "nonlinear" else np.nan,
         }
         status, message, pivots = problem.judge(s, found)

@@ -72,6 +72,9 @@ def write_tasks(study, folder, cores):
     for label, experiments in bundles["stability"].items():
         folder_of = str(folder / "stability")
         tasks[f"stability_{label}"] = {"folder": folder_of, "experiments": [_experiment(one) for one in experiments]}
+    for race in study.benchmark:
+        content = {"folder": str(folder / "benchmark"), "races": [_race(race, race is study.benchmark[0])]}
+        tasks[f"benchmark_{race.name}"] = content
     for label, patches in bundles["moduli"].items():
         tasks[f"moduli_{label}"] = {"folder": str(folder / "moduli"), "patches": patches}
     for name, content in tasks.items():
@@ -106,6 +109,7 @@ def _bundles(study, cores):
     return {
         "laying": _shared_out(strips, str, cores),
         "stability": _shared_out(experiments, str, cores),
+        "benchmark": {race.name: [race] for race in study.benchmark},
         "solve": meshes,
         "sensitivity": [label for label, bundle in meshes.items() if curved & set(bundle)],
         "moduli": {
@@ -332,6 +336,18 @@ def _experiment(one):
     return {"key": experiment_key(one)} | asdict(one)
 
 
+def race_key(race):
+    """Key of a scene of the benchmark."""
+    parameters = asdict(race) | {"beam": _beam(race.beam), "material": asdict(race.material) | {"name": ""}}
+    code = _stage_key("benchmark", "numpy", "scipy", "numba", "scikit-fem", "netgen-mesher", "pyamg")
+    definitions = sorted({method.partition("/")[0] for method in race.methods if "/" in method})
+    return files.key(parameters, code, [definition_digest(name) for name in definitions])
+
+
+def _race(race, first):
+    return {"key": race_key(race), "curves": first} | asdict(race)
+
+
 def patch_name(one):
     """File stem of the moduli of a patch."""
     return f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
@@ -442,6 +458,8 @@ def _products(name, content):
         return [folder / f"{patch['name']}.h5" for patch in content["patches"]]
     if stage == "laying":
         return [folder / f"{strip['key']}.h5" for strip in content["strips"]]
+    if stage == "benchmark":
+        return [folder / f"{race['key']}.h5" for race in content["races"]]
     if stage == "stability":
         return [folder / f"{one['key']}.h5" for one in content["experiments"]]
     if stage in ("sensitivity", "solve"):

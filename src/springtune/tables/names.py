@@ -8,6 +8,9 @@ DEFINITIONS = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""
 
 
+BENCHMARK = "speed.md"
+"""Page of the benchmark."""
+
 STABILITY = "stability.md"
 """Page of the experiments on stability."""
 
@@ -27,7 +30,7 @@ def of_study(study):
     Returns
     -------
     dict of str to list of str
-        ``tables``, ``definitions`` and ``stability``.
+        ``tables``, ``definitions``, ``stability`` and ``benchmark``.
     """
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
@@ -35,5 +38,5 @@ def of_study(study):
     stems += ["block"] if any(LOADS[scene.load].kind == "face" for scene in study.scenes) else []
     stems += ["laying"] if study.laying else []
     files = {"tables": [*(f"{name}.csv" for name in stems), "index.html"]}
-    files |= {"definitions": list(DEFINITIONS), "stability": [STABILITY]}
+    files |= {"definitions": list(DEFINITIONS), "stability": [STABILITY], "benchmark": [BENCHMARK]}
     return {kind: names if kind in study.outputs else [] for kind, names in files.items()}

@@ -1,0 +1,254 @@
+"""Run time against error: definitions on all mesh types, and their rivals.
+
+Every case runs in a process of its own, forked warm, several times; the first run, which also imports and reads what
+the method needs, is told apart. The machine's load and the largest memory are noted beside the seconds.
+"""
+
+import multiprocessing
+import os
+import resource
+import statistics
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from .boundary import held, weights
+from .calculix import installed
+from .geometry import Beam
+from .loads import LOADS
+from .materials import Material
+from .mesh import MESH_TYPES
+from .network import Network
+from .path import trace
+from .reference.small_strain import solve_small_strain
+from .rivals import METHODS, network
+from .schemes import CURVE_COUNTS
+from .springs import DefinitionError
+from .springs.lattice import COEFFICIENT
+from .statics import StaticProblem
+
+PARTS = ("meshing", "assembling", "factorising", "solving")
+"""Parts of the seconds."""
+
+REPETITIONS = 3
+BRIEF = 0.05
+"""Cases below these seconds are repeated twice as often."""
+
+LONG = 0.4
+"""Cases above these seconds run once."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A beam under a load, see `springtune.loads`."""
+
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+
+    @property
+    def kind(self):
+        """Kind of the load."""
+        return LOADS[self.load].kind
+
+    @property
+    def side(self):
+        """Coordinate of the loaded side [m], axis of that coordinate, axis of the force."""
+        if self.kind == "face":
+            return self.beam.height, 1, 1
+        return self.beam.length, 0, 1 if self.kind == "bending" else 0
+
+
+class _Clock:
+    """Seconds of each part of a run."""
+
+    def __init__(self):
+        self.seconds = dict.fromkeys(PARTS, 0.0)
+
+    @contextmanager
+    def __call__(self, part):
+        begin = time.perf_counter()
+        yield
+        self.seconds[part] += time.perf_counter() - begin
+
+
+def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0):
+    """All methods on all sizes, from coarse to fine, as long as a run is not expected to take too long.
+
+    Parameters
+    ----------
+    scene : Scene
+    methods : sequence of str
+        Names as `springtune.schemes.method_names` gives them.
+    sizes : sequence of float
+        Lengths of an edge [m], ascending.
+    most_seconds : float
+        Seconds that one run may take; finer sizes of a method that would take longer are left out.
+    thorough : sequence of str, optional
+        Methods that may take more,
+    most_thorough : float, optional
+        so many seconds.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Variables of `springtune.dataset.BENCHMARK_VARIABLES` over method and mesh size.
+    """
+    begin = time.perf_counter()
+    reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
+    result = {
+        "reference_displacement": reference.displacement,
+        "reference_error_estimate": reference.error_estimate,
+        "reference_seconds": time.perf_counter() - begin,
+        "machine_load": os.getloadavg()[0],
+    }
+    shape = len(methods), len(sizes)
+    names = ("displacement", "seconds", "seconds_spread", "cold_seconds", "peak_memory", "unknowns")
+    arrays = {name: np.full(shape, np.nan) for name in (*names, *(f"{part}_seconds" for part in PARTS))}
+    status, message = np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
+    meshes = {}
+    for mesh_type in {method.partition("/")[2] for method in methods if "/" in method}:
+        MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
+    for j in reversed(range(len(sizes))):
+        for i, method in enumerate(methods):
+            before = arrays["seconds"][i, j + 1 :]
+            most = most_thorough if method in thorough else most_seconds
+            if len(before) and np.isfinite(before[0]) and before[0] * _growth(before, sizes[j:]) > most:
+                message[i, j] = f"left out: more than {most:g} s to be expected"
+                continue
+            if message[i, j + 1 :].any():
+                message[i, j] = message[i, j + 1]
+                continue
+            if method.startswith("calculix") and not installed():
+                message[i, j] = "left out: CalculiX (ccx) is not on this machine"
+                continue
+            found = _in_process(scene, method, sizes[j], meshes)
+            if "message" in found:
+                status[i, j], message[i, j] = found["status"], found["message"]
+                continue
+            status[i, j] = 1
+            for name, values in arrays.items():
+                values[i, j] = found[name]
+    result |= arrays | {"status": status, "message": message}
+    result["error"] = (arrays["displacement"] - reference.displacement) / abs(reference.displacement)
+    return result | _rates(result, sizes)
+
+
+def _growth(seconds, sizes):
+    """Factor by which the next finer size takes longer: as from the last one to this, at least as the particles."""
+    particles = (sizes[1] / sizes[0]) ** 2
+    if len(seconds) < 2 or not np.isfinite(seconds[1]):
+        return particles
+    exponent = np.log(seconds[0] / seconds[1]) / np.log((sizes[2] / sizes[1]) ** 2)
+    return particles ** float(np.clip(exponent, 1.0, 2.0))
+
+
+def _in_process(scene, method, size, meshes):
+    """Result of a case from a process of its own; the mesh of a definition is made before, and its time counted."""
+    mesh, meshing = None, 0.0
+    if method not in METHODS:
+        mesh_type = method.partition("/")[2]
+        if (mesh_type, size) not in meshes:
+            begin = time.perf_counter()
+            made = MESH_TYPES[mesh_type](scene.beam.length, scene.beam.height, size)
+            made.edges  # noqa: B018  computed when first asked for
+            meshes[mesh_type, size] = made, time.perf_counter() - begin
+        mesh, meshing = meshes[mesh_type, size]
+    context = multiprocessing.get_context("fork")
+    receive, send = context.Pipe(duplex=False)
+    process = context.Process(target=_repeat, args=(send, scene, method, size, mesh, meshing))
+    process.start()
+    send.close()
+    try:
+        return receive.recv()
+    except EOFError:
+        return {"status": 5, "message": "the process died, of lack of memory most likely"}
+    finally:
+        process.join()
+
+
+def _repeat(send, scene, method, size, mesh, meshing):
+    base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    seconds, parts = [], []
+    try:
+        while True:
+            clock, begin = _Clock(), time.perf_counter()
+            if mesh is None:
+                displacement, unknowns = METHODS[method](scene, size, clock)
+            else:
+                displacement, unknowns = network(scene, mesh, method.partition("/")[0], clock)
+            seconds.append(time.perf_counter() - begin + meshing)
+            parts.append(clock.seconds | ({"meshing": meshing} if mesh is not None else {}))
+            # The first run is cold, which a long one does not feel.
+            wanted = 1 if seconds[0] > LONG else 1 + REPETITIONS * (2 if seconds[-1] < BRIEF else 1)
+            if len(seconds) >= wanted:
+                break
+    except DefinitionError as error:
+        send.send({"status": 5, "message": str(error)})
+        return
+    except Exception as error:  # the other cases shall still be measured
+        send.send({"status": 3, "message": f"{type(error).__name__}: {error}"})
+        return
+    warm, of_warm = (seconds[1:], parts[1:]) if len(seconds) > 1 else (seconds, parts)
+    here, there = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    found = {f"{part}_seconds": statistics.median(one[part] for one in of_warm) for part in PARTS}
+    found |= {"displacement": displacement, "unknowns": unknowns, "seconds": statistics.median(warm)}
+    found |= {"seconds_spread": max(warm) - min(warm), "cold_seconds": seconds[0]}
+    send.send(found | {"peak_memory": 1024.0 * max(here - base, there)})
+
+
+def _rates(result, sizes):
+    """Order of the error in the mesh size, exponent of the seconds in the unknowns, and which cases nothing beats."""
+    count = len(result["error"])
+    rates, exponents = np.full(count, np.nan), np.full(count, np.nan)
+    for i in range(count):
+        errors = np.abs(result["error"][i])
+        good = np.isfinite(errors) & (errors > 0)
+        if good.sum() >= 3:
+            rates[i] = np.polyfit(np.log(np.asarray(sizes)[good]), np.log(errors[good]), 1)[0]
+        large = np.isfinite(result["seconds"][i]) & (result["unknowns"][i] >= 3000)
+        if large.sum() >= 2 and np.ptp(result["unknowns"][i][large]) > 0:
+            logs = np.log(result["unknowns"][i][large]), np.log(result["seconds"][i][large])
+            exponents[i] = np.polyfit(*logs, 1)[0]
+    errors, seconds = np.abs(result["error"]), result["seconds"]
+    best = np.zeros(errors.shape, dtype=np.int8)
+    for place in np.argwhere(np.isfinite(errors)):
+        i, j = place
+        best[i, j] = not ((errors < errors[i, j]) & (seconds <= seconds[i, j])).any()
+    return {"error_rate": rates, "cost_exponent": exponents, "pareto": best}
+
+
+def curves(scene, size):
+    """Seconds of sensitivity curves over the number of stiffnesses: as one path, and solve by solve.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_counts,)
+    """
+    mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
+    directions, pattern = held(mesh, scene.kind), weights(mesh, scene.kind)
+    membrane = scene.material.young_modulus * scene.beam.thickness
+
+    def problem():
+        return StaticProblem(Network(mesh, directions, np.ones(len(mesh.edges))), pattern)
+
+    together, apart = np.zeros(len(CURVE_COUNTS)), np.zeros(len(CURVE_COUNTS))
+    for number, count in enumerate(CURVE_COUNTS):
+        loads = scene.force / (COEFFICIENT * membrane * np.linspace(0.4, 1.6, count))
+        together[number] = _median(lambda loads=loads: trace(problem(), pattern, loads))
+    one = _median(lambda: problem().nonlinear(scene.force / (COEFFICIENT * membrane)))
+    linear = _median(lambda: problem().linear(scene.force / (COEFFICIENT * membrane)))
+    apart[:] = one * np.array(CURVE_COUNTS)
+    return {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
+
+
+def _median(function):
+    seconds = []
+    for _ in range(REPETITIONS):
+        begin = time.perf_counter()
+        function()
+        seconds.append(time.perf_counter() - begin)
+    return statistics.median(seconds)

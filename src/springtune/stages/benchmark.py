@@ -1,0 +1,46 @@
+"""Stage `benchmark`: run time against error."""
+
+import sys
+from pathlib import Path
+
+from .. import benchmark
+from ..geometry import Beam
+from ..materials import Material
+from . import files, store
+
+CURVE_SIZE = 1e-3
+"""Mesh size of the curves whose cost is measured, where the beam is the first scene's [m]."""
+
+
+def run(tasks, done):
+    """Race the scenes that are not stored yet.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder`` and ``races``, each with ``key``, ``curves`` and what `springtune.benchmark.run` takes.
+    done : str or Path
+        JSON file to write: how many were raced.
+    """
+    tasks = files.read_json(tasks)
+    count = 0
+    for task in tasks["races"]:
+        path = Path(tasks["folder"]) / f"{task['key']}.h5"
+        if task["key"] not in store.stored(path):
+            store.add(path, {task["key"]: _race(task)})
+            count += 1
+    files.write_json(done, {"races": count})
+
+
+def _race(task):
+    scene = benchmark.Scene(Beam(**task["beam"]), Material(**task["material"]), task["load"], task["force"])
+    found = benchmark.run(
+        scene, task["methods"], task["mesh_sizes"], task["most_seconds"], task["thorough"], task["most_thorough"]
+    )
+    if task["curves"]:
+        found |= benchmark.curves(scene, max(CURVE_SIZE, min(task["mesh_sizes"])))
+    return found | {"message": found["message"].tolist()}
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

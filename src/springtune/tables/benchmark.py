@@ -1,0 +1,112 @@
+"""The page of the benchmark: every number from the dataset."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from .names import BENCHMARK
+
+TARGETS = (0.01, 0.001, 0.0001)
+"""Errors to reach [1]."""
+
+
+def write(tree, folder):
+    """Write the page in Markdown.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        With the group ``/benchmark``.
+    folder : str or Path
+
+    Returns
+    -------
+    list of str
+        Names of the files written.
+    """
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    unfinished = Path(folder) / f"{BENCHMARK}.unfinished"
+    unfinished.write_text(page(tree), encoding="utf-8")
+    os.replace(unfinished, Path(folder) / BENCHMARK)
+    return [BENCHMARK]
+
+
+def page(tree):
+    """Markdown: the quickest ways to an error, costs of one mesh size, orders and exponents, curves."""
+    data = tree["benchmark"].to_dataset()
+    loads = ", ".join(f"{float(value):.1f}" for value in data.machine_load.values)
+    parts = [f"Machine load at the start of each scene: {loads}.", ""]
+    for scene in map(str, data.scene.values):
+        race = data.sel(scene=scene)
+        parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(race), ""]
+        parts += [f"### {scene}: methods on one mesh size", "", *_one_size(race), ""]
+    return "\n".join([*parts, "### A sensitivity curve", "", *_curve(data), ""])
+
+
+def _table(heads, rows):
+    lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def _time(seconds):
+    seconds = float(seconds)
+    if np.isnan(seconds):
+        return ""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+
+
+def _percent(value):
+    value = 100 * float(value)
+    return "" if np.isnan(value) else f"{value:+.2g} %".replace("-", "−")
+
+
+def _plain(value, digits):
+    return "" if np.isnan(float(value)) else f"{float(value):.{digits}f}"
+
+
+def _quickest(race):
+    """The three methods that come first to each error, with their mesh size."""
+    rows = []
+    errors, seconds = np.abs(race.error.transpose("method", "mesh_size").values), race.seconds.values
+    for target in TARGETS:
+        good = np.where(errors <= target, seconds, np.inf)
+        best = good.min(axis=1)
+        row = [f"{100 * target:g} %"]
+        for i in np.argsort(best)[:3]:
+            if np.isfinite(best[i]):
+                size = 1e3 * float(race.mesh_size.values[good[i].argmin()])
+                row.append(f"`{race.method.values[i]}`, {size:g} mm: {_time(best[i])}")
+        rows.append(row + [""] * (4 - len(row)))
+    return _table(["error", "first", "second", "third"], rows)
+
+
+def _one_size(race):
+    """Error, seconds and memory on the finest size that half of the methods have."""
+    counts = np.isfinite(race.seconds.values).sum(axis=0)
+    place = int(np.flatnonzero(counts >= 0.5 * counts.max())[0])
+    cells = race.isel(mesh_size=place)
+    order = np.argsort(np.abs(cells.error.values))
+    rows = []
+    for i in order:
+        cell = cells.isel(method=i)
+        if np.isnan(cell.seconds):
+            continue
+        rows.append([
+            f"`{cell.method.item()}`", _percent(cell.error), _time(cell.seconds), _time(cell.cold_seconds),
+            *(_time(cell[f"{part}_seconds"]) for part in ("meshing", "assembling", "factorising", "solving")),
+            f"{float(cell.peak_memory) / 1e6:.0f}", _plain(cell.error_rate, 1), _plain(cell.cost_exponent, 2),
+        ])  # fmt: skip
+    heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", "meshing", "assembling", "factorising",
+             "solving", "memory [MB]", "order", "exponent of cost"]  # fmt: skip
+    return _table(heads, rows)
+
+
+def _curve(data):
+    rows = [
+        [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
+        for count in data.curve_count.values
+    ]  # fmt: skip
+    lines = _table(["stiffnesses", "one path", "solve by solve"], rows)
+    return [*lines, "", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
+            f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
