@@ -16,6 +16,7 @@ import numpy as np
 
 from .boundary import held, weights
 from .calculix import installed
+from .dynamics import Motion, masses
 from .geometry import Beam
 from .loads import LOADS
 from .materials import Material
@@ -25,7 +26,7 @@ from .path import trace
 from .reference.small_strain import solve_small_strain
 from .rivals import METHODS, network
 from .schemes import CURVE_COUNTS
-from .springs import DefinitionError
+from .springs import DEFINITIONS, DefinitionError
 from .springs.lattice import COEFFICIENT
 from .statics import StaticProblem
 
@@ -243,6 +244,36 @@ def curves(scene, size):
     linear = _median(lambda: problem().linear(scene.force / (COEFFICIENT * membrane)))
     apart[:] = one * np.array(CURVE_COUNTS)
     return {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
+
+
+def explicit(scene, size):
+    """Explicit steps a second of nonlinear springs, and the memory that they move, beside a plain copy of memory.
+
+    A step reads each spring's ends, rest vector, length and stiffness once, and six vectors a particle; what it does
+    not find in a cache it moves.
+
+    Returns
+    -------
+    dict of str to float
+    """
+    mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
+    springs = DEFINITIONS["lattice"].springs(mesh, scene.material, scene.beam.thickness)
+    inertia = masses(mesh, scene.material.density, scene.beam.thickness) / springs.reference
+    motion = Motion(Network(mesh, held(mesh, scene.kind), springs.relative), inertia)
+    step = 0.9 * motion.step_limit("central-difference")
+    motion.run("central-difference", step, 10)  # compiled
+    steps = 2000
+    seconds = _median(lambda: motion.run("central-difference", step, steps))
+    moved = len(mesh.edges) * (2 * 4 + 4 * 8) + len(mesh.points) * 6 * 16
+    large = np.ones(2**24)
+    other = np.empty_like(large)
+    copy = _median(lambda: np.copyto(other, large))
+    rate = steps / seconds
+    return {
+        "explicit_steps": rate,
+        "explicit_bandwidth": rate * moved,
+        "copy_bandwidth": 2 * large.nbytes / copy,
+    }
 
 
 def _median(function):

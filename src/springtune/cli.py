@@ -206,6 +206,36 @@ def stability(dataset, write, page):
     _tables("stability", tables, "stability", dataset, page if write else None)
 
 
+@main.command()
+@click.argument("dataset", type=click.Path(path_type=Path), default="results/benchmark/dataset.nc")
+@click.option("--compare", type=click.Path(path_type=Path), help="An earlier dataset: print ratios to it.")
+@click.option("--write", is_flag=True, help="Renew the tables of the page instead of printing them.")
+@click.option("--page", default="docs/speed.md", show_default=True, type=click.Path(path_type=Path))
+def bench(dataset, compare, write, page):
+    """Show the benchmark of a dataset, or how its seconds compare with an earlier one's."""
+    from .tables.benchmark import comparison
+    from .tables.benchmark import page as tables
+
+    if compare is None:
+        _tables("bench", tables, "benchmark", dataset, page if write else None)
+        return
+    import xarray as xr
+
+    found = []
+    for path in (compare, dataset):
+        try:
+            with xr.open_datatree(path, engine="h5netcdf") as tree:
+                if "benchmark" not in tree:
+                    raise click.ClickException(f"{path}: has no group /benchmark; run config/benchmark.yaml")
+                found.append(tree["benchmark"].to_dataset().load())
+        except OSError as error:
+            raise click.ClickException(f"{path}: {error.strerror or error}") from None
+    lines, flagged = comparison(*found)
+    click.echo("\n".join(lines))
+    if flagged:
+        raise SystemExit(1)
+
+
 def _tables(command, text, group, dataset, page):
     """Print tables of a dataset's group, or put them between the marks of a page."""
     import xarray as xr

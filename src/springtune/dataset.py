@@ -305,6 +305,9 @@ BENCHMARK_VARIABLES = {
     "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", np.nan),
     "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", np.nan),
     "linear_seconds": ((), "s", "time of one linear solve there", np.nan),
+    "explicit_steps": ((), "s-1", "explicit steps a second of nonlinear springs there", np.nan),
+    "explicit_bandwidth": ((), "B/s", "memory that these steps read and write", np.nan),
+    "copy_bandwidth": ((), "B/s", "memory that a plain copy reads and writes", np.nan),
 }
 
 FIELD = (*SCENE, "particle")

@@ -99,6 +99,8 @@ class Run:
         [s]
     residual : float
         Out-of-balance force over the load at the end [1]; over the reference stiffness without a load [m].
+    step_bound : float
+        Step that is safe by each particle's stiffness alone [s], known before the run; infinite for implicit schemes.
     samples : ndarray of float, shape (n, 4)
         Time [s], energy over the reference stiffness [m2], and momentum over it [m s]; only where asked for.
     """
@@ -110,6 +112,7 @@ class Run:
     steps: int
     time: float
     residual: float
+    step_bound: float
     samples: np.ndarray
 
 
@@ -173,7 +176,11 @@ class Motion:
 
         ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `Network.local_stiffness`.
         """
-        return float(np.sqrt((self.network.local_stiffness / self.inertia)[~self.network.held].max()))
+        return float(np.sqrt((self.network.reduce(self.network.local_stiffness) / self.mass).max()))
+
+    def step_bound(self, integrator):
+        """Step that is safe by each particle's stiffness alone, springs undamped [s]; infinite for implicit schemes."""
+        return np.inf if integrator in IMPLICIT else 2 / self.particle_bound
 
     @cached_property
     def omega_max(self):
@@ -345,7 +352,8 @@ class Motion:
             )
         if status == "moving" and rest is not None:
             message = f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
-        return Run(u, v, status, message, done, done * step, residual, np.array(samples).reshape(-1, 4))
+        samples = np.array(samples).reshape(-1, 4)
+        return Run(u, v, status, message, done, done * step, residual, self.step_bound(integrator), samples)
 
     def _at_rest(self, u, v, rest):
         if self.residual(u) > rest:

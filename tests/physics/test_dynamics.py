@@ -299,6 +299,13 @@ def test_explicit_runs_factorise_nothing(integrator, monkeypatch):
     assert relax(motion.network, motion.load).status == "rest"
 
 
+def test_a_run_records_the_bound_of_its_step():
+    motion = beam()
+    bound = motion.run("central-difference", 1e-8, 1).step_bound
+    assert bound == 2 / motion.particle_bound <= motion.step_limit("central-difference")
+    assert motion.run("backward-euler", 1e-3, 1).step_bound == np.inf
+
+
 def test_a_rest_criterion_ends_a_run():
     motion = beam().critical()
     step = 0.8 * motion.step_limit("central-difference")

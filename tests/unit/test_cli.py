@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
+import xarray as xr
 import yaml
 from click.testing import CliRunner
 
@@ -26,6 +28,29 @@ def run(*arguments):
 def words(text):
     """Lines of a text with their runs of blanks made one."""
     return [" ".join(line.split()) for line in text.splitlines()]
+
+
+class TestBench:
+    def test_dataset_without_a_benchmark_is_refused(self, tmp_path):
+        xr.DataTree.from_dict({"/": xr.Dataset()}).to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+        result = run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc")
+        assert result.exit_code == 1 and "has no group /benchmark; run config/benchmark.yaml" in result.stderr
+        assert "none.nc" in run("bench", tmp_path / "none.nc").stderr
+
+    def test_ratios_of_two_benchmarks(self, tmp_path):
+        dims, coordinates = (
+            ("scene", "method", "mesh_size"),
+            {"scene": ["a"], "method": ["x", "y", "z"], "mesh_size": [1.0]},
+        )
+        for name, second in (("old", 0.1), ("new", 0.3)):
+            seconds = [[[0.1], [second], [0.1]]]
+            data = xr.Dataset(
+                {"seconds": (dims, seconds), "seconds_spread": (dims, 0.0 * np.array(seconds))}, coordinates
+            )
+            xr.DataTree.from_dict({"/benchmark": data}).to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+        assert run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc").exit_code == 0
+        result = run("bench", tmp_path / "new.nc", "--compare", tmp_path / "old.nc")
+        assert result.exit_code == 1 and "  3.00  y  slower" in result.stdout
 
 
 class TestScenes:

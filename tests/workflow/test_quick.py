@@ -77,6 +77,21 @@ def test_stability_has_the_names_of_the_contract(tree):
     assert "energy" not in data  # not asked for
 
 
+def test_benchmark_has_the_names_of_the_contract(tree):
+    """Ratios within one run; seconds themselves are no business of a test."""
+    data = tree["benchmark"].to_dataset()
+    for name in ("error", "seconds", "peak_memory"):
+        assert data[name].dims == ("scene", "method", "mesh_size"), name
+    race = data.sel(scene="traction")
+    ours, theirs = (race.error.sel({"method": name}) for name in ("delingette/structured", "linear-triangles"))
+    assert abs(ours - theirs).max() <= 1e-9
+    assert (race.solving_seconds.sel({"method": "condensation"}) < race.factorising_seconds.sel(
+        {"method": "condensation"})).all()  # fmt: skip
+    assert (race.pareto.max("method") == 1).all() and (data.reference_error_estimate < 1e-4).all()
+    # One path is many solves' worth.
+    assert data.curve_seconds.sel(curve_count=201) < 0.5 * data.separate_seconds.sel(curve_count=201)
+
+
 def test_every_variable_has_units_and_a_long_name(tree):
     for group in tree.subtree:
         for name, variable in group.to_dataset(inherit=False).variables.items():

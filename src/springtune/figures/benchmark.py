@@ -126,8 +126,8 @@ def _costs(data, folder):
         _lines(scene, axes[0], "unknowns", "seconds")
         axes[0].set(**LOGARITHMIC, xlabel="unknowns", ylabel="seconds", title="Run time; exponents from 3000 on")
         axes[0].legend(fontsize=6)
-        case = scene.sel({"method": "delingette/structured"}) if "delingette/structured" in scene.method.values else None
-        if case is not None:
+        if "delingette/structured" in scene.method.values:
+            case = scene.sel({"method": "delingette/structured"})
             there = np.isfinite(case.seconds.values)
             size, bottom = np.arange(there.sum()), np.zeros(there.sum())
             for number, part in enumerate(("meshing", "assembling", "factorising", "solving")):

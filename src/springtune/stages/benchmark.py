@@ -9,7 +9,7 @@ from ..materials import Material
 from . import files, store
 
 CURVE_SIZE = 1e-3
-"""Mesh size of the curves whose cost is measured, where the beam is the first scene's [m]."""
+"""Mesh size of the curves and of the explicit steps whose cost is measured, on the first scene's beam [m]."""
 
 
 def run(tasks, done):
@@ -38,7 +38,8 @@ def _race(task):
         scene, task["methods"], task["mesh_sizes"], task["most_seconds"], task["thorough"], task["most_thorough"]
     )
     if task["curves"]:
-        found |= benchmark.curves(scene, max(CURVE_SIZE, min(task["mesh_sizes"])))
+        size = max(CURVE_SIZE, min(task["mesh_sizes"]))
+        found |= benchmark.curves(scene, size) | benchmark.explicit(scene, size)
     return found | {"message": found["message"].tolist()}
 
 

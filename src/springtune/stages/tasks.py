@@ -18,8 +18,8 @@ from ..study import MeshSpec
 from . import files
 from .code import definition_digest, digest
 
-BUNDLE_SECONDS = 4.0
-"""Work that a bundle holds: some ten times the start-up of a job."""
+BUNDLE_SECONDS = 8.0
+"""Work that a bundle holds: some ten times the start-up of a job and the scheduler's share."""
 
 SCENE_SECONDS = {"linear": (1.5e-3, 2e-6), "nonlinear": (3e-3, 2e-5), "curve": (5e-3, 4e-5), "moduli": (4e-3, 1e-5)}
 """Rough cost of a scene, curve or moduli, in any case and per particle; it balances bundles and nothing else."""

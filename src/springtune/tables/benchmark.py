@@ -108,5 +108,53 @@ def _curve(data):
         for count in data.curve_count.values
     ]  # fmt: skip
     lines = _table(["stiffnesses", "one path", "solve by solve"], rows)
-    return [*lines, "", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
-            f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
+    lines += ["", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
+              f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
+    if "explicit_steps" in data and np.isfinite(data.explicit_steps):
+        lines += ["", f"Explicit steps of nonlinear springs: {float(data.explicit_steps):.0f} a second, which move "
+                  f"{float(data.explicit_bandwidth) / 1e9:.1f} GB/s; a plain copy of memory moves "
+                  f"{float(data.copy_bandwidth) / 1e9:.1f} GB/s."]  # fmt: skip
+    return lines
+
+
+NOISE = 1.3
+"""Ratio of seconds that runs of one program on one machine show among themselves."""
+
+
+def comparison(old, new):
+    """Ratios of the seconds of two benchmarks, method by method.
+
+    A machine that is slower on the whole is no regression: ratios are over their median. Flagged is what lies outside
+    of `NOISE` and of three times the spread that the runs showed.
+
+    Parameters
+    ----------
+    old, new : xarray.Dataset
+        Groups ``/benchmark``.
+
+    Returns
+    -------
+    lines : list of str
+    flagged : int
+        Number of methods that became slower.
+    """
+    both = {name: [label for label in old[name].values if label in new[name].values]
+            for name in ("scene", "method", "mesh_size")}  # fmt: skip
+    old, new = old.sel(both), new.sel(both)
+    ratio = (new.seconds / old.seconds).transpose("method", "scene", "mesh_size").values
+    if not np.isfinite(ratio).any():
+        return ["The two datasets have no case in common."], 0
+    spread = [(one.seconds_spread / one.seconds).transpose("method", "scene", "mesh_size").values for one in (old, new)]
+    middle = float(np.nanmedian(ratio))
+    lines = [f"{int(np.isfinite(ratio).sum())} cases in common, median ratio new / old {middle:.2f}."]
+    flagged = 0
+    for i, method in enumerate(both["method"]):
+        cells = np.isfinite(ratio[i])
+        if not cells.any():
+            continue
+        own = float(np.median(ratio[i][cells])) / middle
+        noise = max(NOISE, 1 + 3 * float(np.median(np.fmax(*(part[i][cells] for part in spread)))))
+        word = "slower" if own > noise else "faster" if own < 1 / noise else ""
+        flagged += own > noise
+        lines.append(f"{own:6.2f}  {method}  {word}".rstrip())
+    return lines, flagged

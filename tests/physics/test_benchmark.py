@@ -1,0 +1,152 @@
+"""The rivals of the benchmark against each other and the reference, and how a race is run."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from springtune import benchmark, calculix
+from springtune import network as network_module
+from springtune.benchmark import Scene
+from springtune.boundary import held, weights
+from springtune.dataset import BENCHMARK_VARIABLES
+from springtune.geometry import Beam
+from springtune.materials import Material
+from springtune.mesh import MESH_TYPES
+from springtune.network import Network
+from springtune.ordering import nested_dissection
+from springtune.reference.small_strain import solve_small_strain
+from springtune.rivals import METHODS
+from springtune.schemes import RIVALS, method_names
+from springtune.springs.lattice import half_weight
+from springtune.statics import StaticProblem
+from springtune.tables.benchmark import comparison
+
+BEAM = Beam("100x20", 0.1, 0.02, 1e-3)
+SCENES = {
+    "traction": Scene(BEAM, Material("steel", 210e9, 0.3, 7850.0), "traction", 20e3),
+    "bending": Scene(BEAM, Material("steel", 210e9, 0.3, 7850.0), "bending", 200.0),
+    "block": Scene(BEAM, Material("rubber", 1e6, 0.49, 1000.0), "pressure", -10.0),
+}
+CLOSE = {
+    # largest error at 2 mm, ten rows: linear triangles; quadratic; constant boundary elements; no physics
+    "traction": (5e-4, 1e-4, 1e-3, 5e-3),
+    "bending": (2e-2, 5e-4, 0.6, 3e-2),
+    "block": (2e-3, 3e-4, 1e-2, 0.3),
+}
+
+
+def answer(scene, method, size=2e-3):
+    return METHODS[method](scene, size, benchmark._Clock())
+
+
+@pytest.fixture(scope="module")
+def references():
+    return {
+        name: solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind).displacement
+        for name, scene in SCENES.items()
+    }
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_rival_comes_near_the_reference(name, references):
+    linear, quadratic, boundary, free = CLOSE[name]
+    allowed = dict.fromkeys(RIVALS, linear)
+    allowed |= {"quadratic-triangles": quadratic, "boundary-elements": boundary, "free-form": free}
+    for method in RIVALS:
+        if method.startswith("calculix") or "backward" in method:
+            continue
+        found, unknowns = answer(SCENES[name], method)
+        assert found == pytest.approx(references[name], rel=allowed[method]), method
+        assert unknowns > 0
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_ways_to_linear_triangles_agree(name):
+    """scikit-fem, vertex and edge tensors, condensed responses, motion to rest and springs with coupling are one."""
+    first, _ = answer(SCENES[name], "linear-triangles", 4e-3)
+    for method in ("tensor-mass", "condensation", "relaxation"):
+        assert answer(SCENES[name], method, 4e-3)[0] == pytest.approx(first, rel=1e-6), method
+
+
+def test_boundary_elements_converge(references):
+    errors = [abs(answer(SCENES["bending"], "boundary-elements", size)[0] / references["bending"] - 1)
+              for size in (4e-3, 2e-3, 1e-3)]  # fmt: skip
+    assert errors[0] > 1.3 * errors[1] > 1.3**2 * errors[2]
+
+
+@pytest.mark.skipif(not calculix.installed(), reason="needs CalculiX (ccx; Debian package calculix-ccx)")
+@pytest.mark.parametrize("name", SCENES)
+def test_calculix_takes_part(name, references):
+    assert answer(SCENES[name], "calculix-cps3")[0] == pytest.approx(references[name], rel=CLOSE[name][0])
+    assert answer(SCENES[name], "calculix-cps8")[0] == pytest.approx(references[name], rel=2e-3)
+
+
+def test_a_race_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
+    methods = method_names(["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "free-form"])
+    assert methods == ("lattice/structured", "lattice/braced", "delingette/structured", "linear-triangles", "free-form")
+    found = benchmark.run(SCENES["traction"], methods, (2e-3, 5e-3, 1e-2), 1e-6, ["lattice/braced"], 10.0)
+    sizes = {"scene": 1, "method": len(methods), "mesh_size": 3}
+    for name, values in found.items():
+        assert np.shape(values) == tuple(sizes[one] for one in BENCHMARK_VARIABLES[name][0] if one != "scene"), name
+    assert np.isfinite(found["seconds"][1]).all() and np.isfinite(found["seconds"][0]).tolist() == [False, False, True]
+    assert "left out" in found["message"][0, 0] and (found["peak_memory"][1] > 0).all()
+    assert np.abs(found["error"][2, 2]) < 0.01
+    parts = sum(found[f"{part}_seconds"][1] for part in benchmark.PARTS)
+    assert (parts <= 1.5 * found["seconds"][1]).all()
+
+
+def test_a_case_that_fails_is_stored_with_its_message():
+    found = benchmark.run(SCENES["traction"], ("van-gelder/braced",), (5e-3,), 1.0)
+    assert found["status"][0, 0] == 5 and found["message"][0, 0]
+
+
+def test_comparison_flags_what_became_slower():
+    values = np.full((1, 3, 2), 0.1)
+    coordinates = {"scene": ["a"], "method": ["x", "y", "z"], "mesh_size": [1e-3, 2e-3]}
+    old = xr.Dataset({"seconds": (("scene", "method", "mesh_size"), values),
+                      "seconds_spread": (("scene", "method", "mesh_size"), 0.01 * values)}, coordinates)  # fmt: skip
+    new = 2.0 * old  # a machine half as fast
+    assert comparison(old, new)[1] == 0
+    new["seconds"][0, 1] *= 2
+    lines, flagged = comparison(old, new)
+    assert flagged == 1 and any("y" in line and "slower" in line for line in lines)
+
+
+# -- what makes it fast ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+def test_nested_dissection_is_an_order_and_fills_in_less(mesh_type):
+    mesh = MESH_TYPES[mesh_type](0.2, 0.04, 2e-3)
+    order = nested_dissection(mesh.points, mesh.edges)
+    assert sorted(order.tolist()) == list(range(len(mesh.points)))
+    network = Network(mesh, held(mesh, "axial"), np.ones(len(mesh.edges)))
+    dense = network.rest_factor._lu.L.nnz
+    rows = network.unknowns**1.5  # what an order along the beam fills in is unknowns times the band
+    assert dense < rows
+
+
+def test_multigrid_gives_what_the_factorisation_gives(monkeypatch):
+    mesh = MESH_TYPES["structured"](0.2, 0.04, 2e-3)
+    pattern = weights(mesh, "axial")
+    answers = []
+    for largest in (10**9, 10):
+        monkeypatch.setattr(network_module, "LARGE", largest)
+        problem = StaticProblem(Network(mesh, held(mesh, "axial"), half_weight(mesh)), pattern)
+        found = problem.linear(1e-3)
+        assert found.converged and problem.judge(1e-3, found)[0] == "solved"
+        answers.append((found.factor.name, float(np.tensordot(found.displacements, pattern, axes=2))))
+    assert [name for name, _ in answers] == ["factorisation", "multigrid"]
+    assert answers[1][1] == pytest.approx(answers[0][1], rel=1e-9)
+
+
+def test_multigrid_refuses_a_network_beyond_its_buckling_load(monkeypatch):
+    mesh = MESH_TYPES["structured"](0.2, 0.01, 2e-3)
+    problem = StaticProblem(Network(mesh, held(mesh, "axial"), half_weight(mesh)), weights(mesh, "axial"))
+    bent = 5e-3 * problem.slope / np.abs(problem.slope).max() * -1
+    assert problem.network.factorize(bent).negative_pivots > 0
+    monkeypatch.setattr(network_module, "LARGE", 10)
+    factor = problem.network.factorize(bent)
+    across = problem.network.reduce(np.stack([0 * mesh.points[:, 0], mesh.points[:, 0] ** 2], axis=1))
+    with pytest.raises(network_module.SingularError):
+        factor.solve(across)
