@@ -275,7 +275,15 @@ class Factor:
 
     @cached_property
     def negative_pivots(self):
-        """Number of negative eigenvalues of the matrix; 0 where the equilibrium is stable."""
+        """Number of negative eigenvalues of the matrix; 0 where the equilibrium is stable.
+
+        Raises
+        ------
+        SingularError
+            If a pivot on the diagonal is zero and the factorisation went beside it: its signs then say nothing.
+        """
+        if (self._lu.perm_r != self._lu.perm_c).any():
+            raise SingularError("a zero pivot")
         return int((self._lu.U.diagonal() < 0).sum())
 
 

@@ -218,9 +218,9 @@ def stable_until(problem, targets):
     def stable(place):
         try:
             tangent = problem.network.factorize(problem.rest.predict(targets[by_load[place]]))
+            return tangent.negative_pivots == 0
         except SingularError:
             return False
-        return tangent.negative_pivots == 0
 
     count = int(np.searchsorted(loads, critical))  # of stable loads
     if count and not stable(count - 1):

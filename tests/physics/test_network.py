@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from springtune.materials import Material
+from springtune.network import Factor, SingularError
 from springtune.springs import lattice as lattice_springs
 from springtune.springs.lattice import COEFFICIENT, uniform
 
@@ -104,6 +107,16 @@ def test_tangent_is_symmetric_and_matches_a_dense_assembly():
     ours = network.tangent(here).toarray()
     assert np.abs(ours - ours.T).max() <= 1e-14
     assert np.abs(ours - dense[np.ix_(free, free)]).max() <= 1e-12
+
+
+def test_pivots_beside_the_diagonal_are_not_counted():
+    """Eigenvalues 1 and -1, no pivot on the diagonal: both signs of the factor are positive, and say nothing."""
+    matrix = csc_array(np.array([[0.0, 1.0], [1.0, 0.0]]))
+    lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factor = Factor(lu, np.arange(2))
+    assert factor.solve(np.array([1.0, 2.0])).tolist() == [2.0, 1.0]
+    with pytest.raises(SingularError, match="zero pivot"):
+        factor.negative_pivots  # noqa: B018
 
 
 def test_negative_pivots_count_negative_eigenvalues():
