@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from .mesh.cells import DIAGONALS, SIDES
 from .ordering import nested_dissection
 
 LARGE = 200_000
@@ -57,7 +58,7 @@ class Network:
 
     @cached_property
     def _pattern(self):
-        return _Pattern(self.mesh.points, self.mesh.edges, self.held)
+        return _Pattern(self.mesh, self.held)
 
     @property
     def unknowns(self):
@@ -108,15 +109,16 @@ class Network:
         normals = self.rest_vectors / self.rest_lengths[:, None]
         pull = self.stiffness * np.einsum("ij,ij->i", normals, self.stretch(displacements))
         resistance = -self._pattern.sum_springs(pull[:, None] * normals)
-        for energy, matrices in zip(self.energies, self._rest_tangents):
-            count, corners = energy.corners.shape
-            forces = np.einsum("nij,nj->ni", matrices, displacements[energy.corners].reshape(count, -1))
-            resistance += self._pattern.sum_cells(energy.corners, forces.reshape(count, corners, 2))
+        if self.energies:
+            apart = self.stretch(displacements).T
+            at_first = np.einsum("abn,bn->na", self._rest_couplings, apart)
+            at_second = np.einsum("ban,bn->na", self._rest_couplings, apart)
+            resistance += self._pattern.sum_springs(at_first, at_second)
         return resistance
 
     @cached_property
-    def _rest_tangents(self):
-        return [energy.tangent() for energy in self.energies]
+    def _rest_couplings(self):
+        return self._pattern.cell_couplings(self.energies)
 
     def energy(self, displacements):
         """Energy of the network over the reference stiffness [m2]."""
@@ -146,16 +148,18 @@ class Network:
             ratio = self.rest_lengths / np.sqrt(squares)
         along = self.stiffness * ratio / squares
         across = self.stiffness * (1.0 - ratio)
-        xx = across + along * vectors[:, 0] ** 2
-        xy = along * vectors[:, 0] * vectors[:, 1]
-        yy = across + along * vectors[:, 1] ** 2
-        data = self._pattern.spring_entries(xx, xy, yy)
-        for number, energy in enumerate(self.energies):
-            matrices = self._rest_tangents[number] if displacements is None else energy.tangent(displacements)
-            data += self._pattern.cell_entries(energy.corners, matrices)
+        x, y = vectors.T
+        couplings = np.empty((2, 2, len(along)))
+        couplings[0, 0] = -across - along * x * x
+        couplings[0, 1] = couplings[1, 0] = -along * x * y
+        couplings[1, 1] = -across - along * y * y
+        if self.energies:
+            at_rest = displacements is None
+            couplings += self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)
+        data = self._pattern.coupling_entries(couplings)
         if follower is not None:
             s, load = follower
-            data -= s * self._pattern.cell_entries(load.edges, load.derivative)
+            data -= s * self._pattern.entries(load.edges, load.derivative)
         return self._pattern.matrix(data)
 
     @cached_property
@@ -293,55 +297,48 @@ class _Pattern:
     All particles of a cell are joined by springs, so the springs' entries are all there are.
     """
 
-    def __init__(self, points, springs, held):
-        self.points, self.springs = points, springs
+    def __init__(self, mesh, held):
+        self.mesh, self.springs = mesh, mesh.edges
+        self.first, self.second = (np.ascontiguousarray(ends) for ends in self.springs.T)
         self.shape = held.shape
         self.places = np.flatnonzero(~held.ravel())
         self.size = len(self.places)
         number = np.full(held.size, -1)
         number[self.places] = np.arange(self.size)
         self.number = number.reshape(-1, 2)
-        self.indices, self.pointers, self.kept, self.slots = self._sparsity()
-        self.cells = {}
+        self.indices, self.pointers, self.sources = self._sparsity()
 
     def _sparsity(self):
-        """Rows and column pointers of the matrix; of the springs' 4 x 4 entries those that are kept, and their places.
+        """Rows and column pointers of the matrix; for each entry its place in what `coupling_entries` puts together.
 
         Block by block of two directions each: sorting those is a sixth of the work of sorting entries.
         """
         count, joined = self.shape[0], len(self.springs)
-        (first, second), own = self.springs.T, np.arange(self.shape[0])
+        first, second, own = self.first, self.second, np.arange(self.shape[0])
         columns, rows = np.concatenate([second, first, own]), np.concatenate([first, second, own])
         order = np.argsort(columns * count + rows)
         columns, rows = columns[order], rows[order]
-        place = np.empty(len(order), dtype=np.int64)
-        place[order] = np.arange(len(order))
         sizes = np.bincount(columns, minlength=count)
+        # Place of entry (0, 0) of each block in what it comes from, and the steps to the next row and column of it.
+        place = np.concatenate([np.arange(joined), np.arange(joined), 4 * joined + own])[order]
+        down = np.repeat([2 * joined, joined, 2 * count], [joined, joined, count])[order]
+        right = np.repeat([joined, 2 * joined, count], [joined, joined, count])[order]
         before = np.cumsum(sizes) - sizes
         # Entry (a, d) of a block stands in column d of its particle's two, each twice as high as the blocks are many.
         corner = 4 * before[columns] + 2 * (np.arange(len(order)) - before[columns])
         height = 2 * sizes[columns]
-        row_of, kept = np.empty(4 * len(order), dtype=np.int64), np.empty(4 * len(order), dtype=bool)
+        row_of, source = np.empty((2, 4 * len(order)), dtype=np.int64)
+        kept = np.empty(4 * len(order), dtype=bool)
         for a in range(2):
             for d in range(2):
-                row_of[corner + d * height + a] = row = self.number[rows, a]
-                kept[corner + d * height + a] = (row >= 0) & (self.number[columns, d] >= 0)
-        new = np.cumsum(kept) - 1
-        new[~kept] = -1
+                at = corner + d * height + a
+                row_of[at] = row = self.number[rows, a]
+                kept[at] = (row >= 0) & (self.number[columns, d] >= 0)
+                source[at] = place + a * down + d * right
         ends = np.repeat(2 * sizes, 2).cumsum()
         filled = np.concatenate([[0], np.cumsum(kept)[ends - 1]])
         pointers = filled[np.concatenate([[True], self.number.ravel() >= 0])].astype(np.int32)
-        slots = np.empty((joined, 2, 2, 2, 2), dtype=np.int64)  # spring, end, direction, end, direction
-        numbers = np.arange(joined)
-        blocks = {(0, 0): first + 2 * joined, (0, 1): numbers, (1, 0): joined + numbers, (1, 1): second + 2 * joined}
-        for (i, j), block in blocks.items():
-            at = place[block]
-            for a in range(2):
-                for d in range(2):
-                    slots[:, i, a, j, d] = new[corner[at] + d * height[at] + a]
-        slots = slots.ravel()
-        chosen = np.flatnonzero(slots >= 0)
-        return row_of[kept].astype(np.int32), pointers, chosen, slots[chosen]
+        return row_of[kept].astype(np.int32), pointers, source[kept]
 
     @cached_property
     def codes(self):
@@ -351,7 +348,7 @@ class _Pattern:
     @cached_property
     def elimination(self):
         """Unknowns in the order of elimination; place and row of each entry in that order, and column pointers."""
-        order = self.number[nested_dissection(self.points, self.springs)].ravel()
+        order = self.number[nested_dissection(self.mesh.points, self.springs)].ravel()
         order = order[order >= 0]
         rank = np.empty(self.size, dtype=np.int64)
         rank[order] = np.arange(self.size)
@@ -380,37 +377,61 @@ class _Pattern:
     def reduce(self, vectors):
         return vectors.ravel()[self.places]
 
-    def sum_springs(self, forces):
-        first, second = self.springs.T
+    def sum_springs(self, at_first, at_second=None):
+        """Sum over springs of what is added at their first ends and taken off at their second, by default the same."""
         count = self.shape[0]
+        at_second = at_first if at_second is None else at_second
         total = np.empty(self.shape)
         for axis in range(2):
-            weights = forces[:, axis]
-            total[:, axis] = np.bincount(first, weights, count) - np.bincount(second, weights, count)
+            total[:, axis] = np.bincount(self.first, at_first[:, axis], count)
+            total[:, axis] -= np.bincount(self.second, at_second[:, axis], count)
         return total
 
     def sum_cells(self, corners, forces):
-        places = corners.ravel()
-        total = [np.bincount(places, forces[:, :, axis].ravel(), self.shape[0]) for axis in range(2)]
+        places = corners.T.ravel()
+        total = [np.bincount(places, forces[:, :, axis].T.ravel(), self.shape[0]) for axis in range(2)]
         return np.stack(total, axis=1)
 
-    def spring_entries(self, xx, xy, yy):
-        block = np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2)
-        entries = np.empty((len(xx), 2, 2, 2, 2))  # spring, end, direction, end, direction
-        entries[:, 0, :, 0, :] = entries[:, 1, :, 1, :] = block
-        entries[:, 0, :, 1, :] = entries[:, 1, :, 0, :] = -block
-        return np.bincount(self.slots, entries.ravel()[self.kept], len(self.indices))
+    def cell_couplings(self, energies, displacements=None):
+        """Blocks of the tangent of energies that couple the ends of each spring, shape (2, 2, n_springs)."""
+        count = len(self.springs)
+        total = np.zeros((2, 2, count))
+        for energy in energies:
+            places = self._cell_springs[energy.corners.shape[1]]
+            blocks = np.ascontiguousarray(energy.couplings(displacements).transpose(1, 2, 0, 3))
+            for a in range(2):
+                for d in range(2):
+                    ours, turned = np.bincount(places, blocks[a, d].ravel(), 2 * count).reshape(2, count)
+                    total[a, d] += ours
+                    total[d, a] += turned
+        return total
 
-    def cell_entries(self, corners, matrices):
-        name = corners.shape[1]  # a mesh has its triangles and its quadrilaterals
-        if name not in self.cells:
-            kept, codes = self._codes(corners)
-            self.cells[name] = kept, np.searchsorted(self.codes, codes)
-        kept, slots = self.cells[name]
-        return np.bincount(slots, matrices.ravel()[kept], len(self.indices))
+    @cached_property
+    def _cell_springs(self):
+        """Spring of each pair of corners by number of corners, beyond the last one where it runs the other way."""
+        found = {}
+        for count, corners in self.mesh.cells.items():
+            first, second = np.transpose(SIDES[count] + DIAGONALS[count])
+            turned = corners[:, first] > corners[:, second]
+            found[count] = (self.mesh.cell_edges[count] + len(self.springs) * turned).T.ravel()
+        return found
+
+    def coupling_entries(self, couplings):
+        """Entries of the tangent from its blocks that couple the ends of each spring, shape (2, 2, n_springs).
+
+        A common displacement costs nothing: the block of a particle is what its springs' blocks lack to that.
+        """
+        count = self.shape[0]
+        own = np.empty((2, 2, count))
+        for a in range(2):
+            for d in range(a, 2):
+                own[a, d] = -np.bincount(self.first, couplings[a, d], count)
+                own[a, d] -= np.bincount(self.second, couplings[d, a], count)
+        own[1, 0] = own[0, 1]
+        return np.concatenate([couplings.ravel(), own.ravel()])[self.sources]
 
     def entries(self, particles, matrices):
-        """As `cell_entries`, of groups of joined particles that change from call to call."""
+        """Entries of matrices of groups of joined particles, shape (n, 2 m, 2 m)."""
         kept, codes = self._codes(particles)
         return np.bincount(np.searchsorted(self.codes, codes), matrices.ravel()[kept], len(self.indices))
 
