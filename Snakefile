@@ -24,7 +24,7 @@ rule all:
         f"The study is in {RESULTS}: dataset.nc, figures, tables/index.html"
     input:
         # Stages before the dataset, too: what they store is made again where it is missing.
-        rules.reference.output,
+        REFERENCES,
         expand(RESULTS / "done/{stage}_{bundle}.json", stage=["mesh", "solve"], bundle=BUNDLES["solve"]),
         rules.collect.input.curves,
         rules.collect.input.moduli,

@@ -9,6 +9,7 @@ import click
 
 from . import __version__
 from .loads import LOADS
+from .reference.unit import unit_problem
 
 SCHEMA = "study.schema.json"
 MANUAL = "README.md"
@@ -277,7 +278,7 @@ def summary(study):
     -------
     str
     """
-    pairs = {(reference.beam, reference.material, LOADS[reference.load].kind) for reference in study.references}
+    units = {unit_problem(one.beam, one.material, LOADS[one.load].kind) for one in study.references}
     networks = _networks(study)
     asked = sum(len(grid.scenes) for grid in study.grids)
     users = len(study.scenes) + len(study.curves)
@@ -285,7 +286,11 @@ def summary(study):
     rows = [
         ["scenes", len(study.scenes), again],
         ["meshes", len(study.meshes), f"each serves {users / len(study.meshes):.3g} scenes and curves on average"],
-        ["references", len(study.references), f"from {_count(len(pairs), 'solution')}: small strain scales with force"],
+        [
+            "references",
+            len(study.references),
+            f"from {_count(len(units), 'solution')}: small strain scales with force, E t and size",
+        ],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
         ["networks", networks, "to factorise at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]

@@ -60,7 +60,7 @@ class TestScenes:
         lines = words(result.stdout)
         assert "scenes 270" in lines
         assert "meshes 18 each serves 20 scenes and curves on average" in lines
-        assert "references 9 from 6 solutions: small strain scales with force" in lines
+        assert "references 9 from 4 solutions: small strain scales with force, E t and size" in lines
         assert any(line.startswith("curves 90 of 61 stiffnesses") for line in lines)
         assert any(line.startswith("networks 45 ") for line in lines)
         assert "printed 45 cells to compare with, 45 of them in this study" in lines

@@ -139,3 +139,28 @@ def test_bad_input_is_one_message_and_nothing_written(run, change, words):
         assert word in output
     assert "Traceback" not in output
     assert not (run.folder / "results/bad").exists()
+
+
+def test_what_differs_by_a_scale_alone_has_one_reference(run):
+    """Size, thickness, Young's modulus and force scale a reference; Poisson's ratio and the aspect ratio do not."""
+    text = study("10 mm").replace(
+        "beams: {small:", "beams: {large: {length: 100 mm, height: 40 mm, thickness: 3 mm}, small:"
+    )
+    text = text.replace("materials: {", "materials: {soft: {young_modulus: 1 MPa, poisson_ratio: 0.3}, ")
+    text = text.replace("    material: steel\n", "    material: [steel, soft]\n").replace(
+        "    beam: small\n", "    beam: [large, small]\n"
+    )
+    text = text.replace("load: traction", "load: [traction, compression]").replace("force: 20 kN", "force: 20 mN")
+    text = text.replace("definition: [paper, lattice]", "definition: lattice\n    kinematics: linear")
+    run.write("scales.yaml", text)
+    code, output = run.snakemake("scales.yaml", "--until", "collect")
+    assert code == 0, output
+    assert len(run.times("results/scales/references/*.h5")) == 1
+    assert not run.times("results/scales/done/calibrate.json")  # and nothing calibrates where nothing is calibrated
+    compliance = dataset(run, "scales").reference_displacement / dataset(run, "scales").force
+    small = compliance.sel(beam="small", material="steel")
+    for load in ("traction", "compression"):
+        # The same shape: the displacement goes as F / (E t), whatever the size.
+        assert compliance.sel(beam="large", material="steel", load=load) == pytest.approx(small.sel(load=load) / 3)
+        soft = compliance.sel(beam="small", material="soft", load=load)
+        assert soft == pytest.approx(small.sel(load=load) * 210e3)

@@ -3,8 +3,8 @@ rule collect:
         "Comparing, and collecting the dataset"
     input:
         config=CONFIG,
-        references=rules.reference.output,
-        calibration=rules.calibrate.output,
+        references=REFERENCES,
+        calibration=CALIBRATION,
         curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
         scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES["solve"]),
         laying=expand(RESULTS / "done/laying_{bundle}.json", bundle=BUNDLES["laying"]),

@@ -1,14 +1,17 @@
+REFERENCES = expand(RESULTS / "done/reference_{bundle}.json", bundle=BUNDLES["reference"])
+
+
 rule reference:
     message:
-        "Solving the finite-element references"
+        "Solving the finite-element references of bundle {wildcards.bundle}"
     input:
-        tasks=RESULTS / "tasks/reference.json",
+        tasks=RESULTS / "tasks/reference_{bundle}.json",
         code=modules("reference"),
     output:
-        RESULTS / "done/reference.json",
+        RESULTS / "done/reference_{bundle}.json",
     log:
-        RESULTS / "logs/reference.log",
+        RESULTS / "logs/reference_{bundle}.log",
     benchmark:
-        RESULTS / "benchmarks/reference.tsv"
+        RESULTS / "benchmarks/reference_{bundle}.tsv"
     shell:
         "python -m springtune.stages.reference {input.tasks} {output} > {log} 2>&1"

@@ -1,3 +1,7 @@
+# Stiffnesses of calibrated scenes; a study may have none.
+CALIBRATION = expand(RESULTS / "done/{name}.json", name=BUNDLES["calibrate"])
+
+
 rule sensitivity:
     message:
         "Tracing the sensitivity curves of bundle {wildcards.bundle}"
@@ -21,7 +25,7 @@ rule calibrate:
     input:
         tasks=RESULTS / "tasks/calibrate.json",
         curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
-        references=rules.reference.output,
+        references=REFERENCES,
         code=modules("calibrate"),
     output:
         RESULTS / "done/calibrate.json",

@@ -4,8 +4,8 @@ rule solve:
     input:
         tasks=RESULTS / "tasks/solve_{bundle}.json",
         meshes=RESULTS / "done/mesh_{bundle}.json",
-        references=rules.reference.output,
-        calibration=rules.calibrate.output,
+        references=REFERENCES,
+        calibration=CALIBRATION,
         code=modules("solve"),
     output:
         RESULTS / "done/solve_{bundle}.json",
@@ -14,4 +14,4 @@ rule solve:
     benchmark:
         RESULTS / "benchmarks/solve_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.solve {input.tasks} {input.calibration} {output} > {log} 2>&1"
+        "python -m springtune.stages.solve {input.tasks} {output} {input.calibration} > {log} 2>&1"

@@ -19,6 +19,7 @@ to 1e-6 with some thousand unknowns.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from math import ceil, log
 
 import numpy as np
@@ -30,6 +31,7 @@ from ..geometry import Beam
 from ..loads import KINDS
 from ..materials import Material
 from .field import interpolate
+from .unit import unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
 FIRST_LEVEL, LAST_LEVEL = 3, 8
@@ -82,10 +84,10 @@ class ReferenceSolution:
     displacements: np.ndarray
     unknowns: int
 
-    def scaled(self, factor: float) -> "ReferenceSolution":
-        """The solution under `factor` times the force; exact, since small strain is linear."""
-        names = ("displacement", "mean_displacement", "displacements")
-        return replace(self, **{name: getattr(self, name) * factor for name in names})
+    def scaled(self, factor: float, length: float = 1.0) -> "ReferenceSolution":
+        """The solution with displacements times `factor` on a beam of sizes times `length`; small strain is linear."""
+        names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
+        return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points of the beam [m], shape (n, 2); see `springtune.reference.field.interpolate`."""
@@ -123,8 +125,7 @@ def solve_small_strain(
 
     Notes
     -----
-    Lengths over half the height and stresses over the traction leave a problem of the aspect ratio and of nu alone, so
-    the displacement is exactly proportional to ``force / (E t)``.
+    The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.unit`.
 
     The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive levels
     are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and what is missing is the sum of all
@@ -152,26 +153,50 @@ def solve_small_strain(
         raise ValueError(f"Poisson's ratio of {material.name!r} is {nu}: isotropic materials have -1 < nu <= 0.5")
     if kind not in KINDS:
         raise ValueError(f"unknown kind of load {kind!r}; known: {', '.join(KINDS)}")
-    name = f"{beam.name}, {material.name}"
-    level, estimate = _converge(2 * beam.length / beam.height, nu, tolerance, name, kind)
-    half_height = beam.height / 2
-    side = beam.length if kind in ("shear", "face") else beam.height
-    scale = half_height * force / (side * beam.thickness * material.young_modulus)
+    length, displacement = unit_scales(beam, material, kind)
+    return solve_unit(*unit_problem(beam, material, kind), tolerance).scaled(force * displacement, length)
+
+
+def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-4) -> ReferenceSolution:
+    """Displacements of a beam of height 2 with E = 1 under traction 1; see `springtune.reference.unit`.
+
+    Parameters
+    ----------
+    aspect_ratio : float
+        Length over height [1].
+    nu : float
+        Poisson's ratio [1].
+    kind : str
+        Kind of load, one of `springtune.loads.KINDS`.
+    tolerance : float
+        Largest relative error estimate to accept [1].
+
+    Returns
+    -------
+    ReferenceSolution
+        In units of half the height and of the traction over Young's modulus.
+
+    Raises
+    ------
+    ReferenceNotConvergedError
+        If the last level does not meet the tolerance.
+    """
+    level, estimate = _converge(aspect_ratio, nu, kind, tolerance)
     x, y, field = level.field()
     return ReferenceSolution(
-        displacement=scale * level.measured,
-        mean_displacement=scale * level.displacement,
+        displacement=level.measured,
+        mean_displacement=level.displacement,
         error_estimate=estimate,
-        x=half_height * x,
-        y=half_height * (y + 1.0),
-        displacements=scale * field,
+        x=x,
+        y=y + 1.0,
+        displacements=field,
         unknowns=level.unknowns,
     )
 
 
-def _converge(length, nu, tolerance, name, kind):
+def _converge(aspect_ratio, nu, kind, tolerance):
     """First level whose error estimate meets the tolerance, and the estimate."""
-    aspect_ratio = length / 2  # the length is in half heights
+    length = 2 * aspect_ratio  # in half heights
     round_off = ROUND_OFF * (1 + aspect_ratio ** (4 if kind == "bending" else 2))
     values, middle = [], 0.0
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
@@ -186,8 +211,8 @@ def _converge(length, nu, tolerance, name, kind):
         if estimate <= tolerance and (last <= before / 2 or before <= round_off):
             return level, estimate
     raise ReferenceNotConvergedError(
-        f"reference of {name}: relative error estimate {estimate:.1e} at level {degree} ({level.unknowns} unknowns), "
-        f"the last one, the tolerance is {tolerance:.1e}"
+        f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative error estimate "
+        f"{estimate:.1e} at level {degree} ({level.unknowns} unknowns), the last one, the tolerance is {tolerance:.1e}"
     )
 
 
@@ -222,6 +247,42 @@ class UnitLevel:
     """
 
     def __init__(self, length, nu, degree, kind="axial"):
+        self._grid = grid = _grid(length, degree, kind)
+        solution = grid.solve(nu)
+        self.displacement = float(grid.load @ solution) / (length / 2 if kind in ("shear", "face") else 1.0)
+        self.unknowns = len(solution)
+        self._coefficients = grid.expand(solution)
+        self.measured = self.displacement
+        if kind == "face":
+            self.measured = float(self.displacements(np.array([length / 2]), np.array([1.0]))[0, 0, 1])
+
+    def displacements(self, x, y):
+        """Displacements on the grid of the coordinates x (0 to length) and y (-1 to 1), shape (n_x, n_y, 2)."""
+        return self._sum(self._grid.values(x, y))
+
+    def field(self):
+        """Coordinates along x (0 to length) and y (-1 to 1) of a grid, and displacements; see `ReferenceSolution`."""
+        x, y = self._grid.plot_points
+        return x, y, self._sum(self._grid.plot_values)
+
+    def _sum(self, values):
+        signs, at_x, at_y = values
+        return np.stack([sign * (at_x @ part @ at_y.T) for sign, part in zip(signs, self._coefficients)], axis=2)
+
+
+@lru_cache(maxsize=2 * LAST_LEVEL)
+def _grid(length, degree, kind):
+    """Grids are shared by references that differ in Poisson's ratio alone."""
+    return _Grid(length, degree, kind)
+
+
+class _Grid:
+    """Elements of one level, and of its matrix and load what does not depend on Poisson's ratio.
+
+    Parameters are those of `UnitLevel`.
+    """
+
+    def __init__(self, length, degree, kind):
         self._length, self._kind = length, kind
         if kind in ("shear", "face"):  # the left half, from y = 0 to 2
             along, across = _graded(length / 2, min(length / 2, 1.0), degree), _graded_both(2.0, degree)
@@ -237,45 +298,49 @@ class UnitLevel:
             "shear": (((), (y.first,)), ((x.last,), (y.first, y.last))),
             "face": (((x.last,), (y.first,)), ((), (y.first,))),
         }[kind]
-        (x_1, y_1), (x_2, y_2) = (
+        self._unknowns = first, second = [
             [line.all[~np.isin(line.all, ends)] for line, ends in zip((x, y), sides)] for sides in (x_held, y_held)
-        )
-        direct, shear = 1 / (1 - nu**2), 1 / (2 * (1 + nu))
+        ]
 
         def product(of_x, of_y, rows, columns):
             return kron(_part(of_x, rows[0], columns[0]), _part(of_y, rows[1], columns[1]))
 
-        first, second = (x_1, y_1), (x_2, y_2)
-        xx = direct * product(x.slope, y.mass, first, first) + shear * product(x.mass, y.slope, first, first)
-        yy = direct * product(x.mass, y.slope, second, second) + shear * product(x.slope, y.mass, second, second)
-        xy = nu * direct * product(x.mixed, y.mixed.T, first, second)
-        xy = xy + shear * product(x.mixed.T, y.mixed, first, second)
-        matrix = block_array([[xx, xy], [xy.T, yy]], format="csc")
+        lateral, turning = product(x.mixed, y.mixed.T, first, second), product(x.mixed.T, y.mixed, first, second)
+        direct = [product(x.slope, y.mass, first, first), product(x.mass, y.slope, second, second)]
+        shear = [product(x.mass, y.slope, first, first), product(x.slope, y.mass, second, second)]
+        self._direct = block_array([[direct[0], None], [None, direct[1]]], format="csc")
+        self._lateral = block_array([[None, lateral], [lateral.T, None]], format="csc")
+        self._shear = block_array([[shear[0], turning], [turning.T, shear[1]]], format="csc")
 
-        load = np.zeros(matrix.shape[0])
-        split = len(x_1) * len(y_1)
+        (x_1, y_1), (x_2, y_2) = first, second
+        self.load = np.zeros(len(x_1) * len(y_1) + len(x_2) * len(y_2))
+        self._split = split = len(x_1) * len(y_1)
         if kind == "axial":
-            load[:split] = np.kron(x_1 == x.last, y.integrals[y_1])
+            self.load[:split] = np.kron(x_1 == x.last, y.integrals[y_1])
         elif kind == "bending":
-            load[split:] = np.kron(x_2 == x.last, y.integrals[y_2])
+            self.load[split:] = np.kron(x_2 == x.last, y.integrals[y_2])
         elif kind == "shear":
-            load[:split] = np.kron(x.integrals[x_1], y_1 == y.last)
+            self.load[:split] = np.kron(x.integrals[x_1], y_1 == y.last)
         else:
-            load[split:] = np.kron(x.integrals[x_2], y_2 == y.last)
+            self.load[split:] = np.kron(x.integrals[x_2], y_2 == y.last)
+
+    def solve(self, nu):
+        """Unknowns for a Poisson's ratio."""
+        direct, shear = 1 / (1 - nu**2), 1 / (2 * (1 + nu))
+        matrix = direct * (self._direct + nu * self._lateral) + shear * self._shear
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        solution = factor.solve(load)
+        return factor.solve(self.load)
 
-        self.displacement = float(load @ solution) / (length / 2 if kind in ("shear", "face") else 1.0)
-        self.unknowns = len(load)
-        self._coefficients = np.zeros((2, len(x.all), len(y.all)))
-        self._coefficients[0][np.ix_(x_1, y_1)] = solution[:split].reshape(len(x_1), -1)
-        self._coefficients[1][np.ix_(x_2, y_2)] = solution[split:].reshape(len(x_2), -1)
-        self.measured = self.displacement
-        if kind == "face":
-            self.measured = float(self.displacements(np.array([length / 2]), np.array([1.0]))[0, 0, 1])
+    def expand(self, solution):
+        """Coefficients of all products of polynomials, shape (2, n along x, n along y)."""
+        coefficients = np.zeros((2, len(self._x.all), len(self._y.all)))
+        parts = solution[: self._split], solution[self._split :]
+        for full, (along, across), part in zip(coefficients, self._unknowns, parts):
+            full[np.ix_(along, across)] = part.reshape(len(along), -1)
+        return coefficients
 
-    def displacements(self, x, y):
-        """Displacements on the grid of the coordinates x (0 to length) and y (-1 to 1), shape (n_x, n_y, 2)."""
+    def values(self, x, y):
+        """Signs of the two displacements on a grid of coordinates, and what takes coefficients there along x and y."""
         signs = np.ones((2, len(x), len(y)))
         if self._kind in ("shear", "face"):
             signs[1 if self._kind == "shear" else 0] = np.sign(self._length / 2 - x)[:, None]
@@ -283,16 +348,18 @@ class UnitLevel:
         else:
             signs[0 if self._kind == "bending" else 1] = np.sign(y)
             y = np.abs(y)
-        at_x, at_y = self._x.values(x), self._y.values(y)
-        return np.stack([sign * (at_x @ part @ at_y.T) for sign, part in zip(signs, self._coefficients)], axis=2)
+        return signs, self._x.values(x), self._y.values(y)
 
-    def field(self):
-        """Coordinates along x (0 to length) and y (-1 to 1) of a grid, and displacements; see `ReferenceSolution`."""
+    @cached_property
+    def plot_points(self):
+        """Coordinates along x and y of the points of the field that is handed out."""
         spacing = (2 * self._length / FIELD_POINTS) ** 0.5
         x, half = _plot_points(self._length / 2, spacing), 1 - _plot_points(1.0, spacing)[::-1]
-        x = np.concatenate([x, self._length - x[-2::-1]])
-        y = np.concatenate([-half[:0:-1], half])
-        return x, y, self.displacements(x, y)
+        return np.concatenate([x, self._length - x[-2::-1]]), np.concatenate([-half[:0:-1], half])
+
+    @cached_property
+    def plot_values(self):
+        return self.values(*self.plot_points)
 
 
 class _Line:

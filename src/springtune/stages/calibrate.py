@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compare import best_stiffness
 from ..springs.calibrated import calibrate
-from . import files, store
+from . import files, references, store
 
 
 def run(tasks, done):
@@ -17,7 +17,7 @@ def run(tasks, done):
     ----------
     tasks : str or Path
         JSON file: ``curves`` (folder), ``references`` (folder) and ``groups``, each with ``name`` and ``members``, and
-        each of these with ``mesh, key, reference, reference_key, force, stiffnesses``.
+        each of these with ``mesh, key, reference, force, stiffnesses``.
     done : str or Path
         JSON file to write: calibrated stiffness [N/m] by name of the group, and a message where there is none.
     """
@@ -34,8 +34,7 @@ def run(tasks, done):
 def _best(tasks, member):
     name = member["key"]
     curve = store.read(Path(tasks["curves"]) / f"{member['mesh']}.h5", [name], ["displacement"])[name]
-    name = member["reference_key"]
-    reference = store.read(Path(tasks["references"]) / f"{member['reference']}.h5", [name])[name]
+    reference = references.read(tasks["references"], member["reference"])
     displacement = member["force"] * reference.get("displacement", np.nan)
     return best_stiffness(np.array(member["stiffnesses"]), curve["displacement"], displacement)
 

@@ -21,7 +21,7 @@ from ..mesh import read_mesh
 from ..reference.field import outline
 from ..springs.lattice import predicted_stiffness
 from ..study import load_study
-from . import files, store, tasks
+from . import bundles, files, references, store, tasks
 
 SOFTWARE = (
     "h5netcdf",
@@ -70,7 +70,7 @@ def run(config, folder, output):
     axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
     root = _Filler(dataset.empty(axes, dataset.ROOT_VARIABLES))
     _meshes(study, folder, root)
-    references = _references(study, folder, root)
+    displacements = _references(study, folder, root)
     _scenes(study, folder, root)
     for material in {scene.material for scene in study.scenes}:
         values = {
@@ -86,7 +86,7 @@ def run(config, folder, output):
     )
     groups = {"/": data}
     if study.curves:
-        groups["/sensitivity"] = _sensitivity(study, folder, references, axes)
+        groups["/sensitivity"] = _sensitivity(study, folder, displacements, axes)
     if study.moduli:
         groups["/moduli"] = _moduli(study, folder, axes)
     if any(LOADS[scene.load].kind == "face" for scene in study.scenes):
@@ -100,6 +100,7 @@ def run(config, folder, output):
     if "deformed" in study.outputs:
         groups["/fields"] = _fields(study, folder, axes)
     dataset.write(output, groups, _attributes(study, config))
+    bundles.remember(folder.parent / tasks.COSTS, bundles.work_of(folder))
 
 
 class _Filler:
@@ -128,6 +129,12 @@ def _mesh_labels(mesh):
     return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
 
 
+def _calibration(folder):
+    """Calibrated stiffnesses by group; none where no scene is calibrated."""
+    path = folder / "done" / "calibrate.json"
+    return files.read_json(path) if path.exists() else {}
+
+
 def _meshes(study, folder, root):
     for mesh in study.meshes:
         notes = files.read_json(folder / "meshes" / f"{mesh.name}.json")
@@ -152,13 +159,12 @@ def _references(study, folder, root):
 
 
 def _reference(folder, asked, fields=()):
-    name = tasks.reference_key(asked.beam, asked.material, asked.load)
-    file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
-    return store.read(file, [name], fields)[name]
+    reference = tasks.reference_of(asked.beam, asked.material, asked.load)
+    return references.read(folder / "references", reference, fields)
 
 
 def _scenes(study, folder, root):
-    calibration = files.read_json(folder / "done" / "calibrate.json")
+    calibration = _calibration(folder)
     for mesh, scenes in _by_mesh(study.scenes).items():
         names = [tasks.solved_key(study, scene, calibration) for scene in scenes]
         results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names))
@@ -189,7 +195,7 @@ def _printed(study, root):
             continue  # a cell that this study does not ask for
 
 
-def _sensitivity(study, folder, references, axes):
+def _sensitivity(study, folder, displacements, axes):
     curves = _Filler(dataset.empty(axes, dataset.SENSITIVITY_VARIABLES))
     for mesh, members in _by_mesh(study.curves).items():
         names = [tasks.curve_key(study, curve) for curve in members]
@@ -197,7 +203,7 @@ def _sensitivity(study, folder, references, axes):
         for curve, name in zip(members, names):
             result, stiffness = results[name], np.array(tasks.stiffnesses(study, curve))
             displacement = result["displacement"]
-            reference = references.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
+            reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
             solved, unstable, missing = map(dataset.STATUS.index, ("solved", "unstable", "not_converged"))
             status = np.where(np.isnan(displacement), missing, np.where(result["stable"], solved, unstable))
             curves.put(
@@ -244,7 +250,7 @@ def _block(study, folder, axes):
         labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
         for kind in kinds:
             block.put(_face_reference(folder, asked, kind), reference=kind, **labels)
-    calibration = files.read_json(folder / "done" / "calibrate.json")
+    calibration = _calibration(folder)
     pressed = [scene for scene in study.scenes if LOADS[scene.load].kind == "face"]
     for mesh, scenes in _by_mesh(pressed).items():
         names = [tasks.solved_key(study, scene, calibration) for scene in scenes]
@@ -279,8 +285,8 @@ def _face_reference(folder, asked, kind):
         if "x" in result:
             result |= {"positions": result["x"] / asked.beam.length, "profile": result["displacements"][:, -1, 1]}
     else:
-        file = folder / "references" / f"{tasks.reference_name(asked.beam, asked.material)}.h5"
         name = tasks.finite_key(asked, kind)
+        file = folder / "references" / f"{name}.h5"
         result, scale = store.read(file, [name], ["positions", "profile"])[name], 1.0
     values = {"reference_message": result["message"]}
     if "displacement" in result:
@@ -381,7 +387,7 @@ def _fields(study, folder, axes):
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
     fields = _Filler(dataset.empty(axes | numbers, dataset.FIELD_VARIABLES))
-    calibration = files.read_json(folder / "done" / "calibrate.json")
+    calibration = _calibration(folder)
     scenes = _by_mesh(study.scenes)
     for spec, mesh in meshes.items():
         labels = _mesh_labels(spec)

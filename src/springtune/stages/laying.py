@@ -1,6 +1,7 @@
 """Stage `laying`: strips laid on a trapezoid."""
 
 import sys
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from ..laying import lay
 from ..materials import Material
 from ..springs import DefinitionError
 from . import files, store
+from .work import Work
 
 
 def run(tasks, done):
@@ -21,16 +23,16 @@ def run(tasks, done):
     tasks : str or Path
         JSON file: ``folder`` and ``strips``, each with ``key`` and what `springtune.laying.lay` takes.
     done : str or Path
-        JSON file to write: how many were laid.
+        JSON file to write: what the work was.
     """
-    tasks = files.read_json(tasks)
-    laid = 0
+    tasks, work = files.read_json(tasks), Work()
     for task in tasks["strips"]:
         path = Path(tasks["folder"]) / f"{task['key']}.h5"
         if task["key"] not in store.stored(path):
+            begin = time.perf_counter()
             store.add(path, {task["key"]: _lay(task)})
-            laid += 1
-    files.write_json(done, {"laid": laid})
+            work.add("laying", (1e-3 / task["mesh_size"]) ** 3, time.perf_counter() - begin)
+    files.write_json(done, work.summary())
 
 
 def _lay(task):

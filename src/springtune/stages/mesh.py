@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..mesh import MESH_TYPES, MeshError, quality, read_beam_mesh, write_mesh
 from . import files
+from .work import Work
 
 
 def run(tasks, done):
@@ -16,12 +17,11 @@ def run(tasks, done):
     tasks : str or Path
         JSON file: ``folder`` and ``meshes``, each with ``name``, ``key`` and what `make` takes.
     done : str or Path
-        JSON file to write: what was made.
+        JSON file to write: what the work was.
     """
-    tasks = files.read_json(tasks)
+    tasks, work = files.read_json(tasks), Work()
     folder = Path(tasks["folder"])
     folder.mkdir(parents=True, exist_ok=True)
-    made = []
     for task in tasks["meshes"]:
         path, notes = folder / f"{task['name']}.vtu", folder / f"{task['name']}.json"
         if path.exists() and notes.exists() and files.read_json(notes)["key"] == task["key"]:
@@ -37,8 +37,8 @@ def run(tasks, done):
         write_mesh(path, mesh)
         figures = quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
         files.write_json(notes, {"key": task["key"], "mesh_seconds": seconds} | figures)
-        made.append(task["name"])
-    files.write_json(done, {"made": made})
+        work.add("mesh", len(mesh.points), time.perf_counter() - begin)
+    files.write_json(done, work.summary())
 
 
 def make(source):

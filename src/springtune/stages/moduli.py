@@ -10,6 +10,7 @@ from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import patch_cases
 from . import files, store
 from .mesh import make
+from .work import Work
 
 
 def run(tasks, done):
@@ -21,10 +22,9 @@ def run(tasks, done):
         JSON file: ``folder`` and ``patches``, each with ``name``, ``mesh_type``, ``mesh_size``, ``mesh`` (what the
         stage `mesh` takes) and ``asked``, each of these with ``key, definition, poisson_ratio``.
     done : str or Path
-        JSON file to write: how many were measured.
+        JSON file to write: what the work was.
     """
-    tasks = files.read_json(tasks)
-    measured = 0
+    tasks, work = files.read_json(tasks), Work()
     for patch in tasks["patches"]:
         path = Path(tasks["folder"]) / f"{patch['name']}.h5"
         present = store.stored(path)
@@ -35,9 +35,16 @@ def run(tasks, done):
         box = source["length"], source["height"]
         mesh = patch_mesh(lambda *_: make(source), patch["mesh_type"], *box, patch["mesh_size"])  # noqa: B023
         measure = _Measure(mesh)
-        store.add(path, {asked["key"]: measure(asked) for asked in missing})
-        measured += len(missing)
-    files.write_json(done, {"measured": measured})
+        results = {}
+        for asked in missing:
+            begin = time.perf_counter()
+            results[asked["key"]] = result = measure(asked)
+            seconds = time.perf_counter() - begin
+            of_definition = result.get("definition_seconds", 0.0)
+            work.add("moduli", len(mesh.points), seconds - of_definition)
+            work.add(asked["definition"], len(mesh.points), of_definition)
+        store.add(path, results)
+    files.write_json(done, work.summary())
 
 
 class _Measure:

@@ -13,6 +13,7 @@ from ..path import stable_until, trace
 from ..springs.lattice import uniform
 from ..statics import StaticProblem
 from . import files, store
+from .work import Work
 
 
 def run(tasks, done):
@@ -24,10 +25,9 @@ def run(tasks, done):
         JSON file: ``folder``, ``meshes`` (folder) and ``families``, each with ``name`` and ``curves``, and each of
         these with ``key, kind, force, kinematics, stiffnesses``.
     done : str or Path
-        JSON file to write: how many curves were traced.
+        JSON file to write: what the work was.
     """
-    tasks = files.read_json(tasks)
-    traced = 0
+    tasks, work = files.read_json(tasks), Work()
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
@@ -39,9 +39,11 @@ def run(tasks, done):
         for kind in {curve["kind"]: None for curve in missing}:
             problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
             problems[kind] = problem, measured(mesh, kind)
-        store.add(path, {curve["key"]: _trace(*problems[curve["kind"]], curve) for curve in missing})
-        traced += len(missing)
-    files.write_json(done, {"traced": traced})
+        results = {curve["key"]: _trace(*problems[curve["kind"]], curve) for curve in missing}
+        store.add(path, results)
+        for result in results.values():
+            work.add("curve", len(mesh.points), result["seconds"])
+    files.write_json(done, work.summary())
 
 
 def _trace(problem, weights, curve):

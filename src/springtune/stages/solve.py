@@ -17,13 +17,14 @@ from ..reference.field import field_error, interpolate
 from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import Case
 from ..statics import FollowerPressure, StaticProblem
-from . import files, store
+from . import files, references, store
+from .work import Work
 
 NETWORKS = 6
 """Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""
 
 
-def run(tasks, calibration, done):
+def run(tasks, done, calibration=None):
     """Solve the scenes of a bundle that are not stored yet.
 
     A scene that fails is stored with its status and message; it never stops the others.
@@ -33,15 +34,15 @@ def run(tasks, calibration, done):
     tasks : str or Path
         JSON file: ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name``,
         ``thickness``, ``keep_fields`` and ``scenes``, and each of these with ``key, material, kind, force, definition,
-        kinematics, reference, reference_key`` and either ``stiffness``, or ``calibration``, the name of a group, and
-        ``thickness_ratio``.
-    calibration : str or Path
-        JSON file of the stage `calibrate`.
+        kinematics``, ``reference`` (see `springtune.stages.references.read`) and either ``stiffness``, or
+        ``calibration``, the name of a group, and ``thickness_ratio``.
     done : str or Path
-        JSON file to write: how many scenes were solved.
+        JSON file to write: what the work was.
+    calibration : str or Path, optional
+        JSON file of the stage `calibrate`, where scenes are calibrated.
     """
-    tasks, calibration = files.read_json(tasks), files.read_json(calibration)
-    solved = 0
+    tasks, work = files.read_json(tasks), Work()
+    calibration = files.read_json(calibration) if calibration else {}
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
@@ -50,12 +51,16 @@ def run(tasks, calibration, done):
         if not missing:
             continue
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
-        references = References(Path(tasks["references"]), mesh)
-        solver = Solver(mesh, family["thickness"], references, family["keep_fields"])
+        fields = References(tasks["references"], mesh)
+        solver = Solver(mesh, family["thickness"], fields, family["keep_fields"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
-        store.add(path, {name: solver.solve(missing[name], calibration) for name in order})
-        solved += len(missing)
-    files.write_json(done, {"solved": solved})
+        results = {name: solver.solve(missing[name], calibration) for name in order}
+        store.add(path, results)
+        for name, result in results.items():
+            scene = missing[name]
+            work.add(scene["kinematics"], len(mesh.points), result["seconds"])
+            work.add(scene["definition"], len(mesh.points), result.get("definition_seconds", 0.0))
+    files.write_json(done, work.summary())
 
 
 def _stored_key(scene, calibration):
@@ -75,7 +80,7 @@ class References:
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where the references are stored.
     mesh : Mesh
     """
@@ -83,13 +88,16 @@ class References:
     def __init__(self, folder, mesh):
         self.folder, self.mesh, self.fields = folder, mesh, {}
 
-    def field(self, name, key):
+    def field(self, reference):
         """Displacements for 1 N [m], shape (n_points, 2); None where the reference has none."""
-        if key not in self.fields:
-            found = store.read(self.folder / f"{name}.h5", [key], ["x", "y", "displacements"])[key]
-            grid = [found.get(label) for label in ("x", "y", "displacements")]
+        key = reference["key"]
+        if key not in self.fields:  # for 1 N, of whichever material asks first
+            labels = ("x", "y", "displacements")
+            found = references.read(self.folder, reference | {"displacement": 1.0}, labels)
+            grid = [found.get(label) for label in labels]
             self.fields[key] = None if grid[0] is None else interpolate(*grid, self.mesh.points)
-        return self.fields[key]
+        field = self.fields[key]
+        return None if field is None else reference["displacement"] * field
 
 
 class Solver:
@@ -147,7 +155,7 @@ class Solver:
             if group["stiffness"] is None:
                 return {"status": "failed", "message": group["message"]}
             stiffness = group["stiffness"] * scene["thickness_ratio"]
-        reference = self.references.field(scene["reference"], scene["reference_key"])
+        reference = self.references.field(scene["reference"])
         springs, seconds = self._springs(scene, stiffness, reference)
         problem = self._problem(springs, scene["kind"], scene["follower"])
         s = scene["force"] / springs.reference

@@ -10,6 +10,7 @@ from .. import stability
 from ..geometry import Beam
 from ..materials import Material
 from . import files, store
+from .work import Work
 
 
 def run(tasks, done):
@@ -23,16 +24,16 @@ def run(tasks, done):
         JSON file: ``folder`` and ``experiments``, each with ``key``, ``name`` and what `springtune.stability.Setup`
         takes.
     done : str or Path
-        JSON file to write: how many were done.
+        JSON file to write: what the work was.
     """
-    tasks = files.read_json(tasks)
-    count = 0
+    tasks, work = files.read_json(tasks), Work()
     for task in tasks["experiments"]:
         path = Path(tasks["folder"]) / f"{task['key']}.h5"
         if task["key"] not in store.stored(path):
-            store.add(path, {task["key"]: _experiment(task)})
-            count += 1
-    files.write_json(done, {"experiments": count})
+            result = _experiment(task)
+            store.add(path, {task["key"]: result})
+            work.add(task["name"], 0, result.get("seconds", 0.0))
+    files.write_json(done, work.summary())
 
 
 def _experiment(task):

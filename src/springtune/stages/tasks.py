@@ -14,32 +14,13 @@ from pathlib import Path
 
 from ..loads import LOADS
 from ..mesh import MESH_TYPES
+from ..reference.unit import unit_problem, unit_scales
 from ..study import MeshSpec
-from . import files
+from . import bundles, files
 from .code import definition_digest, digest
 
-BUNDLE_SECONDS = 8.0
-"""Work that a bundle holds: some ten times the start-up of a job and the scheduler's share."""
-
-SCENE_SECONDS = {"linear": (1.5e-3, 2e-6), "nonlinear": (3e-3, 2e-5), "curve": (5e-3, 4e-5), "moduli": (4e-3, 1e-5)}
-"""Rough cost of a scene, curve or moduli, in any case and per particle; it balances bundles and nothing else."""
-
-LAYING_SECONDS = 2.0
-"""Rough cost of laying a strip on a mesh of 1 mm; it grows with the cube of its fineness."""
-
-EXPERIMENT_SECONDS = {
-    "limits": 10.0,
-    "maps": 8.0,
-    "drift": 9.0,
-    "rest": 2.0,
-    "sizes": 3.0,
-    "strains": 2.0,
-    "buckling": 2.0,
-}
-"""Rough cost of the experiments on stability that take more than half a second."""
-
-SEARCH_SECONDS = {"adjoint": (0.5, 2e-3), "annealed": (0.1, 2e-3), "evolved": (0.1, 2e-3)}
-"""Rough cost of definitions that search, which they take besides."""
+COSTS = "costs.json"
+"""File beside the studies' folders: what tasks cost on this machine."""
 
 
 def write_tasks(study, folder, cores):
@@ -56,26 +37,29 @@ def write_tasks(study, folder, cores):
     Returns
     -------
     dict of str to list of str
-        Labels of the bundles by stage: ``solve`` (also of `mesh`), ``sensitivity``, ``moduli``, ``laying`` and
-        ``stability``.
+        Labels of the bundles by stage: ``reference``, ``solve`` (also of `mesh`), ``sensitivity``, ``moduli``,
+        ``laying``, ``stability`` and ``benchmark``; ``calibrate`` is empty where no scene is calibrated.
     """
-    bundles = _bundles(study, cores)
-    tasks = {"reference": _reference(study, folder), "calibrate": _calibrate(study, folder)}
+    shared = _bundles(study, folder, cores)
+    calibrated = any(scene.definition == "calibrated" for scene in study.scenes)
+    tasks = {"calibrate": _calibrate(study, folder)} if calibrated else {}
     scenes, curves = _by_mesh(study.scenes), _by_mesh(study.curves)
-    for label, meshes in bundles["solve"].items():
+    for label, groups in shared["reference"].items():
+        tasks[f"reference_{label}"] = _reference(folder, [one for group in groups for one in group])
+    for label, meshes in shared["solve"].items():
         tasks[f"mesh_{label}"] = _mesh(folder, meshes)
         tasks[f"solve_{label}"] = _solve(study, folder, meshes, scenes)
-    for label in bundles["sensitivity"]:
-        tasks[f"sensitivity_{label}"] = _sensitivity(study, folder, bundles["solve"][label], curves)
-    for label, strips in bundles["laying"].items():
+    for label in shared["sensitivity"]:
+        tasks[f"sensitivity_{label}"] = _sensitivity(study, folder, shared["solve"][label], curves)
+    for label, strips in shared["laying"].items():
         tasks[f"laying_{label}"] = {"folder": str(folder / "laying"), "strips": [_laid(one) for one in strips]}
-    for label, experiments in bundles["stability"].items():
+    for label, experiments in shared["stability"].items():
         folder_of = str(folder / "stability")
         tasks[f"stability_{label}"] = {"folder": folder_of, "experiments": [_experiment(one) for one in experiments]}
     for race in study.benchmark:
         content = {"folder": str(folder / "benchmark"), "races": [_race(race, race is study.benchmark[0])]}
         tasks[f"benchmark_{race.name}"] = content
-    for label, patches in bundles["moduli"].items():
+    for label, patches in shared["moduli"].items():
         tasks[f"moduli_{label}"] = {"folder": str(folder / "moduli"), "patches": patches}
     for name, content in tasks.items():
         path = folder / "tasks" / f"{name}.json"
@@ -85,57 +69,65 @@ def write_tasks(study, folder, cores):
         # Snakemake guards what is declared; results are not, so a missing one makes the job run again.
         if done.exists() and not all(Path(file).exists() for file in _products(name, content)):
             done.unlink()
-    return {stage: list(content) for stage, content in bundles.items()}
+    return {stage: list(content) for stage, content in shared.items()} | {"calibrate": ["calibrate"] * calibrated}
 
 
-def _bundles(study, cores):
-    """Meshes of each bundle by its label for the stages `solve` and `sensitivity`, and patches for `moduli`."""
-    costs = {mesh: 0.0 for mesh in study.meshes}
+def _bundles(study, folder, cores):
+    """Tasks of each bundle by its label: meshes for `solve` and `sensitivity`, patches for `moduli`, and so on."""
+    notes = folder / "tasks/bundles.json"
+    before = files.read_json(notes) if notes.exists() else {}
+    known = bundles.Costs(folder.parent / COSTS)
+    meshes, costs = {mesh.name: mesh for mesh in study.meshes}, defaultdict(float)
+    for mesh in study.meshes:
+        costs[mesh.name] += known.of("mesh", _particles(mesh))
     for scene in study.scenes:
-        costs[scene.mesh] += _cost(scene.kinematics, scene.mesh, scene.definition)
-    curved = {curve.mesh for curve in study.curves}
+        costs[scene.mesh.name] += known.of(scene.kinematics, _particles(scene.mesh))
+        costs[scene.mesh.name] += _search(known, scene.definition, scene.mesh)
     for curve in study.curves:
-        costs[curve.mesh] += _cost("curve", curve.mesh)
-    meshes = _shared_out(costs, lambda mesh: mesh.name, cores)
-    patches = _patches(study)
-    costs = {
-        name: sum(_cost("moduli", patch_mesh(study, one), one.definition) for one in patch["members"])
-        for name, patch in patches.items()
-    }
-    for patch in patches.values():
-        del patch["members"]
-    strips = {one: LAYING_SECONDS * (1e-3 / one.mesh_size) ** 3 for one in (*study.laying, *study.laying_references)}
-    experiments = {one: EXPERIMENT_SECONDS.get(one.name, 0.5) for one in study.stability}
-    return {
-        "laying": _shared_out(strips, str, cores),
-        "stability": _shared_out(experiments, str, cores),
-        "benchmark": {race.name: [race] for race in study.benchmark},
-        "solve": meshes,
-        "sensitivity": [label for label, bundle in meshes.items() if curved & set(bundle)],
-        "moduli": {
-            label: [patches[name] for name in bundle] for label, bundle in _shared_out(costs, str, cores).items()
+        costs[curve.mesh.name] += known.of("curve", _particles(curve.mesh))
+    curved = {curve.mesh.name for curve in study.curves}
+    patches, of_patches = _patches(study), defaultdict(float)
+    for one in study.moduli:
+        mesh = patch_mesh(study, one)
+        of_patches[patch_name(one)] += known.of("moduli", _particles(mesh)) + _search(known, one.definition, mesh)
+    strips = {files.key(asdict(one)): one for one in (*study.laying, *study.laying_references)}
+    experiments = {files.key(asdict(one)): one for one in study.stability}
+    references = _unit_references(study) | _finite_references(study)
+    asked = {
+        "reference": {
+            name: sum(known.of("reference" if kind is None else "finite") for _, kind in group)
+            for name, group in references.items()
         },
+        "solve": costs,
+        "moduli": of_patches,
+        "laying": {name: known.of("laying", bundles.laying_units(one.mesh_size)) for name, one in strips.items()},
+        "stability": {name: known.of(one.name) for name, one in experiments.items()},
+    }
+    found = {
+        stage: bundles.share_out(costs, cores, known.start_up, before.get(stage, {})) if costs else {}
+        for stage, costs in asked.items()
+    }
+    if found != before:
+        files.write_json(notes, found)
+    members = {"reference": references, "solve": meshes, "moduli": patches, "laying": strips,
+               "stability": experiments}  # fmt: skip
+    shared = {
+        stage: {label: [members[stage][name] for name in names] for label, names in labels.items()}
+        for stage, labels in found.items()
+    }
+    return shared | {
+        "benchmark": {race.name: [race] for race in study.benchmark},
+        "sensitivity": [label for label, names in found["solve"].items() if curved & set(names)],
     }
 
 
-def _cost(kind, mesh, definition=None):
-    """Seconds that a scene, a curve or moduli take, roughly."""
-    particles = mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
-    parts = (SCENE_SECONDS[kind], SEARCH_SECONDS.get(definition, (0.0, 0.0)))
-    return sum(always + each * particles for always, each in parts)
+def _particles(mesh):
+    return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
 
 
-def _shared_out(costs, name, cores):
-    """Bundles of about equal cost: the costliest first, each to the bundle with least to do."""
-    if not costs:
-        return {}
-    count = min(max(cores, round(sum(costs.values()) / BUNDLE_SECONDS)), len(costs))
-    bundles, loads = [[] for _ in range(count)], [0.0] * count
-    for item in sorted(costs, key=lambda item: (-costs[item], name(item))):
-        least = loads.index(min(loads))
-        bundles[least].append(item)
-        loads[least] += costs[item]
-    return {str(number): bundle for number, bundle in enumerate(bundles)}
+def _search(known, definition, mesh):
+    """Seconds of a definition that searches, on top of its scene's; none of others."""
+    return known.of(definition, _particles(mesh)) if definition in bundles.COSTS else 0.0
 
 
 @cache
@@ -160,17 +152,49 @@ def _mesh_source(mesh):
 
 
 @cache
-def reference_key(beam, material, load):
-    """Key of a reference: one a beam, material and kind of load, which loads of that kind scale."""
-    code = _stage_key("reference", "numpy", "scipy", "scikit-fem")
-    return files.key(_beam(beam), _material(material), LOADS[load].kind, code)
+def reference_of(beam, material, load):
+    """Reference of a beam, material and load, as `springtune.stages.references.read` takes it.
+
+    Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
+    kind.
+    """
+    problem = beam, material, LOADS[load].kind
+    length, displacement = unit_scales(*problem)
+    key = files.key(unit_problem(*problem), _stage_key("reference", "numpy", "scipy", "scikit-fem"))
+    return {"key": key, "length": length, "displacement": displacement}
 
 
 def finite_key(reference, kind):
     """Key of a reference at finite strain, which no load scales."""
-    parameters = [_beam(reference.beam), _material(reference.material), reference.force, kind]
-    code = _stage_key("reference", "numpy", "scipy", "scikit-fem")
-    return files.key(parameters, LOADS[reference.load].follower, code)
+    return files.key(kind, _finite_problem(reference), _stage_key("reference", "numpy", "scipy", "scikit-fem"))
+
+
+def _problem(reference):
+    return reference.beam, reference.material, LOADS[reference.load].kind
+
+
+def _finite_problem(reference):
+    parameters = [_beam(reference.beam), _material(reference.material), reference.force]
+    return [*parameters, LOADS[reference.load].follower]
+
+
+def _unit_references(study):
+    """A reference of each unit problem and nothing, in groups that share elements and differ in Poisson's ratio."""
+    groups = defaultdict(dict)
+    for reference in study.references:
+        aspect_ratio, nu, kind = unit_problem(*_problem(reference))
+        groups[files.key(aspect_ratio, kind)].setdefault(nu, (reference, None))
+    return {name: list(group.values()) for name, group in groups.items()}
+
+
+def _finite_references(study):
+    """References at finite strain and their kinds, each in a group of its own."""
+    return {
+        files.key(kind, _finite_problem(reference)): [(reference, kind)]
+        for reference in study.references
+        if LOADS[reference.load].kind == "face"
+        for kind in study.further_references
+    }
 
 
 def curve_key(study, curve):
@@ -182,7 +206,7 @@ def curve_key(study, curve):
 
 def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    reference = reference_key(scene.mesh.beam, scene.material, scene.load)
+    reference = reference_of(scene.mesh.beam, scene.material, scene.load)
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, _material(scene.material), reference]
     parameters += [LOADS[scene.load].kind, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
@@ -231,11 +255,6 @@ def stiffnesses(study, curve):
     return [ratio * membrane for ratio in study.stiffness_ratios]
 
 
-def reference_name(beam, material):
-    """File stem of the references of a beam and material."""
-    return f"{beam.name}_{material.name}"
-
-
 def _thickness_ratio(study, scene):
     """Thickness over that of the beam that calibrates: stiffness is in proportion to it."""
     if scene.definition != "calibrated":
@@ -258,10 +277,12 @@ def _given_stiffness(study, scene):
     return study.stiffness_table[scene.mesh.mesh_type, scene.material.name] if scene.definition == "paper" else None
 
 
+@cache
 def _beam(beam):
     return asdict(beam) | {"name": ""}  # a new label is not a new beam
 
 
+@cache
 def _material(material):
     known = asdict(material) | {"name": ""}
     del known["density"]  # statics depend on none
@@ -282,36 +303,26 @@ def _mesh(folder, meshes):
     }
 
 
-def _reference(study, folder):
-    loads = {}
-    for reference in study.references:
-        loads.setdefault(reference_key(reference.beam, reference.material, reference.load), reference)
-    finite = [
-        {
-            "name": reference_name(reference.beam, reference.material),
-            "key": finite_key(reference, kind),
-            "beam": _beam(reference.beam),
-            "material": _material(reference.material),
-            "force": reference.force,
-            "plane": kind.rpartition("-")[2],
-            "follower": LOADS[reference.load].follower,
-        }
-        for reference in study.references
-        if LOADS[reference.load].kind == "face"
-        for kind in study.further_references
-    ]
+def _reference(folder, references):
+    """References and their kinds at finite strain, nothing of a unit problem."""
     return {
-        "finite": finite,
         "folder": str(folder / "references"),
         "references": [
+            {"key": reference_of(one.beam, one.material, one.load)["key"], "problem": unit_problem(*_problem(one))}
+            for one, kind in references
+            if kind is None
+        ],
+        "finite": [
             {
-                "name": reference_name(reference.beam, reference.material),
-                "key": key,
-                "beam": _beam(reference.beam),
-                "material": _material(reference.material),
-                "kind": LOADS[reference.load].kind,
+                "key": finite_key(one, kind),
+                "beam": _beam(one.beam),
+                "material": _material(one.material),
+                "force": one.force,
+                "plane": kind.rpartition("-")[2],
+                "follower": LOADS[one.load].follower,
             }
-            for key, reference in loads.items()
+            for one, kind in references
+            if kind is not None
         ],
     }
 
@@ -359,10 +370,9 @@ def _patches(study):
     for one in study.moduli:
         labels = {"name": patch_name(one), "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
         source = {"mesh": _mesh_source(patch_mesh(study, one))}
-        patch = patches.setdefault(patch_name(one), labels | source | {"asked": [], "members": []})
+        patch = patches.setdefault(patch_name(one), labels | source | {"asked": []})
         asked = {"key": moduli_key(study, one), "definition": one.definition, "poisson_ratio": one.poisson_ratio}
         patch["asked"].append(asked)
-        patch["members"].append(one)
     return patches
 
 
@@ -412,8 +422,7 @@ def _scene(study, scene):
         "force": scene.force,
         "definition": scene.definition,
         "kinematics": scene.kinematics,
-        "reference": reference_name(scene.mesh.beam, scene.material),
-        "reference_key": reference_key(scene.mesh.beam, scene.material, scene.load),
+        "reference": reference_of(scene.mesh.beam, scene.material, scene.load),
     }
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
@@ -435,8 +444,7 @@ def _calibrate(study, folder):
         members = [
             {
                 "mesh": curve.mesh.name,
-                "reference": reference_name(curve.mesh.beam, material),
-                "reference_key": reference_key(curve.mesh.beam, material, curve.load),
+                "reference": reference_of(curve.mesh.beam, material, curve.load),
                 **_curve(study, curve),
             }
             for curve in study.curves
@@ -453,7 +461,7 @@ def _products(name, content):
     if stage == "mesh":
         return [folder / f"{mesh['name']}{ending}" for mesh in content["meshes"] for ending in (".vtu", ".json")]
     if stage == "reference":
-        return [folder / f"{reference['name']}.h5" for reference in content["references"]]
+        return [folder / f"{one['key']}.h5" for one in (*content["references"], *content["finite"])]
     if stage == "moduli":
         return [folder / f"{patch['name']}.h5" for patch in content["patches"]]
     if stage == "laying":
