@@ -23,7 +23,7 @@ from functools import cached_property, lru_cache
 from math import ceil, log
 
 import numpy as np
-from scipy.sparse import block_array, csc_array, kron
+from scipy.sparse import block_array, coo_array, kron
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementLinePp, LinearForm, MeshLine
 
@@ -303,7 +303,8 @@ class _Grid:
         ]
 
         def product(of_x, of_y, rows, columns):
-            return kron(_part(of_x, rows[0], columns[0]), _part(of_y, rows[1], columns[1]))
+            # Slices of so small matrices are cheaper dense.
+            return kron(*(coo_array(of[np.ix_(*ends)]) for of, *ends in zip((of_x, of_y), rows, columns)))
 
         lateral, turning = product(x.mixed, y.mixed.T, first, second), product(x.mixed.T, y.mixed, first, second)
         direct = [product(x.slope, y.mass, first, first), product(x.mass, y.slope, second, second)]
@@ -371,7 +372,7 @@ class _Line:
     def __init__(self, points, degree):
         self.points, self.degree = points, degree
         basis = self._basis()
-        self.mass, self.slope, self.mixed = (form.assemble(basis) for form in (_mass, _slope, _mixed))
+        self.mass, self.slope, self.mixed = (form.assemble(basis).toarray() for form in (_mass, _slope, _mixed))
         self.integrals = _integral.assemble(basis)
         self.all = np.arange(basis.N)
         # MeshLine numbers vertices as they are given.
@@ -406,10 +407,6 @@ def _mixed(u, v, _):
 @LinearForm
 def _integral(v, _):
     return v
-
-
-def _part(matrix, rows, columns):
-    return csc_array(matrix)[rows][:, columns]
 
 
 def _graded(length, reach, layers):
