@@ -1,0 +1,93 @@
+"""Studies: what a config file asks for, validated, named, free of duplicates and in a canonical order.
+
+`load_study` reads a YAML file. `springtune.study.config` says what the file may hold.
+"""
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from .asked import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, Study
+from .checks import check_definitions, check_meshes, check_names
+from .config import SECTIONS, StudyConfig, expected_value, json_schema
+from .expand import build, expand, files_of_meshes
+from .fields import NAME, NAME_RULE
+from .problems import Problems, StudyError, show
+from .source import read_yaml
+
+__all__ = [
+    "OUTPUTS",
+    "SECTIONS",
+    "Curve",
+    "MeshSpec",
+    "Moduli",
+    "Reference",
+    "Scene",
+    "Study",
+    "StudyError",
+    "expected_value",
+    "json_schema",
+    "load_study",
+]
+
+
+def load_study(path):
+    """Read, validate and expand a study.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML file.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    StudyError
+        If anything is wrong with the file; nothing else is raised.
+    """
+    path, file = Path(path), str(path)
+    try:
+        text = path.read_bytes().decode()
+    except (OSError, ValueError) as error:
+        why = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
+        raise StudyError(f"{file}: cannot be read: {why}; give the path of a study such as config/paper.yaml") from None
+    if not NAME.fullmatch(path.stem):
+        raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
+    content, lines = read_yaml(text, file)
+    problems = Problems(file, lines)
+    config = _validate(content, problems)
+    check_names(config, problems)
+    problems.stop()
+    check_meshes(config, content, problems)
+    problems.stop()
+    mesh_files = files_of_meshes(config, path.parent, problems)
+    grids = expand(config, mesh_files, problems)
+    check_definitions(config, content, grids, problems)
+    problems.stop()
+    printed_path = path.parent / config.printed if config.printed else None
+    about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
+    return build(config, grids, problems, about)
+
+
+def _validate(content, problems):
+    """Config of what a file holds."""
+    if content is None:
+        problems.add((), f"the file is empty; give the keys {', '.join(StudyConfig.model_fields)}")
+        problems.stop()
+    try:
+        return StudyConfig.model_validate(content)
+    except ValidationError as error:
+        for details in error.errors(include_url=False):
+            path, place = [], content
+            # pydantic's path has steps that the file has not: branches of a union, the item of a single value.
+            for step in details["loc"]:
+                if isinstance(place, dict) and step in place or isinstance(place, list) and isinstance(step, int):
+                    path.append(step)
+                    place = place[step]
+            own = details["type"] == "study"
+            path += [step for step in details["ctx"]["path"] if isinstance(place, list | dict)] if own else []
+            problems.add(path, details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md")
+        problems.stop()

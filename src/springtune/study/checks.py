@@ -1,0 +1,241 @@
+"""Whether the values of a study go together."""
+
+import math
+from collections import Counter
+
+from ..loads import LOADS
+from ..mesh import MESH_TYPES, QUADS
+from ..schemes import method_names
+from ..springs import DEFINITIONS
+from ..springs.lattice import COEFFICIENT
+from .config import PLAUSIBLE
+from .problems import nearest
+
+MOST_PARTICLES = 5e6
+"""A mesh with more particles is taken for an error of units."""
+
+
+def check_names(config, problems):
+    """Names that refer to what the study declares, and pairs of numbers."""
+
+    def known(path, what, name, names):
+        if name not in names:
+            problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
+
+    mesh_types = mesh_type_names(config)
+    for name in config.mesh_files or ():
+        if name in MESH_TYPES:
+            problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
+        for number, row in enumerate(config.mesh_files[name]):
+            known(("mesh_files", name, number, "beam"), "beam", row.beam, config.beams)
+    for name, grid in config.grids.items():
+        for mesh_type in grid.mesh_type:
+            if mesh_type not in mesh_types:
+                message = f"unknown mesh type '{mesh_type}'; {nearest(mesh_type, mesh_types)}"
+                problems.add(("grids", name, "mesh_type"), f"{message}; or declare it under mesh_files")
+        for beam in grid.beam:
+            known(("grids", name, "beam"), "beam", beam, config.beams)
+        for material in grid.material:
+            known(("grids", name, "material"), "material", material, config.materials)
+        for beam in grid.force or ():
+            if beam is not None:
+                known(("grids", name, "force", beam), "beam", beam, config.beams)
+        if grid.force and None not in grid.force:
+            for beam in grid.beam:
+                if beam not in grid.force:
+                    problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
+    if config.laying:
+        known(("laying", "strip"), "beam", config.laying.strip, config.beams)
+        for key in ("material", "support"):
+            known(("laying", key), "material", getattr(config.laying, key), config.materials)
+        for name in config.laying.definition:
+            if DEFINITIONS[name].needs or 3 not in DEFINITIONS[name].cells:
+                able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+                message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
+                problems.add(("laying", "definition"), f"{message}; choose of {', '.join(able)}")
+        base = config.laying.trapezoid
+        if not base.upper_base < base.lower_base:
+            problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
+    if config.benchmark:
+        _check_benchmark(config, known, problems)
+    if config.stability:
+        _check_stability(config, known, problems)
+    calibrated, paper = config.definitions.calibrated, config.definitions.paper
+    if calibrated:
+        known(("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
+    seen = set()
+    for number, row in enumerate(paper.stiffness if paper else ()):
+        path = ("definitions", "paper", "stiffness", number)
+        known((*path, "material"), "material", row.material, config.materials)
+        if row.mesh_type not in mesh_types:
+            problems.add(
+                (*path, "mesh_type"), f"unknown mesh type '{row.mesh_type}'; {nearest(row.mesh_type, mesh_types)}"
+            )
+        if (row.mesh_type, row.material) in seen:
+            problems.add(path, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
+        seen.add((row.mesh_type, row.material))
+    if not config.sensitivity.start < config.sensitivity.stop:
+        start, stop = config.sensitivity.start, config.sensitivity.stop
+        problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
+
+
+def _check_benchmark(config, known, problems):
+    """Names and numbers of the benchmark."""
+    asked = config.benchmark
+    for name, scene in asked.scenes.items():
+        place = ("benchmark", "scenes", name)
+        known((*place, "beam"), "beam", scene.beam, config.beams)
+        known((*place, "material"), "material", scene.material, config.materials)
+        if scene.material in config.materials and config.materials[scene.material].density is None:
+            message = f"'{scene.material}' has no density; add one to it under materials, such as density: 7850 kg/m^3"
+            problems.add((*place, "material"), message)
+        if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
+            problems.add((*place, "load"), f"'{scene.load}' is not raced; choose traction, bending or pressure")
+        if scene.beam in config.beams:
+            side = min(config.beams[scene.beam].length, config.beams[scene.beam].height)
+            if max(asked.mesh_size) > side / 2:
+                large = f"{1e3 * max(asked.mesh_size):g} mm"
+                message = f"{large} is too large for '{scene.beam}'; give at most {500 * side:g} mm"
+                problems.add(("benchmark", "mesh_size"), message)
+    for name in asked.definition:
+        if DEFINITIONS[name].needs:
+            able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)
+            problems.add(("benchmark", "definition"), f"'{name}' needs more than mesh and material; choose of {able}")
+    for name in asked.mesh_type:
+        if name not in MESH_TYPES:
+            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
+    methods = method_names(asked.definition, asked.mesh_type, asked.method)
+    for name in asked.thorough:
+        if name not in methods:
+            message = f"'{name}' is no method of this benchmark; {nearest(name, methods)}"
+            problems.add(("benchmark", "thorough"), message)
+
+
+def _check_stability(config, known, problems):
+    """Names and numbers of the experiments on stability."""
+    asked = config.stability
+    known(("stability", "beam"), "beam", asked.beam, config.beams)
+    known(("stability", "material"), "material", asked.material, config.materials)
+    if asked.material in config.materials and config.materials[asked.material].density is None:
+        message = f"'{asked.material}' has no density; add one to it under materials, such as density: 7850 kg/m^3"
+        problems.add(("stability", "material"), message)
+    for name in asked.definition:
+        if DEFINITIONS[name].needs or 3 not in DEFINITIONS[name].cells:
+            able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+            message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
+            problems.add(("stability", "definition"), f"{message}; choose of {', '.join(able)}")
+    made = [name for name in MESH_TYPES if name not in QUADS]
+    if asked.mesh_type not in made:
+        message = f"'{asked.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
+        problems.add(("stability", "mesh_type"), message)
+    if asked.beam in config.beams:
+        side = min(config.beams[asked.beam].length, config.beams[asked.beam].height)
+        if max(asked.mesh_size) > 0.3 * side:
+            message = f"{1e3 * max(asked.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
+            problems.add(("stability", "mesh_size"), message)
+
+
+def mesh_type_names(config):
+    """Names of all mesh types, made ones first."""
+    return [*MESH_TYPES, *(config.mesh_files or ())]
+
+
+def check_meshes(config, content, problems):
+    """Mesh sizes against the beams they are for."""
+    for name, grid in config.grids.items():
+        if not any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type):
+            continue
+        written = content["grids"][name]["mesh_size"]
+        for number, size in enumerate(grid.mesh_size):
+            shown = f"'{written[number]}'" if isinstance(written, list) else f"'{written}'"
+            path = ("grids", name, "mesh_size", number) if isinstance(written, list) else ("grids", name, "mesh_size")
+            for beam in grid.beam:
+                length, height = config.beams[beam].length, config.beams[beam].height
+                if size > min(length, height):
+                    side = f"{1e3 * min(length, height):g} mm"
+                    problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
+                elif length * height / (COEFFICIENT * size**2) > MOST_PARTICLES:
+                    particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
+                    least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.2g} mm"
+                    problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
+
+
+def _check_kinds(grids, problems):
+    """Definitions against the cells and loads of the grids that use them."""
+    for grid in grids:
+        found = {}
+        for scene in grid.scenes:
+            definition, mesh_type = DEFINITIONS[scene.definition], scene.mesh.mesh_type
+            count = 4 if mesh_type in QUADS else 3
+            if mesh_type in MESH_TYPES and count not in definition.cells:
+                needs, has = ("triangles", "quadrilaterals") if count == 4 else ("rectangles", "triangles")
+                found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
+            if LOADS[scene.load].kind not in definition.kinds:
+                kinds = " and ".join(name for name, load in LOADS.items() if load.kind in definition.kinds)
+                found[f"'{definition.name}' is for {kinds} and load '{scene.load}' is neither; {SEPARATE}"] = None
+        for message in found:
+            problems.add(("grids", grid.name, "definition"), message)
+
+
+SEPARATE = "give them grids of their own"
+"""Remedy where two values of a grid do not go together."""
+
+
+def check_definitions(config, content, grids, problems):
+    """Parameters of the definitions against what the grids need of them."""
+    _check_kinds(grids, problems)
+    stated = {(row.mesh_type, row.material): row.value for row in stated_rows(config)}
+    thicknesses = {}
+    for grid in grids:
+        lacking = set()
+        for scene in grid.scenes:
+            pair = (scene.mesh.mesh_type, scene.material.name)
+            if scene.definition == "paper":
+                thicknesses.setdefault(pair, {})[scene.mesh.beam.thickness] = None
+                if pair not in stated and pair not in lacking:
+                    lacking.add(pair)
+                    row = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
+                    problems.add(
+                        ("grids", grid.name, "definition"),
+                        f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; "
+                        f"add {row} to definitions.paper.stiffness",
+                    )
+        if not config.definitions.calibrated and any(scene.definition == "calibrated" for scene in grid.scenes):
+            problems.add(
+                ("grids", grid.name, "definition"),
+                "'calibrated' needs to know on what; add definitions.calibrated with a beam and a load",
+            )
+    every = {beam.thickness: None for beam in config.beams.values()}
+    for number, row in enumerate(stated_rows(config)):
+        modulus = config.materials[row.material].young_modulus
+        for thickness in thicknesses.get((row.mesh_type, row.material), every):
+            expected = COEFFICIENT * modulus * thickness
+            if not expected / PLAUSIBLE <= row.value <= expected * PLAUSIBLE:
+                written = content["definitions"]["paper"]["stiffness"][number]["value"]
+                problems.add(
+                    ("definitions", "paper", "stiffness", number, "value"),
+                    f"'{written}' cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick, is "
+                    f"{expected:.4g} N/m; give a stiffness near that, in N/m",
+                )
+                break
+
+
+def stated_rows(config):
+    return config.definitions.paper.stiffness if config.definitions.paper else []
+
+
+def check_files(meshes, scenes, references, problems):
+    """Different things must not share a name: names become files."""
+    parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
+    pairs = {(reference.beam.name, reference.material.name) for reference in references}
+    sizes = {mesh.mesh_size for mesh in meshes}
+    for path, what, names, remedy in (
+        (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
+        (("beams",), "meshes", [mesh.name for mesh in meshes], "rename a beam"),
+        (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
+        (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
+    ):
+        name, count = Counter(name.casefold() for name in names).most_common(1)[0]
+        if count > 1:
+            problems.add(path, f"{count} different {what} are all named '{name}'; {remedy}")
+            return

@@ -1,0 +1,393 @@
+"""Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
+
+from typing import Annotated, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ..loads import LOADS
+from ..schemes import EXPERIMENTS, RIVALS
+from .fields import (
+    BeamName,
+    DefinitionName,
+    Density,
+    ExperimentName,
+    FileName,
+    Flag,
+    Force,
+    Friction,
+    FurtherReference,
+    Kinematics,
+    Length,
+    Load,
+    Loading,
+    MaterialName,
+    MeshType,
+    Named,
+    OneOrMore,
+    Output,
+    PerBeam,
+    Points,
+    PoissonRatio,
+    Ratio,
+    Rival,
+    Seconds,
+    Stiffness,
+    Stress,
+    Text,
+)
+from .problems import nearest, refuse, show
+
+PLAUSIBLE = 20.0
+"""A stated stiffness farther than this factor from sqrt(3)/2 E t is taken for an error of units."""
+
+
+def expected_value(field):
+    """Words for what a field of a section expects, e.g. ``a length such as '200 mm'``."""
+    for note in field.metadata:
+        if isinstance(note, OneOrMore):
+            item = get_args(field.annotation)[0]
+            return f"{get_args(item)[1].words}, or a list"
+        if hasattr(note, "words"):
+            return note.words
+    listed = get_origin(field.annotation) is list
+    text = next((note.words for part in get_args(field.annotation) for note in get_args(part)[1:]), None)
+    return text or ("a list of sections; see below" if listed else "a section; see below")
+
+
+class Section(BaseModel):
+    """A mapping of known keys in a study."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, value):
+        names = {field.alias or name: field for name, field in cls.model_fields.items()}
+        if not isinstance(value, dict):
+            raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
+        for key in value:
+            if key not in names:
+                raise refuse(f"unknown key '{key}'; {nearest(key, names)}", key)
+        given = {key: content for key, content in value.items() if content is not None}
+        for name, field in names.items():
+            if field.is_required() and name not in given:
+                raise refuse(f"'{name}' is missing; give {expected_value(field)}", name)
+        return given
+
+
+class BeamConfig(Section):
+    """A rectangular sheet, its length along x."""
+
+    length: Length = Field(description="Extent along x, the direction of the load.")
+    height: Length = Field(description="Extent along y.")
+    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+
+
+class MaterialConfig(Section):
+    """An isotropic, linearly elastic material."""
+
+    young_modulus: Stress = Field(description="Young's modulus E.")
+    poisson_ratio: PoissonRatio = Field(
+        description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress."
+    )
+    density: Density | None = Field(None, description="Density rho; for dynamics, statics need none.")
+
+
+class StatedStiffness(Section):
+    """One stated stiffness."""
+
+    mesh_type: MeshType = Field(description="Mesh type that it is for.")
+    material: MaterialName = Field(description="Material that it is for.")
+    value: Stiffness = Field(
+        description=f"Stiffness of every spring; refused if farther than a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
+    )
+
+
+class PaperConfig(Section):
+    """Parameters of the definition `paper`: stiffnesses that are stated, not derived."""
+
+    stiffness: list[StatedStiffness] = Field(
+        description="One entry for each mesh type and material that a grid uses with `paper`.", min_length=1
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _listed(cls, value):
+        rows = value.get("stiffness") if isinstance(value, dict) else None
+        if rows is not None and (not isinstance(rows, list) or not rows):
+            example = "- {mesh_type: structured, material: steel, value: 170e6 N/m}"
+            raise refuse(f"{show(rows)} instead of a list; give entries such as {example}", "stiffness")
+        return value
+
+
+class CalibratedConfig(Section):
+    """Parameters of the definition `calibrated`.
+
+    Its stiffness is found per mesh type, material and kinematics: the mean over the mesh sizes of the best stiffness of
+    this study's own sensitivity curves of one beam and load.
+    """
+
+    beam: BeamName = Field(description="Beam whose curves calibrate.")
+    load: Load = Field(description="Load whose curves calibrate.")
+
+
+class DefinitionsConfig(Section):
+    """Parameters of those definitions that have any; `springtune definitions` lists all definitions."""
+
+    paper: PaperConfig | None = Field(None, description="Table of stiffnesses; needed where a grid uses `paper`.")
+    calibrated: CalibratedConfig | None = Field(
+        None, description="Where the stiffness is calibrated; needed where a grid uses `calibrated`."
+    )
+
+
+class SensitivityConfig(Section):
+    """Uniform stiffnesses of every sensitivity curve, equally spaced, in units of sqrt(3)/2 E t."""
+
+    start: Ratio = Field("0.4", validate_default=True, alias="from", description="Smallest stiffness.")
+    stop: Ratio = Field("1.6", validate_default=True, alias="to", description="Largest stiffness.")
+    points: Points = Field("61", validate_default=True, description="Number of stiffnesses, both ends included.")
+
+
+class MeshFileConfig(Section):
+    """One mesh from a file, of a format that meshio reads; it fills its beam and its lower left corner is anywhere."""
+
+    file: FileName = Field(description="The file, its path relative to the study's folder.")
+    beam: BeamName = Field(description="Beam that it meshes.")
+    mesh_size: Length = Field(description="Length of an edge that it goes by in grids and in the dataset.")
+    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
+
+
+class PatchConfig(Section):
+    """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
+
+    Rows of triangles come as the exact lattice there, with staggered ends, not stretched to the box.
+    """
+
+    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
+    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
+
+
+class TrapezoidConfig(Section):
+    """A symmetric trapezoid that stands on its lower base."""
+
+    lower_base: Length = Field(description="Length of the base on the floor.")
+    upper_base: Length = Field(description="Length of the upper base.")
+    height: Length = Field(description="Height.")
+
+
+class LayingConfig(Section):
+    """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
+
+    The reference of a loading and friction is a strip of linear triangles on a mesh of its own.
+    """
+
+    strip: BeamName = Field(description="Beam that is the strip.")
+    trapezoid: TrapezoidConfig = Field(description="What it is laid on.")
+    material: MaterialName = Field(description="Material of the strip.")
+    support: MaterialName = Field(description="Material of the trapezoid; from 1e4 times as stiff on it is rigid.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    reference_size: Length = Field(
+        "1 mm", validate_default=True, description="Length of an edge of the reference's mesh."
+    )
+    loading: Annotated[list[Loading], OneOrMore()] = Field(
+        "pressure",
+        validate_default=True,
+        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: the "
+        "ends are drawn down to the floor.",
+    )
+    pressure: Stress = Field(description="Pressure, or weight over the upper face.")
+    friction: Annotated[list[Friction], OneOrMore()] = Field(
+        "0", validate_default=True, description="Coulomb's coefficients of friction."
+    )
+
+
+class StabilityConfig(Section):
+    """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    force: Force = Field(description="Traction on the right end.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
+        "experiment is not about definitions."
+    )
+    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type of triangles.")
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
+        description="Lengths of an edge; most experiments take the coarsest."
+    )
+    experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
+        list(EXPERIMENTS),
+        validate_default=False,
+        description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
+    )
+
+
+class BenchmarkSceneConfig(Section):
+    """A scene of the benchmark."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
+    force: Force = Field(description="Magnitude of the force.")
+
+
+class BenchmarkConfig(Section):
+    """Run time against error: every definition on every mesh type, and other methods; one method at a time."""
+
+    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
+    method: Annotated[list[Rival], OneOrMore()] = Field(
+        list(RIVALS),
+        validate_default=False,
+        description="Other methods: finite elements, CalculiX where it is on the machine, motion to rest, and what the "
+        "paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
+    )
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    most_seconds: Seconds = Field(
+        "0.2",
+        validate_default=True,
+        description="Seconds that a run may take; a finer size that would take more is left out.",
+    )
+    thorough: Annotated[list[Text], OneOrMore()] = Field(
+        [], validate_default=False, description="Methods that may take more, such as `delingette/structured`."
+    )
+    most_thorough: Seconds = Field("8", validate_default=True, description="Seconds that a run of those may take.")
+
+
+class GridConfig(Section):
+    """A product of parameters: every combination of the values listed is a scene.
+
+    A single value stands for a list of one. A scene that two grids ask for is solved once.
+    """
+
+    beam: Annotated[list[BeamName], OneOrMore()] = Field(description="Beams, by name.")
+    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(
+        description="`structured`: equilateral rows fitted to the box; "
+        "`free`: Delaunay inside an outline of imposed edge size; `right`, `alternating`: squares with one diagonal; "
+        "`braced`: squares with both; `isosceles-0.3`, `isosceles-0.5`: rows of triangles whose shape sets that "
+        "Poisson's ratio; or a name under `mesh_files`."
+    )
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
+        description="Lengths of an edge; at most the smaller side of each beam."
+    )
+    material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
+    load: Annotated[list[Load], OneOrMore()] = Field(
+        description="`traction`, `compression`: along x on the right end, `bending`: along y there, the left end "
+        "clamped; `shear`: along x on the upper side, which stays level, the lower side clamped; `pressure`, "
+        "`follower-pressure`: down on the upper side, the lower side clamped. Spread evenly."
+    )
+    force: Annotated[dict[str, Force], PerBeam()] | None = Field(
+        None,
+        description="Magnitude of the force: one for all beams, or one for each. The load's name carries the sign. "
+        "A beam, material and load have the same force in all grids.",
+    )
+    pressure: Stress | None = Field(
+        None,
+        description="Pressure on the upper side, in place of `force`; for loads `pressure` and `follower-pressure`.",
+    )
+
+    @model_validator(mode="after")
+    def _one_force(self):
+        if (self.force is None) == (self.pressure is None):
+            both = "both 'force' and 'pressure'; remove one"
+            missing = "'force' is missing; give a force such as '400 kN', or one for each beam"
+            raise refuse(missing if self.force is None else both, *(() if self.force is None else ("pressure",)))
+        for load in self.load if self.pressure is not None else ():
+            if LOADS[load].kind != "face":
+                raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
+        return self
+
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Rules that give every spring its stiffness; `springtune definitions` explains them."
+    )
+    kinematics: Annotated[list[Kinematics], OneOrMore()] = Field(
+        "nonlinear",
+        validate_default=True,
+        description="Whether springs keep their length law or their tangent at rest.",
+    )
+    sensitivity: Flag = Field(
+        "true",
+        validate_default=True,
+        description="Whether each mesh, material, load and kinematics also gets a sensitivity curve. "
+        "Curves that `calibrated` needs are made in any case.",
+    )
+    moduli: Flag = Field(
+        "false",
+        validate_default=True,
+        description="Whether effective moduli are measured for each definition, mesh type, mesh size and Poisson's "
+        "ratio, on the box under `patch`. Definitions that are told their stiffness have none.",
+    )
+
+
+class StudyConfig(Section):
+    """A study."""
+
+    title: Text = Field(description="What the study is, in one line.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field(description="Beams.")
+    materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(description="Materials.")
+    definitions: DefinitionsConfig = Field(
+        default_factory=DefinitionsConfig, description="Parameters of the definitions that have any."
+    )
+    sensitivity: SensitivityConfig = Field(
+        default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
+    )
+    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
+        None, description="Mesh types of your own: for each a list of files, one for each beam and mesh size."
+    )
+    patch: PatchConfig = Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured.")
+    outputs: Annotated[list[Output], OneOrMore()] = Field(
+        ["sensitivity", "size", "deformed", "tables"],
+        validate_default=False,
+        description="What is made from the dataset: figures of sensitivity curves, of errors against mesh size, of "
+        "deformed networks (and the group `/fields` behind them), tables as the paper's; `definitions`: figures and "
+        "tables that compare definitions; `block`, `laying`, `stability`, `benchmark`: figures of these groups. "
+        "Figures of scenes are of nonlinear kinematics.",
+    )
+    further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
+        [],
+        description="References at finite strain besides the small-strain one, for scenes under pressure, in the group "
+        "`/block`. An incompressible material has none in plane strain.",
+    )
+    laying: LayingConfig | None = Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`.")
+    stability: StabilityConfig | None = Field(
+        None, description="Experiments on numerical stability; they make the group `/stability`."
+    )
+    benchmark: BenchmarkConfig | None = Field(
+        None, description="Run time against error; it makes the group `/benchmark`."
+    )
+    printed: FileName | None = Field(
+        None, description="CSV file of printed values to compare with, its path relative to the study's folder."
+    )
+    grids: Annotated[dict[str, GridConfig], Named("grid", for_files=False)] = Field(description="Grids: what is asked.")
+
+
+SECTIONS = {
+    "": StudyConfig,
+    "beams.<name>": BeamConfig,
+    "materials.<name>": MaterialConfig,
+    "definitions": DefinitionsConfig,
+    "definitions.paper": PaperConfig,
+    "definitions.paper.stiffness[]": StatedStiffness,
+    "definitions.calibrated": CalibratedConfig,
+    "sensitivity": SensitivityConfig,
+    "mesh_files.<name>[]": MeshFileConfig,
+    "patch": PatchConfig,
+    "laying": LayingConfig,
+    "laying.trapezoid": TrapezoidConfig,
+    "stability": StabilityConfig,
+    "benchmark": BenchmarkConfig,
+    "benchmark.scenes.<name>": BenchmarkSceneConfig,
+    "grids.<name>": GridConfig,
+}
+"""Model of each section of a study, by its place."""
+
+
+def json_schema():
+    """JSON schema of a study, for editors."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | StudyConfig.model_json_schema()

@@ -1,0 +1,194 @@
+"""Types of the values of a study: how their text is read, and words for what is expected."""
+
+import math
+import re
+from typing import Annotated
+
+from pydantic_core import core_schema
+
+from .. import units
+from ..loads import LOADINGS, LOADS
+from ..mesh import MESH_TYPES
+from ..schemes import EXPERIMENTS, RIVALS
+from ..springs import DEFINITIONS
+from .asked import FURTHER_REFERENCES, KINEMATICS, OUTPUTS
+from .problems import nearest, refuse, show
+
+MOST_POINTS = 10_001
+"""Most points of a sensitivity curve."""
+
+
+class Scalar:
+    """Annotation of a field: how its text is read, its JSON schema and words for the manual."""
+
+    def __init__(self, read, schema, words):
+        self.read, self.schema, self.words = read, schema, words
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        return dict(self.schema)
+
+    def _read(self, value):
+        if not isinstance(value, str) or not value.strip():
+            raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
+        return self.read(value)
+
+
+def _quantity(kind, negative="give a size above zero"):
+    example = units.KINDS[kind].example
+
+    def read(value):
+        try:
+            number = units.parse(value, kind)
+        except units.UnitError as error:
+            raise refuse(str(error)) from None
+        if not number > 0:
+            raise refuse(f"'{value}' is not above zero; {negative}, such as '{example}'")
+        return number
+
+    schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
+    return Annotated[float, Scalar(read, schema, f"a {kind} such as '{example}'")]
+
+
+def _number(words, low, high, *, above=False, whole=False):
+    def read(value):
+        try:
+            number = int(value) if whole else float(value)
+        except ValueError:
+            raise refuse(f"'{value}' is not a {'whole ' if whole else ''}number; give {words}") from None
+        if not (low < number if above else low <= number) or not number <= high or not math.isfinite(number):
+            raise refuse(f"'{value}' is out of range; give {words}")
+        return number
+
+    schema = {"type": "integer" if whole else "number", "exclusiveMinimum" if above else "minimum": low}
+    if math.isfinite(high):
+        schema["maximum"] = high
+    return Annotated[int if whole else float, Scalar(read, schema, words)]
+
+
+def _one_of(what, names):
+    names = list(names)
+
+    def read(value):
+        if value not in names:
+            raise refuse(f"unknown {what} '{value}'; {nearest(value, names)}")
+        return value
+
+    return Annotated[str, Scalar(read, {"enum": names}, " or ".join(f"'{name}'" for name in names))]
+
+
+def _read_flag(value):
+    if value.lower() not in ("true", "false"):
+        raise refuse(f"'{value}' is neither true nor false; give one of them")
+    return value.lower() == "true"
+
+
+NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
+NAME_RULE = "use letters, digits, '.', '_' and '-', and no '.' in front: names become parts of file names"
+
+Length = _quantity("length")
+Force = _quantity("force", "the load's name carries the sign: give a magnitude")
+Stiffness = _quantity("stiffness")
+Stress = _quantity("stress")
+Density = _quantity("density")
+PoissonRatio = _number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
+Ratio = _number("a number above 0", 0, math.inf, above=True)
+Points = _number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
+MeshType = Annotated[
+    str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
+]
+Load = _one_of("load", LOADS)
+Output = _one_of("output", OUTPUTS)
+Loading = _one_of("loading", LOADINGS)
+Rival = _one_of("method", RIVALS)
+Seconds = _number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)
+ExperimentName = _one_of("experiment", EXPERIMENTS)
+Friction = _number("a coefficient from 0 to 2, such as 0.3", 0, 2)
+FurtherReference = _one_of("reference", FURTHER_REFERENCES)
+Kinematics = _one_of("kinematics", KINEMATICS)
+DefinitionName = _one_of("definition", DEFINITIONS)
+Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
+Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
+FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
+BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam")]
+MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a material")]
+
+
+class OneOrMore:
+    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        array = handler(schema["schema"]) | {"minItems": 1, "uniqueItems": True}
+        return {"anyOf": [array["items"], array]}
+
+    @staticmethod
+    def _read(value, handler):
+        listed = [value] if isinstance(value, str) else value
+        if not isinstance(listed, list):
+            raise refuse(f"{show(value)} instead of a value or a list; write it as [first, second]")
+        if not listed:
+            raise refuse("an empty list leaves the grid empty; give at least one value, or remove the grid")
+        items = handler(listed)
+        for number, item in enumerate(items):
+            if item in items[:number]:
+                raise refuse(f"{show(listed[number])} is listed twice; remove one", number)
+        return items
+
+
+class PerBeam:
+    """Annotation of a mapping from beams to quantities; a single quantity, kept under None, stands for all beams."""
+
+    words = "a force such as '400 kN', or one for each beam"
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        single = handler.generate_schema(Force)
+        each = core_schema.no_info_wrap_validator_function(self._read_each, handler(source))
+        choices = {"single": core_schema.no_info_after_validator_function(lambda force: {None: force}, single)}
+        choices["each"] = each
+        return core_schema.tagged_union_schema(choices, lambda value: "each" if isinstance(value, dict) else "single")
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        each = handler(schema["choices"]["each"]["schema"])
+        return {"anyOf": [each["additionalProperties"], each | {"minProperties": 1}]}
+
+    @staticmethod
+    def _read_each(value, handler):
+        if not value:
+            raise refuse("no force at all; give one for each beam, such as {200x40: 400 kN}")
+        return handler(value)
+
+
+class Named:
+    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one."""
+
+    def __init__(self, what, for_files=True):
+        self.what, self.for_files = what, for_files
+        self.words = f"a section for each {what}, by name; see below"
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema, handler):
+        described = handler(schema["schema"]) | {"minProperties": 1}
+        if self.for_files:
+            described["propertyNames"] = {"pattern": f"^{NAME.pattern}$"}
+        return described
+
+    def _read(self, value, handler):
+        if not isinstance(value, dict) or not value:
+            shown = show(value) if value else f"no {self.what} at all"
+            raise refuse(f"{shown}; give at least one {self.what}, its name followed by a colon and its keys")
+        seen = {}
+        for name in value if self.for_files else ():
+            if not NAME.fullmatch(name):
+                raise refuse(f"'{name}' cannot name a {self.what}; {NAME_RULE}", name)
+            other = seen.setdefault(name.casefold(), name)
+            if other != name:
+                message = f"'{name}' and '{other}' differ in case only, which file systems may ignore; rename one"
+                raise refuse(message, name)
+        return handler(value)

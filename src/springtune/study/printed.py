@@ -1,0 +1,84 @@
+"""Printed values to compare with."""
+
+import csv
+import math
+from decimal import Decimal
+
+from ..loads import LOADS
+from .asked import PrintedCell
+from .problems import Problems, nearest
+
+_PRINTED_COLUMNS = {
+    # column: field and unit of PrintedCell; without unit, a text
+    "table": ("table", ""),
+    "beam": ("beam", None),
+    "mesh_type": ("mesh_type", None),
+    "mesh_size_mm": ("mesh_size", "1e-3"),
+    "material": ("material", None),
+    "load": ("load", None),
+    "force_N": ("force", "1"),
+    "stiffness_N_per_m": ("stiffness", "1"),
+    "reference_displacement_mm": ("reference_displacement", "1e-3"),
+    "displacement_mm": ("displacement", "1e-3"),
+    "deformation_error_percent": ("deformation_error", "1e-2"),
+    "remark": ("remark", None),
+}
+
+
+def read_printed(path, mesh_types, problems):
+    """Cells of a CSV file of printed values; lines that begin with # are comments."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
+        problems.add(("printed",), f"'{path}' cannot be read: {why}; give the path of a CSV file, or remove the key")
+        problems.stop()
+    file_problems = Problems(str(path))
+    # Empty lines in place of comments, so that the reader's line numbers are the file's.
+    rows = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
+    cells, header = {}, None
+    try:
+        for row in rows:
+            if row and header is None:
+                header = row
+                if sorted(header) != sorted(_PRINTED_COLUMNS):
+                    wanted = ",".join(_PRINTED_COLUMNS)
+                    file_problems.add((), f"has columns {','.join(header)}; give {wanted}", rows.line_num)
+                    break
+            elif row:
+                cell = _printed_cell(header, row, mesh_types, rows.line_num, file_problems)
+                if cell:
+                    label = (cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load)
+                    first = cells.setdefault(label, (rows.line_num, cell))[0]
+                    if first != rows.line_num:
+                        file_problems.add((), f"is the cell of line {first} again; remove one", rows.line_num)
+    except csv.Error as error:
+        file_problems.add((), f"not CSV: {error}; correct or remove the line", rows.line_num)
+    if not cells:
+        file_problems.add((), f"no printed values; give a line {','.join(_PRINTED_COLUMNS)} and a line for each cell")
+    file_problems.stop()
+    return tuple(cell for _, cell in cells.values())
+
+
+def _printed_cell(header, row, mesh_types, line, problems):
+    if len(row) != len(header):
+        problems.add((), f"{len(row)} values for {len(header)} columns; add or remove some", line)
+        return None
+    values = {}
+    for column, text in zip(header, row):
+        field, size = _PRINTED_COLUMNS[column]
+        known = {"mesh_type": mesh_types, "load": LOADS}.get(field)
+        if size is None:
+            values[field] = text
+            if known and text not in known:
+                problems.add((column,), f"unknown {field.replace('_', ' ')} '{text}'; {nearest(text, known)}", line)
+                return None
+            continue
+        try:
+            values[field] = int(text) if field == "table" else float(Decimal(text) * Decimal(size))
+            if not math.isfinite(values[field]) or values[field] < 0:
+                raise ValueError
+        except (ValueError, ArithmeticError):
+            problems.add((column,), f"'{text}' is not a number of 0 or more; give the printed one, unsigned", line)
+            return None
+    return PrintedCell(**values)
