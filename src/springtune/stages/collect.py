@@ -71,7 +71,10 @@ def run(config, folder, output):
     root = _Filler(dataset.empty(axes, dataset.ROOT_VARIABLES))
     _meshes(study, folder, root)
     displacements = _references(study, folder, root)
-    _scenes(study, folder, root)
+    pressed = any(LOADS[scene.load].kind == "face" for scene in study.scenes)
+    block = _block(study, folder, axes) if pressed else None
+    fields = _fields(study, folder, axes) if "deformed" in study.outputs else None
+    _scenes(study, folder, root, block, fields)
     for material in {scene.material for scene in study.scenes}:
         values = {
             "material_young_modulus": material.young_modulus,
@@ -89,16 +92,16 @@ def run(config, folder, output):
         groups["/sensitivity"] = _sensitivity(study, folder, displacements, axes)
     if study.moduli:
         groups["/moduli"] = _moduli(study, folder, axes)
-    if any(LOADS[scene.load].kind == "face" for scene in study.scenes):
-        groups["/block"] = _block(study, folder, axes)
+    if pressed:
+        groups["/block"] = _with_face_error(block.data)
     if study.laying:
         groups["/laying"] = _laying(study, folder, axes)
     if study.stability:
         groups["/stability"] = _stability(study, folder, axes)
     if study.benchmark:
         groups["/benchmark"] = _benchmark(study, folder, axes)
-    if "deformed" in study.outputs:
-        groups["/fields"] = _fields(study, folder, axes)
+    if fields:
+        groups["/fields"] = fields.data
     dataset.write(output, groups, _attributes(study, config))
     bundles.remember(folder.parent / tasks.COSTS, bundles.work_of(folder))
 
@@ -163,17 +166,25 @@ def _reference(folder, asked, fields=()):
     return references.read(folder / "references", reference, fields)
 
 
-def _scenes(study, folder, root):
+def _scenes(study, folder, root, block, fields):
+    """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
     calibration = _calibration(folder)
+    arrays = ["face_profile"] * (block is not None) + ["displacements"] * (fields is not None)
     for mesh, scenes in _by_mesh(study.scenes).items():
         names = [tasks.solved_key(study, scene, calibration) for scene in scenes]
-        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names))
+        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), arrays)
         for scene, name in zip(scenes, names):
             result = results[name]
             values = {"status": dataset.STATUS.index(result["status"]), "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
             labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
-            root.put(values, kinematics=scene.kinematics, **labels, **_mesh_labels(mesh))
+            labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
+            root.put(values, **labels)
+            if LOADS[scene.load].kind == "face":
+                block.put({new: result[old] for old, new in FACE.items() if old in result}, **labels)
+            if "displacements" in result:
+                x, y = result["displacements"].T
+                fields.put_rows({"displacement_x": x, "displacement_y": y}, **labels)
 
 
 def _printed(study, root):
@@ -239,7 +250,7 @@ def _moduli(study, folder, axes):
 
 
 def _block(study, folder, axes):
-    """Displacements of pressed faces, of networks and of references of all kinds."""
+    """Group of pressed faces with the references of all kinds; scenes are still to come."""
     kinds = (SMALL_STRAIN, *study.further_references)
     block = _Filler(
         dataset.empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}, dataset.BLOCK_VARIABLES)
@@ -250,17 +261,10 @@ def _block(study, folder, axes):
         labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
         for kind in kinds:
             block.put(_face_reference(folder, asked, kind), reference=kind, **labels)
-    calibration = _calibration(folder)
-    pressed = [scene for scene in study.scenes if LOADS[scene.load].kind == "face"]
-    for mesh, scenes in _by_mesh(pressed).items():
-        names = [tasks.solved_key(study, scene, calibration) for scene in scenes]
-        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), ["face_profile"])
-        for name, scene in zip(names, scenes):
-            labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
-            labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
-            found = {new: results[name][old] for old, new in FACE.items() if old in results[name]}
-            block.put(found, **labels)
-    data = block.data
+    return block
+
+
+def _with_face_error(data):
     pairs = xr.broadcast(data.face_displacement, data.reference_face_displacement)
     data["face_error"].values = deformation_error(*(array.transpose(*data.face_error.dims) for array in pairs))
     return data
@@ -377,6 +381,7 @@ def _benchmark(study, folder, axes):
 
 
 def _fields(study, folder, axes):
+    """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
     shown = tasks.shown_meshes(study)
     meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
     outlines = {asked: _outline(folder, asked) for asked in study.references}
@@ -387,20 +392,10 @@ def _fields(study, folder, axes):
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
     fields = _Filler(dataset.empty(axes | numbers, dataset.FIELD_VARIABLES))
-    calibration = _calibration(folder)
-    scenes = _by_mesh(study.scenes)
     for spec, mesh in meshes.items():
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
-        names = [tasks.solved_key(study, scene, calibration) for scene in scenes[spec]]
-        results = store.read(folder / "solutions" / f"{spec.name}.h5", set(names), ["displacements"])
-        for name, scene in zip(names, scenes[spec]):
-            if "displacements" in results[name]:
-                found = results[name]["displacements"]
-                chosen = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
-                chosen["kinematics"] = scene.kinematics
-                fields.put_rows({"displacement_x": found[:, 0], "displacement_y": found[:, 1]}, **chosen, **labels)
     for asked in study.references:
         points, displacements = outlines[asked]
         moved = asked.force * displacements
@@ -409,7 +404,7 @@ def _fields(study, folder, axes):
         fields.put_rows(
             {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
         )
-    return fields.data
+    return fields
 
 
 def _outline(folder, asked):
