@@ -14,6 +14,7 @@ study: $(VENV)/.run
 
 test: $(VENV)/.test
 	pytest -n 2 -m "not slow"
+	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow
@@ -28,7 +29,7 @@ docs: $(VENV)/.run
 	springtune schema --write
 
 # Stamps: nothing is installed again until a requirement changes.
-$(VENV)/.run: requirements/installer.txt requirements/run.txt pyproject.toml tools/setup.sh
+$(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/cholesky.txt pyproject.toml tools/setup.sh
 	sh tools/setup.sh run
 
 $(VENV)/.test: requirements/test.txt $(VENV)/.run
@@ -39,6 +40,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
 clean:
 	rm -rf results .snakemake

@@ -51,6 +51,10 @@ install() {
     "$python" -m pip install --quiet "$@"
 }
 install --require-hashes -r "requirements/$what.txt"
+if [ "$what" = run ]; then
+    install --only-binary :all: --require-hashes -r requirements/cholesky.txt ||
+        say "no CHOLMOD for this machine: SuperLU factorises in its place, in five times the time"
+fi
 "$python" -m pip install --quiet --no-deps --no-build-isolation --no-index --editable .
 "$python" -m compileall -q src || true # read-only sources only start a little later
 touch "$venv/.$what"

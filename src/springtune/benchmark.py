@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import factors
 from .boundary import held, weights
 from .calculix import installed
 from .dynamics import Motion, masses
@@ -25,9 +26,9 @@ from .network import Network
 from .path import trace
 from .reference.small_strain import solve_small_strain
 from .rivals import METHODS, network
-from .schemes import CURVE_COUNTS
+from .schemes import CURVE_COUNTS, SOLVERS
 from .springs import DEFINITIONS, DefinitionError
-from .springs.lattice import COEFFICIENT
+from .springs.lattice import COEFFICIENT, half_weight
 from .statics import StaticProblem
 
 PARTS = ("meshing", "assembling", "factorising", "solving")
@@ -244,6 +245,30 @@ def curves(scene, size):
     linear = _median(lambda: problem().linear(scene.force / (COEFFICIENT * membrane)))
     apart[:] = one * np.array(CURVE_COUNTS)
     return {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
+
+
+def solvers(scene, sizes, most_seconds):
+    """Seconds of the solvers of one linear system, from its matrix to its solution, the next matrix's with them.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_solvers, n_sizes)
+        NaN where a solver is not installed, and from where a coarser mesh says that it would exceed `most_seconds`.
+    """
+    first, again = np.full((2, len(SOLVERS), len(sizes)), np.nan)
+    for number in np.argsort(sizes)[::-1]:
+        mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, sizes[number])
+        for solver, name in enumerate(SOLVERS):
+            coarser = first[solver, number + 1 :]
+            if name == "Cholesky" and not factors.CHOLESKY or np.nanmax(coarser, initial=0.0) * 8 > most_seconds:
+                continue
+            springs = Network(mesh, held(mesh, scene.kind), half_weight(mesh))
+            matrix, right = springs.tangent(), np.ones(springs.unknowns)
+            for seconds in (first, again):
+                begin = time.perf_counter()
+                springs.factorized(matrix, solver=name).solve(right)
+                seconds[solver, number] = time.perf_counter() - begin
+    return {"solver_seconds": first, "solver_again_seconds": again}
 
 
 def explicit(scene, size):

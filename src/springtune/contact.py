@@ -14,6 +14,7 @@ corners come near, each body entering with its own factorised tangent. A body th
 a rigid one has no unknowns at all, a floor neither.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,6 +22,8 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
+
+from .factors import SingularError, factorised
 
 REACH = 2.0
 """Distance up to which corners and edges are watched, over the mesh size."""
@@ -155,9 +158,10 @@ class Body:
         # A little resistance to any motion: free bodies are held by contact alone, which the tangent does not know.
         for added in SHIFTS:
             matrix = (tangent + added * scale * eye_array(tangent.shape[0], format="csc")).tocsc()
-            factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-            if not (factor.U.diagonal() < 0).any():
-                break
+            factor = factorised(matrix)
+            with suppress(SingularError):  # a zero pivot
+                if not factor.negative_pivots:
+                    break
         self._factorised, self._solve = tangent, factor.solve
         return self._solve
 
@@ -395,7 +399,7 @@ class Contact:
                 found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
                 if found is None:
                     found = self._opening(tangents, missing, rows, contacts.gaps)
-            except (RuntimeError, ValueError, np.linalg.LinAlgError):
+            except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
                 return None
             steps, forces = found
             longest = max(np.abs(part).max() if len(part) else 0.0 for part in steps)

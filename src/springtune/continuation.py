@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .network import SingularError
+from .factors import SingularError
 from .path import smallest_share
 from .statics import TOLERANCE
 

@@ -50,6 +50,7 @@ DIMENSIONS = {
     "experiment": "experiment on stability",
     "scene": "scene of the benchmark",
     "method": "definition / mesh type, or another method",
+    "linear_solver": "solver of linear systems",
     "curve_count": "number of stiffnesses of a sensitivity curve",
 }
 UNITS = {"mesh_size": "m", "scale": "m", "sliver_angle": "degree"}
@@ -74,7 +75,12 @@ ROOT_VARIABLES = {
     "load_share": (SCENE, "1", "largest share of the load with a good equilibrium, nonlinear", np.nan),
     "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
     "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
-    "solver": (SCENE, "1", "factorisation or multigrid, chosen by the number of unknowns", ""),
+    "solver": (
+        SCENE,
+        "1",
+        "what solved: Cholesky, SuperLU or multigrid, by what is installed and the number of unknowns",
+        "",
+    ),
     "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
     "definition_evaluations": (SCENE, "1", "solves that deriving the springs' parameters took", np.nan),
     "spring_ratio": (SCENE, "1", "largest spring stiffness over the smallest", np.nan),
@@ -279,6 +285,7 @@ STABILITY_VARIABLES = {
 
 CASE = ("scene", "method", "mesh_size")
 RACE = ("scene",)
+SOLVED = ("linear_solver", "mesh_size")
 
 BENCHMARK_VARIABLES = {
     "displacement": (CASE, "m", "displacement of the loaded side along the force", np.nan),
@@ -301,6 +308,8 @@ BENCHMARK_VARIABLES = {
     "reference_error_estimate": (RACE, "1", "estimated relative error of the reference", np.nan),
     "reference_seconds": (RACE, "s", "time of the reference", np.nan),
     "machine_load": (RACE, "1", "load of the machine at the start, processes", np.nan),
+    "solver_seconds": (SOLVED, "s", "time from a matrix to a solution, its sparsity analysed", np.nan),
+    "solver_again_seconds": (SOLVED, "s", "time of the next matrix of that sparsity", np.nan),
     "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", np.nan),
     "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", np.nan),
     "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", np.nan),

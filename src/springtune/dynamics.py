@@ -14,8 +14,9 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import cg, eigsh, splu
+from scipy.sparse.linalg import cg, eigsh
 
+from .factors import factorised
 from .network import Network
 from .schemes import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED
 from .statics import TOLERANCE
@@ -497,7 +498,7 @@ class _BackwardEuler(_Stepper):
 
     def _solver(self, matrix):
         if self.iterations is None:
-            return _factorized(matrix).solve
+            return factorised(matrix).solve
         # SOFA's test is of the residual over the right-hand side, as here.
         return lambda right: cg(matrix, right, rtol=self.tolerance, maxiter=self.iterations)[0]
 
@@ -532,7 +533,7 @@ class _Midpoint(_Stepper):
                 if self.factor is None or (size > 0.1 * last and not fresh):
                     stiffness = motion.stiffness_matrix if motion.linear else network.tangent(at)
                     extra = 0 if motion.dampers is None else motion.damper_matrix
-                    self.factor = _factorized(csc_array(diags_array(inertia + damping) + extra + 0.5 * h * stiffness))
+                    self.factor = factorised(csc_array(diags_array(inertia + damping) + extra + 0.5 * h * stiffness))
                     fresh = True
                 elif size >= last:
                     if size <= 1e-9 * scale:  # rounding
@@ -545,10 +546,6 @@ class _Midpoint(_Stepper):
                 return
             self.u = self.u + h * network.expand(middle)
             self.v = network.expand(2 * middle - v)
-
-
-def _factorized(matrix):
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _largest(matrix, start=None):

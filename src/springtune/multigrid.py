@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
-from .network import SingularError
+from .factors import SingularError
 
 TOLERANCE = 1e-11
 """Residual over the right-hand side at which a solve ends."""

@@ -13,17 +13,20 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
+from . import factors
+from .factors import Factor
 from .mesh.cells import DIAGONALS, SIDES
 from .ordering import nested_dissection
 
 LARGE = 200_000
-"""Unknowns beyond which multigrid takes the place of a factorisation: there it is as fast, and takes a third of the
-memory."""
+"""Unknowns beyond which multigrid takes the place of SuperLU: there it is as fast, and takes a third of the memory."""
 
-SUPERLU = {"relax": 4, "panel_size": 4, "options": {"SymmetricMode": True}}
-"""Sizes of SuperLU's panels: for these matrices its own are a quarter slower."""
+LARGEST = 2_500_000
+"""Unknowns beyond which it takes the place of a Cholesky factorisation, which is faster but needs 2 kB an unknown."""
+
+DISSECTED = 100_000
+"""Unknowns beyond which a Cholesky factorisation is faster in the order of nested dissection."""
 
 
 class Network:
@@ -210,25 +213,38 @@ class Network:
         SingularError
             If the tangent is singular.
         """
-        return self.factorized(self.tangent(displacements, follower))
+        return self.factorized(self.tangent(displacements, follower), symmetric=follower is None)
 
-    def factorized(self, matrix):
+    def factorized(self, matrix, symmetric=True, solver=None):
         """Factor of a matrix over the unknowns with the tangent's sparsity, such as `stiffness_of` gives or a sum of.
+
+        Parameters
+        ----------
+        matrix : sparse array, shape (unknowns, unknowns)
+        symmetric : bool, optional
+            Whether the matrix is symmetric.
+        solver : str, optional
+            One of `springtune.schemes.SOLVERS`; by what is installed and the number of unknowns without.
+
+        Returns
+        -------
+        Factor, CholeskyFactor or Multigrid
+            Cholesky's only where the matrix is positive definite.
 
         Raises
         ------
         SingularError
             If it is singular.
         """
-        if self.unknowns > LARGE:
+        cholesky = factors.CHOLESKY and symmetric and self.unknowns <= LARGEST
+        if solver == "Cholesky" or solver is None and cholesky:
+            factor = self._pattern.analysis.factorise(matrix.data)
+            if factor is not None:
+                return factor
+        if solver == "multigrid" or solver is None and self.unknowns > LARGE:
             return self._multigrid(matrix)
         order, places, indices, pointers = self._pattern.elimination
-        ordered = csc_array((matrix.data[places], indices, pointers), shape=matrix.shape)
-        try:
-            lu = splu(ordered, permc_spec="NATURAL", diag_pivot_thresh=0.0, **SUPERLU)
-        except RuntimeError as error:
-            raise SingularError(str(error)) from error
-        return Factor(lu, order)
+        return Factor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
 
     def _multigrid(self, matrix):
         from .multigrid import Multigrid
@@ -253,42 +269,6 @@ class Network:
     def inverted(self, displacements):
         """Whether any cell of the mesh is turned inside out."""
         return self.mesh.inverted(self.mesh.points + displacements)
-
-
-class SingularError(ArithmeticError):
-    """A tangent could not be factorised."""
-
-
-class Factor:
-    """A factorised symmetric matrix: solves, and counts its negative eigenvalues (Sylvester's law of inertia)."""
-
-    name = "factorisation"
-
-    def __init__(self, lu, order):
-        self._lu, self._order = lu, order
-
-    def solve(self, right):
-        """Solution of the factorised system, shape (unknowns,) or (unknowns, n)."""
-        solution = np.empty_like(right)
-        solution[self._order] = self._lu.solve(right[self._order])
-        return solution
-
-    def estimate(self, right):
-        """As `solve`, where an estimate would do."""
-        return self.solve(right)
-
-    @cached_property
-    def negative_pivots(self):
-        """Number of negative eigenvalues of the matrix; 0 where the equilibrium is stable.
-
-        Raises
-        ------
-        SingularError
-            If a pivot on the diagonal is zero and the factorisation went beside it: its signs then say nothing.
-        """
-        if (self._lu.perm_r != self._lu.perm_c).any():
-            raise SingularError("a zero pivot")
-        return int((self._lu.U.diagonal() < 0).sum())
 
 
 class _Pattern:
@@ -346,10 +326,20 @@ class _Pattern:
         return np.repeat(np.arange(self.size), np.diff(self.pointers)) * self.size + self.indices
 
     @cached_property
+    def order(self):
+        """Unknowns in the order of elimination."""
+        order = self.number[nested_dissection(self.mesh.points, self.springs)].ravel()
+        return order[order >= 0]
+
+    @cached_property
+    def analysis(self):
+        """Symbolic Cholesky factorisation; in an order of CHOLMOD's own where ours would not gain what it costs."""
+        return factors.Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
+
+    @cached_property
     def elimination(self):
         """Unknowns in the order of elimination; place and row of each entry in that order, and column pointers."""
-        order = self.number[nested_dissection(self.mesh.points, self.springs)].ravel()
-        order = order[order >= 0]
+        order = self.order
         rank = np.empty(self.size, dtype=np.int64)
         rank[order] = np.arange(self.size)
         sizes = np.diff(self.pointers)[order]

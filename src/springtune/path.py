@@ -9,7 +9,7 @@ displacement continue it past its poles. The nearest of these is the buckling lo
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from .network import SingularError
+from .factors import SingularError
 
 ORDER = 14
 """Order of a series that gives a whole curve, as a rule."""

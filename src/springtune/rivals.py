@@ -5,11 +5,11 @@ a clock which part of the work it is at. All are linear.
 """
 
 import numpy as np
-from scipy.sparse.linalg import splu
 
 from . import calculix
 from .boundary import held, measured, weights
 from .dynamics import Motion, masses, relax
+from .factors import factorised
 from .mesh import structured
 from .network import Network
 from .schemes import RIVALS
@@ -110,7 +110,7 @@ def _triangles(scene, size, clock, degree):
         free = np.setdiff1d(np.arange(len(load)), clamp)
         matrix = matrix[free][:, free].tocsc()
     with clock("factorising"):
-        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factor = factorised(matrix)
     with clock("solving"):
         solution = np.zeros(len(load))
         solution[free] = factor.solve(scene.force * mean[free])

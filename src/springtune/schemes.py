@@ -77,6 +77,9 @@ RIVALS = (
 )
 """Methods of the benchmark besides definitions, see `springtune.rivals`."""
 
+SOLVERS = ("Cholesky", "SuperLU", "multigrid")
+"""Solvers of linear systems."""
+
 CURVE_COUNTS = (1, 11, 61, 201)
 """Numbers of stiffnesses of the benchmark's sensitivity curves."""
 

@@ -12,11 +12,12 @@ import numpy as np
 from .boundary import held, loaded_edges, weights
 from .continuation import buckling_load, follow
 from .dynamics import Motion, masses, relax
+from .factors import SingularError
 from .geometry import Beam
 from .materials import Material
 from .mesh import MESH_TYPES, Mesh, corner_angles
 from .moduli import PatchTest
-from .network import Network, SingularError
+from .network import Network
 from .schemes import AXES, BEHAVIOURS, EXPLICIT, INTEGRATORS
 from .springs import DEFINITIONS, DefinitionError
 from .statics import FollowerPressure, StaticProblem

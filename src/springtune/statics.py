@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .network import SingularError
+from .factors import SingularError
 from .path import Expansion
 
 TOLERANCE = 1e-10

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune import dynamics
+from springtune import factors
 from springtune.boundary import held, weights
 from springtune.dynamics import EXPLICIT, INTEGRATORS, Motion, centre, masses, rayleigh, relax
 from springtune.materials import Material
@@ -292,8 +292,8 @@ def test_explicit_runs_factorise_nothing(integrator, monkeypatch):
     def refuse(*arguments, **options):
         raise AssertionError("factorised")
 
-    monkeypatch.setattr(dynamics, "splu", refuse)
-    monkeypatch.setattr("springtune.network.splu", refuse)
+    monkeypatch.setattr(factors, "splu", refuse)
+    monkeypatch.setattr(factors.Analysis, "factorise", refuse)
     motion = beam()
     assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200).status == "moving"
     assert relax(motion.network, motion.load).status == "rest"

@@ -24,9 +24,9 @@ from math import ceil, log
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, kron
-from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementLinePp, LinearForm, MeshLine
 
+from ..factors import factorised
 from ..geometry import Beam
 from ..loads import KINDS
 from ..materials import Material
@@ -329,8 +329,7 @@ class _Grid:
         """Unknowns for a Poisson's ratio."""
         direct, shear = 1 / (1 - nu**2), 1 / (2 * (1 + nu))
         matrix = direct * (self._direct + nu * self._lateral) + shear * self._shear
-        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        return factor.solve(self.load)
+        return factorised(matrix).solve(self.load)
 
     def expand(self, solution):
         """Coefficients of all products of polynomials, shape (2, n along x, n along y)."""

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..network import Network, SingularError
+from ..factors import SingularError
+from ..network import Network
 from . import lattice
 
 SPAN = 10.0

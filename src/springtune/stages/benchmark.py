@@ -40,6 +40,7 @@ def _race(task):
     if task["curves"]:
         size = max(CURVE_SIZE, min(task["mesh_sizes"]))
         found |= benchmark.curves(scene, size) | benchmark.explicit(scene, size)
+        found |= benchmark.solvers(scene, task["mesh_sizes"], task["most_thorough"])
     return found | {"message": found["message"].tolist()}
 
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from collections import defaultdict
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +23,14 @@ from ..study import load_study
 from . import bundles, files, references, store, tasks
 
 SOFTWARE = (
+    "cvxopt",
     "h5netcdf",
     "h5py",
     "meshio",
     "netgen-mesher",
     "numba",
     "numpy",
+    "pyamg",
     "scikit-fem",
     "scipy",
     "snakemake",
@@ -423,7 +424,7 @@ def _by_mesh(items):
 
 
 def _attributes(study, config):
-    software = {name: version(name) for name in SOFTWARE} | {"python": platform.python_version()}
+    software = {name: tasks.installed(name) for name in SOFTWARE} | {"python": platform.python_version()}
     return {
         "title": study.title,
         "Conventions": "CF-1.11",

@@ -6,10 +6,11 @@ then computes only results that are not stored yet.
 """
 
 import hashlib
+import os
 from collections import defaultdict
 from dataclasses import asdict
 from functools import cache, lru_cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..loads import LOADS
@@ -132,7 +133,16 @@ def _search(known, definition, mesh):
 
 @cache
 def _stage_key(stage, *packages):
-    return [digest(stage), *(f"{package} {version(package)}" for package in packages)]
+    return [digest(stage), *(f"{package} {installed(package)}" for package in packages)]
+
+
+def installed(package):
+    """Version of a package; "none" where it is an extra that is not there, or not wanted."""
+    unused = package == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"
+    try:
+        return "none" if unused else version(package)
+    except PackageNotFoundError:
+        return "none"
 
 
 @cache
@@ -160,13 +170,14 @@ def reference_of(beam, material, load):
     """
     problem = beam, material, LOADS[load].kind
     length, displacement = unit_scales(*problem)
-    key = files.key(unit_problem(*problem), _stage_key("reference", "numpy", "scipy", "scikit-fem"))
+    key = files.key(unit_problem(*problem), _stage_key("reference", "numpy", "scipy", "cvxopt", "scikit-fem"))
     return {"key": key, "length": length, "displacement": displacement}
 
 
 def finite_key(reference, kind):
     """Key of a reference at finite strain, which no load scales."""
-    return files.key(kind, _finite_problem(reference), _stage_key("reference", "numpy", "scipy", "scikit-fem"))
+    code = _stage_key("reference", "numpy", "scipy", "cvxopt", "scikit-fem")
+    return files.key(kind, _finite_problem(reference), code)
 
 
 def _problem(reference):
@@ -201,7 +212,7 @@ def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
     parameters.append(stiffnesses(study, curve))
-    return files.key(parameters, _stage_key("sensitivity", "numpy", "scipy"))
+    return files.key(parameters, _stage_key("sensitivity", "numpy", "scipy", "cvxopt"))
 
 
 def scene_key(study, scene):
@@ -210,14 +221,14 @@ def scene_key(study, scene):
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, _material(scene.material), reference]
     parameters += [LOADS[scene.load].kind, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
-    return files.key(parameters, _stage_key("solve", "numpy", "scipy"), definition_digest(scene.definition))
+    return files.key(parameters, _stage_key("solve", "numpy", "scipy", "cvxopt"), definition_digest(scene.definition))
 
 
 def moduli_key(study, one):
     """Key of the effective moduli of a definition on a patch."""
     mesh = patch_mesh(study, one)
     parameters = [_mesh_source(mesh), one.mesh_type, one.mesh_size, one.definition, one.poisson_ratio]
-    code = _stage_key("moduli", "numpy", "scipy", "netgen-mesher"), definition_digest(one.definition)
+    code = _stage_key("moduli", "numpy", "scipy", "cvxopt", "netgen-mesher"), definition_digest(one.definition)
     return files.key(parameters, *code)
 
 
@@ -329,7 +340,7 @@ def _reference(folder, references):
 
 def laying_key(one):
     """Key of a laid strip."""
-    return files.key(asdict(one), _stage_key("laying", "numpy", "scipy"), definition_digest(one.definition))
+    return files.key(asdict(one), _stage_key("laying", "numpy", "scipy", "cvxopt"), definition_digest(one.definition))
 
 
 def _laid(one):
@@ -339,7 +350,7 @@ def _laid(one):
 def experiment_key(one):
     """Key of an experiment on stability."""
     parameters = asdict(one) | {"beam": _beam(one.beam), "material": asdict(one.material) | {"name": ""}}
-    code = _stage_key("stability", "numpy", "scipy", "numba")
+    code = _stage_key("stability", "numpy", "scipy", "cvxopt", "numba")
     return files.key(parameters, code, definition_digest(one.definition))
 
 
@@ -350,7 +361,7 @@ def _experiment(one):
 def race_key(race):
     """Key of a scene of the benchmark."""
     parameters = asdict(race) | {"beam": _beam(race.beam), "material": asdict(race.material) | {"name": ""}}
-    code = _stage_key("benchmark", "numpy", "scipy", "numba", "scikit-fem", "netgen-mesher", "pyamg")
+    code = _stage_key("benchmark", "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "netgen-mesher", "pyamg")
     definitions = sorted({method.partition("/")[0] for method in race.methods if "/" in method})
     return files.key(parameters, code, [definition_digest(name) for name in definitions])
 

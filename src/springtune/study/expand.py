@@ -6,7 +6,7 @@ from ..geometry import Beam, Strip, Trapezoid
 from ..loads import LOADINGS, LOADS
 from ..materials import Material
 from ..mesh import MESH_TYPES
-from ..schemes import AXES, CURVE_COUNTS, EXPERIMENTS, ONCE, RIVALS, method_names
+from ..schemes import AXES, CURVE_COUNTS, EXPERIMENTS, ONCE, RIVALS, SOLVERS, method_names
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
 from .asked import (
@@ -256,7 +256,7 @@ def build(config, grids, problems, about):
     benchmark = _benchmark(config, _materials(config))
     if benchmark:
         axes |= {"scene": tuple(race.name for race in benchmark), "method": benchmark[0].methods}
-        axes["curve_count"] = CURVE_COUNTS
+        axes |= {"curve_count": CURVE_COUNTS, "linear_solver": SOLVERS}
     further = {one.mesh_size for one in laying}
     further |= {size for one in (*stability, *benchmark) for size in one.mesh_sizes}
     axes["mesh_size"] = tuple(sorted({*axes["mesh_size"], *further}))

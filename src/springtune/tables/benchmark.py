@@ -41,6 +41,7 @@ def page(tree):
         race = data.sel(scene=scene)
         parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(race), ""]
         parts += [f"### {scene}: methods on one mesh size", "", *_one_size(race), ""]
+    parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
     return "\n".join([*parts, "### A sensitivity curve", "", *_curve(data), ""])
 
 
@@ -100,6 +101,20 @@ def _one_size(race):
     heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", "meshing", "assembling", "factorising",
              "solving", "memory [MB]", "order", "exponent of cost"]  # fmt: skip
     return _table(heads, rows)
+
+
+def _solvers(data):
+    first, again = data.solver_seconds, data.solver_again_seconds
+    sizes = [size for size in data.mesh_size.values if np.isfinite(first.sel(mesh_size=size)).any()]
+    rows = [
+        [f"{1e3 * size:g} mm"]
+        + [
+            f"{_time(first.sel(cell))}, {_time(again.sel(cell))}" if np.isfinite(first.sel(cell)) else ""
+            for cell in ({"mesh_size": size, "linear_solver": name} for name in data.linear_solver.values)
+        ]
+        for size in sizes
+    ]
+    return _table(["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)], rows)
 
 
 def _curve(data):

@@ -1,0 +1,133 @@
+"""Factorisations by Cholesky's method and by SuperLU: the same answers, and nothing lost where there is but one."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array
+
+from springtune import factors
+from springtune.boundary import held, measured, weights
+from springtune.factors import SingularError, factorised
+from springtune.mesh import MESH_TYPES
+from springtune.network import Network
+from springtune.path import trace
+from springtune.springs.lattice import half_weight
+from springtune.statics import StaticProblem
+
+FORCE_OVER_STIFFNESS = 2e-4
+
+
+def problem_on(mesh, stiffness=None):
+    stiffness = half_weight(mesh) if stiffness is None else stiffness
+    return StaticProblem(Network(mesh, held(mesh, "axial"), stiffness), weights(mesh, "axial"))
+
+
+@pytest.fixture
+def both(monkeypatch):
+    """Calls a function with either factorisation."""
+    assert factors.CHOLESKY
+
+    def call(function):
+        results = []
+        for there in (True, False):
+            monkeypatch.setattr(factors, "CHOLESKY", there)
+            results.append(function())
+        return results
+
+    return call
+
+
+@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+def test_scenes_have_the_same_answer(both, mesh_type):
+    mesh = MESH_TYPES[mesh_type](0.05, 0.02, 2.5e-3)
+
+    def solve():
+        problem = problem_on(mesh)
+        found = [problem.linear(FORCE_OVER_STIFFNESS), problem.nonlinear(FORCE_OVER_STIFFNESS)]
+        assert all(problem.judge(FORCE_OVER_STIFFNESS, one)[0] == "solved" for one in found)
+        return found
+
+    ours, theirs = both(solve)
+    assert ours[0].factor.name == "Cholesky" and theirs[0].factor.name == "SuperLU"
+    for one, other in zip(ours, theirs):
+        # Condition numbers are some 1e4.
+        assert np.abs(one.displacements - other.displacements).max() <= 1e-10 * np.abs(other.displacements).max()
+
+
+def test_curves_have_the_same_answer(both):
+    mesh = MESH_TYPES["structured"](0.1, 0.02, 4e-3)
+    targets = FORCE_OVER_STIFFNESS / np.linspace(0.4, 1.6, 31)
+    ours, theirs = both(lambda: trace(problem_on(mesh), measured(mesh, "axial"), targets)[0])
+    assert np.abs(ours / theirs - 1).max() <= 1e-8  # the curves' own tolerance is 1e-7
+
+
+def test_negative_pivots_are_counted_where_there_is_no_cholesky_factor(both):
+    mesh = MESH_TYPES["structured"](0.2, 0.01, 2.5e-3)
+
+    def pivots():
+        problem = problem_on(mesh)
+        bent = -5e-3 * problem.slope / np.abs(problem.slope).max()
+        factor = problem.network.factorize(bent)
+        right = np.ones(problem.network.unknowns)
+        residual = problem.network.tangent(bent) @ factor.solve(right) - right
+        return factor.name, factor.negative_pivots, np.abs(residual).max()
+
+    ours, theirs = both(pivots)
+    assert ours[:2] == theirs[:2] == ("SuperLU", ours[1]) and ours[1] > 0
+    assert max(ours[2], theirs[2]) <= 1e-8
+
+
+def test_a_singular_tangent_is_reported_by_either(both):
+    mesh = MESH_TYPES["structured"](0.05, 0.02, 5e-3)
+    stiffness = half_weight(mesh)
+    loose = mesh.edges == len(mesh.points) - 1
+    stiffness[loose.any(axis=1)] = 0.0  # a particle without springs
+
+    def factorise():
+        with pytest.raises(SingularError):
+            problem_on(mesh, stiffness).network.factorize().negative_pivots  # noqa: B018
+        return True
+
+    assert all(both(factorise))
+
+
+def test_factors_of_one_mesh_do_not_overwrite_each_other():
+    """One symbolic factorisation serves them all, each numeric one takes its place: it must be given back unused."""
+    mesh = MESH_TYPES["structured"](0.05, 0.02, 5e-3)
+    network = problem_on(mesh).network
+    like = Network(mesh, network.held, 3.0 * network.stiffness, like=network)
+    right = np.arange(1.0, network.unknowns + 1)
+    first, second = network.factorize(), like.factorize()
+    solution = first.solve(right)
+    assert np.allclose(second.solve(right), solution / 3, rtol=1e-10)
+    del second
+    for _ in range(5):
+        assert np.allclose(like.factorize().solve(right), solution / 3, rtol=1e-10)
+        assert np.array_equal(first.solve(right), solution)
+    assert len(network._pattern.analysis._spare) <= 1  # symbolic factors are used again, not made again
+
+
+def test_many_right_hand_sides_at_once():
+    network = problem_on(MESH_TYPES["structured"](0.05, 0.02, 5e-3)).network
+    right = np.random.default_rng(0).standard_normal((network.unknowns, 3))
+    together = network.rest_factor.solve(right)
+    for column in range(3):
+        assert np.allclose(together[:, column], network.rest_factor.solve(right[:, column].copy()), rtol=1e-10)
+
+
+def test_a_matrix_of_any_sparsity_is_factorised(both):
+    generator = np.random.default_rng(1)
+    dense = generator.standard_normal((30, 30)) * (generator.random((30, 30)) < 0.2)
+    definite = csc_array(dense @ dense.T + 10 * np.eye(30))
+    right = generator.standard_normal(30)
+
+    def solve():
+        factor = factorised(definite)
+        indefinite = factorised(definite - 12 * csc_array(np.eye(30)))
+        return factor.name, factor.solve(right), indefinite.negative_pivots
+
+    ours, theirs = both(solve)
+    assert (ours[0], theirs[0]) == ("Cholesky", "SuperLU")
+    expected = np.linalg.solve(definite.toarray(), right)
+    assert np.allclose(ours[1], expected, rtol=1e-10) and np.allclose(theirs[1], expected, rtol=1e-10)
+    below = (np.linalg.eigvalsh(definite.toarray()) < 12).sum()
+    assert ours[2] == theirs[2] == below > 0
