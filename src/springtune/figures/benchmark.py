@@ -62,7 +62,7 @@ def draw(tree, folder):
 def _precision(race, folder, stem):
     """Error over run time: a line a method, over mesh sizes; what nothing beats is ringed."""
     with style.figure(folder, stem, figsize=(8.0, 5.0), layout="constrained") as (_, panel):
-        labelled = set()
+        labelled, ends = set(), []
         for method in map(str, race.method.values):
             case = race.sel({"method": method})
             errors, seconds = 100 * np.abs(case.error.values), case.seconds.values
@@ -77,8 +77,7 @@ def _precision(race, folder, stem):
             panel.plot(seconds[good], errors[good], marker="o", markersize=3 if shown else 1.5, label=label, **look)
             if shown:
                 last = np.flatnonzero(good)[0]
-                panel.annotate(method, (seconds[last], errors[last]), xytext=(4, 2), textcoords="offset points",
-                               fontsize=6.5, color=FAMILIES[kind])  # fmt: skip
+                ends.append((seconds[last], errors[last], method, FAMILIES[kind]))
             best = good & (case.pareto.values == 1)
             panel.plot(seconds[best], errors[best], "o", markersize=8, markerfacecolor="none", markeredgecolor="black",
                        markeredgewidth=0.8)  # fmt: skip
@@ -88,12 +87,23 @@ def _precision(race, folder, stem):
                        textcoords="offset points", fontsize=6.5)  # fmt: skip
         panel.set(**LOGARITHMIC, xlabel="seconds, from nothing to the displacement", ylabel="|error| [%]",
                   title=f"{race.scene.item()}: ringed: nothing is more accurate and faster")  # fmt: skip
+        _name_ends(panel, ends)
         panel.legend(loc="lower left", fontsize=7)
 
 
+def _name_ends(panel, ends):
+    """Names of lines in a column to the right, in the order of their ends and no two on each other."""
+    low, high = np.log10(panel.get_ylim())
+    gap, last = 0.035, np.inf
+    for seconds, error, name, colour in sorted(ends, key=lambda end: -end[1]):
+        last = min((np.log10(error) - low) / (high - low), last - gap)
+        panel.annotate(name, (seconds, error), xytext=(1.01, last), textcoords=panel.transAxes, fontsize=6.5,
+                       color=colour, va="center", annotation_clip=False,
+                       arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.3})  # fmt: skip
+
+
 def _lines(data, panel, x, y):
-    number = 0
-    for method in SHOWN:
+    for number, method in enumerate(SHOWN):
         if method not in data.method.values:
             continue
         case = data.sel({"method": method})
@@ -106,17 +116,18 @@ def _lines(data, panel, x, y):
         values = case[x].values[there] * (1e3 if x == "mesh_size" else 1)
         panel.plot(values, np.abs(case[y].values[there]) * (100 if y == "error" else 1), label=label,
                    **style.line(number))  # fmt: skip
-        number += 1
 
 
 def _rates(data, folder):
     scenes = data.scene.values
-    arguments = {"ncols": len(scenes), "squeeze": False, "figsize": (3.6 * len(scenes), 4.2), "layout": "constrained"}
+    arguments = {"ncols": len(scenes), "squeeze": False, "figsize": (3.6 * len(scenes), 4.8), "layout": "constrained"}
     with style.figure(folder, "benchmark_rates", **arguments) as (_, axes):
         for panel, scene in zip(axes[0], scenes):
             _lines(data.sel(scene=scene), panel, "mesh_size", "error")
             panel.set(**LOGARITHMIC, xlabel="mesh size [mm]", title=f"{scene}: method and order")
-            panel.legend(fontsize=5.5, loc="lower right")
+            estimate = 100 * float(data.reference_error_estimate.sel(scene=scene))
+            panel.axhspan(0, estimate, color="0.93", zorder=0, label="within the reference's own error")
+            panel.legend(fontsize=5.5, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.05), columnspacing=0.8)
         axes[0, 0].set_ylabel("|error| [%]")
 
 
@@ -125,7 +136,8 @@ def _costs(data, folder):
     with style.figure(folder, "benchmark_costs", ncols=2, figsize=(8.0, 4.0), layout="constrained") as (_, axes):
         _lines(scene, axes[0], "unknowns", "seconds")
         axes[0].set(**LOGARITHMIC, xlabel="unknowns", ylabel="seconds", title="Run time; exponents from 3000 on")
-        axes[0].legend(fontsize=6)
+        above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.06), "columnspacing": 0.8}
+        axes[0].legend(fontsize=6, ncols=3, **above)
         if "delingette/structured" in scene.method.values:
             case = scene.sel({"method": "delingette/structured"})
             there = np.isfinite(case.seconds.values)
@@ -136,7 +148,7 @@ def _costs(data, folder):
                 bottom = bottom + share
             axes[1].set_xticks(size, [f"{1e3 * x:g}" for x in case.mesh_size.values[there][::-1]])
             axes[1].set(xlabel="mesh size [mm]", ylabel="share of the seconds [%]", title="delingette/structured")
-            axes[1].legend(fontsize=7)
+            axes[1].legend(fontsize=7, ncols=4, **above)
 
 
 def _curve(data, folder):
