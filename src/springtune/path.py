@@ -56,38 +56,35 @@ class Expansion:
     def __init__(self, network, load, s, displacements, factor, order=ORDER):
         self.s, self.order = s, 0
         self._network, self._load, self._factor = network, load, factor
-        springs = len(network.rest_lengths)
-        self._d = np.zeros((1, springs, 2))
-        self._length, self._inverse = np.zeros((1, springs)), np.zeros((1, springs))
         self.coefficients = np.zeros((1, *network.held.shape))
         if displacements is not None:
             self.coefficients[0] = displacements
-        self._d[0] = network.rest_vectors + network.stretch(self.coefficients[0])
-        self._length[0] = np.sqrt(np.einsum("ij,ij->i", self._d[0], self._d[0]))
-        self._inverse[0] = 1.0 / self._length[0]
+        # Component by component, shape (order + 1, 2, n_springs): sums over orders are then of whole rows.
+        self._d = (network.rest_vectors + network.stretch(self.coefficients[0])).T[None].copy()
+        self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
+        self._inverse = 1.0 / self._length
         self.extend(order)
 
     def extend(self, order):
         """Add the orders up to one."""
-        network, more = self._network, order - self.order
+        network = self._network
         d, length, inverse, coefficients = (
-            np.concatenate([array, np.zeros((more, *array.shape[1:]))])
-            for array in (self._d, self._length, self._inverse, self.coefficients)
+            _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients)
         )
         weight = network.stiffness * network.rest_lengths
         for n in range(self.order + 1, order + 1):
-            right = self._load
+            right, length[n], inverse[n] = self._load, 0.0, 0.0
             if n > 1:
                 # What lower orders give of order n, as if d[n] were 0.
-                square = np.einsum("nij,nij->i", d[1:n], d[n - 1 : 0 : -1])
+                square = np.einsum("nji,nji->i", d[1:n], d[n - 1 : 0 : -1])
                 square -= np.einsum("ni,ni->i", length[1:n], length[n - 1 : 0 : -1])
                 length[n] = 0.5 * square * inverse[0]
                 inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
-                known = np.einsum("ni,nij->ij", inverse[1 : n + 1], d[n - 1 :: -1])
-                right = -network.gather(weight[:, None] * known)
+                known = np.einsum("ni,nji->ji", inverse[1 : n + 1], d[n - 1 :: -1])
+                right = -network.gather((weight * known).T)
             coefficients[n] = network.expand(self._factor.solve(right))
-            d[n] = network.stretch(coefficients[n])
-            change = np.einsum("ij,ij->i", d[0], d[n]) * inverse[0]
+            d[n] = network.stretch(coefficients[n]).T
+            change = np.einsum("ji,ji->i", d[0], d[n]) * inverse[0]
             length[n] += change
             inverse[n] -= inverse[0] ** 2 * change
         self._d, self._length, self._inverse, self.coefficients, self.order = d, length, inverse, coefficients, order
@@ -126,6 +123,13 @@ class Expansion:
         with np.errstate(divide="ignore", invalid="ignore"):
             errors = np.maximum(np.abs(best - second), np.abs(second - third)) / np.abs(best)
         return best, np.where(np.isfinite(errors), errors, np.inf)
+
+
+def _grown(array, length):
+    """The array with room for more along its first axis."""
+    grown = np.empty((length, *array.shape[1:]))
+    grown[: len(array)] = array
+    return grown
 
 
 def _pade(series, upper, lower):
