@@ -1,8 +1,8 @@
 """Factorised symmetric matrices: by Cholesky's method where CHOLMOD is at hand, else by SuperLU.
 
 CHOLMOD comes with the package cvxopt, an extra. Where it is not installed, or where the environment variable
-``SPRINGTUNE_SOLVER`` is ``superlu``, SuperLU factorises, which takes three to five times as long. What is not positive definite
-has no Cholesky factor, and SuperLU then counts its negative pivots.
+``SPRINGTUNE_SOLVER`` is ``superlu``, SuperLU factorises, which takes three to five times as long. What is not positive
+definite has no Cholesky factor, and SuperLU then counts its negative pivots.
 """
 
 import os
