@@ -54,12 +54,13 @@ def run(tasks, done, calibration=None):
         fields = References(tasks["references"], mesh)
         solver = Solver(mesh, family["thickness"], fields, family["keep_fields"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
-        results = {name: solver.solve(missing[name], calibration) for name in order}
-        store.add(path, results)
-        for name, result in results.items():
+        results = {}
+        for name in order:
             scene = missing[name]
+            results[name] = result = solver.solve(scene, calibration)
             work.add(scene["kinematics"], len(mesh.points), result["seconds"])
-            work.add(scene["definition"], len(mesh.points), result.get("definition_seconds", 0.0))
+            work.add(scene["definition"], len(mesh.points), solver.deriving)
+        store.add(path, results)
     files.write_json(done, work.summary())
 
 
@@ -117,6 +118,7 @@ class Solver:
         self.mesh, self.thickness = mesh, thickness
         self.references, self.keep_fields = references, keep_fields
         self.patterns, self.networks, self.found = {}, {}, {}
+        self.deriving = 0.0  # seconds that the last scene spent on its springs; none where it shares them
         self.held = lru_cache(lambda kind: held(mesh, kind))
         self.weights = lru_cache(lambda kind: weights(mesh, kind))
         self.measured = lru_cache(lambda kind: measured(mesh, kind))
@@ -138,14 +140,14 @@ class Solver:
             ``definition_seconds``, ``definition_evaluations``, ``spring_ratio``, and ``displacements`` [m] of the
             particles where they are kept.
         """
-        begin = time.perf_counter()
+        begin, self.deriving = time.perf_counter(), 0.0
         try:
             result = self._solve(scene, calibration)
         except DefinitionError as error:
             result = {"status": "failed", "message": f"{scene['definition']}: {error}"}
         except Exception as error:  # the other scenes shall still arrive
             result = {"status": "failed", "message": f"{type(error).__name__}: {error}"}
-        return result | {"seconds": time.perf_counter() - begin - result.get("definition_seconds", 0.0)}
+        return result | {"seconds": time.perf_counter() - begin - self.deriving}
 
     def _solve(self, scene, calibration):
         definition = DEFINITIONS[scene["definition"]]
@@ -198,7 +200,8 @@ class Solver:
         if self.found.get("name") != name:
             begin = time.perf_counter()
             springs = definition.springs(self.mesh, material, self.thickness, given)
-            self.found = {"name": name, "springs": springs, "seconds": time.perf_counter() - begin}
+            self.deriving = time.perf_counter() - begin
+            self.found = {"name": name, "springs": springs, "seconds": self.deriving}
         return self.found["springs"], self.found["seconds"]
 
     def _face(self, displacements):
