@@ -51,6 +51,7 @@ class Network:
         self.held = held
         self.stiffness = stiffness
         self.energies = tuple(energies)
+        self.has_springs = bool(np.any(stiffness)) or not self.energies
         if like is not None:
             self._pattern = like._pattern
         self.first, self.second = mesh.edges.T
@@ -92,13 +93,15 @@ class Network:
         The elongation is taken as ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose as many digits as the
         strain is small.
         """
-        relative = self.stretch(displacements)
-        vectors = self.rest_vectors + relative
-        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-        squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
-        resistance = -self.gather(pull[:, None] * vectors)
+        resistance = np.zeros(self.unknowns)
+        if self.has_springs:
+            relative = self.stretch(displacements)
+            vectors = self.rest_vectors + relative
+            lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+            squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
+            resistance -= self.gather(pull[:, None] * vectors)
         for energy in self.energies:
             resistance += self.reduce(self._pattern.sum_cells(energy.corners, energy.forces(displacements)))
         return resistance
@@ -110,10 +113,11 @@ class Network:
     def linear_forces(self, displacements):
         """Forces with which a linear network resists, of held directions, too, shape (n_points, 2)."""
         normals = self.rest_vectors / self.rest_lengths[:, None]
-        pull = self.stiffness * np.einsum("ij,ij->i", normals, self.stretch(displacements))
+        apart = self.stretch(displacements)
+        pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
         resistance = -self._pattern.sum_springs(pull[:, None] * normals)
         if self.energies:
-            apart = self.stretch(displacements).T
+            apart = apart.T
             at_first = np.einsum("abn,bn->na", self._rest_couplings, apart)
             at_second = np.einsum("ban,bn->na", self._rest_couplings, apart)
             resistance += self._pattern.sum_springs(at_first, at_second)
@@ -142,6 +146,19 @@ class Network:
         follower : tuple of float and FollowerPressure, optional
             A pressure and what it acts on, whose own derivative is taken off.
         """
+        couplings = self._spring_couplings(displacements) if self.has_springs else 0.0
+        if self.energies:
+            at_rest = displacements is None
+            of_cells = self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)
+            couplings = couplings + of_cells
+        data = self._pattern.coupling_entries(couplings)
+        if follower is not None:
+            s, load = follower
+            data -= s * self._pattern.entries(load.edges, load.derivative)
+        return self._pattern.matrix(data)
+
+    def _spring_couplings(self, displacements):
+        """Blocks of the tangent that couple the ends of each spring, shape (2, 2, n_springs)."""
         if displacements is None:
             vectors, ratio = self.rest_vectors, np.ones(len(self.rest_lengths))
             squares = self.rest_lengths**2
@@ -156,14 +173,7 @@ class Network:
         couplings[0, 0] = -across - along * x * x
         couplings[0, 1] = couplings[1, 0] = -along * x * y
         couplings[1, 1] = -across - along * y * y
-        if self.energies:
-            at_rest = displacements is None
-            couplings += self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)
-        data = self._pattern.coupling_entries(couplings)
-        if follower is not None:
-            s, load = follower
-            data -= s * self._pattern.entries(load.edges, load.derivative)
-        return self._pattern.matrix(data)
+        return couplings
 
     @cached_property
     def local_stiffness(self):
