@@ -76,40 +76,42 @@ def write_tasks(study, folder, cores):
 def _bundles(study, folder, cores):
     """Tasks of each bundle by its label: meshes for `solve` and `sensitivity`, patches for `moduli`, and so on."""
     notes = folder / "tasks/bundles.json"
-    before = files.read_json(notes) if notes.exists() else {}
-    known = bundles.Costs(folder.parent / COSTS)
+    known = files.read_json(notes) if notes.exists() else {"cores": 0}
+    # More cores want more bundles; what is solved stays solved, whichever bundle it is in.
+    before = known if known["cores"] >= cores else {"cores": cores}
+    machine = bundles.Costs(folder.parent / COSTS)
     meshes, costs = {mesh.name: mesh for mesh in study.meshes}, defaultdict(float)
     for mesh in study.meshes:
-        costs[mesh.name] += known.of("mesh", _particles(mesh))
+        costs[mesh.name] += machine.of("mesh", _particles(mesh))
     for scene in study.scenes:
-        costs[scene.mesh.name] += known.of(scene.kinematics, _particles(scene.mesh))
-        costs[scene.mesh.name] += _search(known, scene.definition, scene.mesh)
+        costs[scene.mesh.name] += machine.of(scene.kinematics, _particles(scene.mesh))
+        costs[scene.mesh.name] += _search(machine, scene.definition, scene.mesh)
     for curve in study.curves:
-        costs[curve.mesh.name] += known.of("curve", _particles(curve.mesh))
+        costs[curve.mesh.name] += machine.of("curve", _particles(curve.mesh))
     curved = {curve.mesh.name for curve in study.curves}
     patches, of_patches = _patches(study), defaultdict(float)
     for one in study.moduli:
         mesh = patch_mesh(study, one)
-        of_patches[patch_name(one)] += known.of("moduli", _particles(mesh)) + _search(known, one.definition, mesh)
+        of_patches[patch_name(one)] += machine.of("moduli", _particles(mesh)) + _search(machine, one.definition, mesh)
     strips = {files.key(asdict(one)): one for one in (*study.laying, *study.laying_references)}
     experiments = {files.key(asdict(one)): one for one in study.stability}
     references = _unit_references(study) | _finite_references(study)
     asked = {
         "reference": {
-            name: sum(known.of("reference" if kind is None else "finite") for _, kind in group)
+            name: sum(machine.of("reference" if kind is None else "finite") for _, kind in group)
             for name, group in references.items()
         },
         "solve": costs,
         "moduli": of_patches,
-        "laying": {name: known.of("laying", bundles.laying_units(one.mesh_size)) for name, one in strips.items()},
-        "stability": {name: known.of(one.name) for name, one in experiments.items()},
+        "laying": {name: machine.of("laying", bundles.laying_units(one.mesh_size)) for name, one in strips.items()},
+        "stability": {name: machine.of(one.name) for name, one in experiments.items()},
     }
     found = {
-        stage: bundles.share_out(costs, cores, known.start_up, before.get(stage, {})) if costs else {}
+        stage: bundles.share_out(costs, cores, machine.start_up, before.get(stage, {})) if costs else {}
         for stage, costs in asked.items()
     }
-    if found != before:
-        files.write_json(notes, found)
+    if found | {"cores": before["cores"]} != known:
+        files.write_json(notes, found | {"cores": before["cores"]})
     members = {"reference": references, "solve": meshes, "moduli": patches, "laying": strips,
                "stability": experiments}  # fmt: skip
     shared = {
@@ -126,9 +128,9 @@ def _particles(mesh):
     return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
 
 
-def _search(known, definition, mesh):
+def _search(machine, definition, mesh):
     """Seconds of a definition that searches, on top of its scene's; none of others."""
-    return known.of(definition, _particles(mesh)) if definition in bundles.COSTS else 0.0
+    return machine.of(definition, _particles(mesh)) if definition in bundles.COSTS else 0.0
 
 
 @cache
