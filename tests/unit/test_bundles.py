@@ -58,7 +58,7 @@ def test_costs_follow_what_the_machine_measures(tmp_path):
     files.write_json(done, work.summary())
     bundles.remember(path, [done])
     assert bundles.Costs(path).of("reference") == pytest.approx(3 * bundles.COSTS["reference"][0])
-    assert bundles.Costs(path).start_up == work.start_up
+    assert bundles.Costs(path).start_up == work.start_up + bundles.SPAWNED
     before = path.read_text()
     bundles.remember(path, [done])  # the same jobs again say nothing new
     assert path.read_text() == before

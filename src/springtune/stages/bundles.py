@@ -40,8 +40,11 @@ COSTS = {
 
 Kinds are the scenes' kinematics, other stages' tasks, definitions that search, and experiments on stability."""
 
-START_UP = 0.5
-"""Seconds of a job's start-up before any was measured."""
+START_UP = 0.25
+"""Seconds of imports of a job before any was measured."""
+
+SPAWNED = 0.25
+"""Seconds of a job's start-up that it does not see: Snakemake's share, the shell's, and those of an interpreter."""
 
 START_SHARE = 0.05
 """Share of a job that its start-up may take."""
@@ -62,7 +65,7 @@ class Costs:
     def __init__(self, path):
         known = files.read_json(path) if path.exists() else {}
         self.ratios = {kind: seconds / usual for kind, (usual, seconds) in known.get("kinds", {}).items() if usual}
-        self.start_up = known.get("start_up", START_UP)
+        self.start_up = known.get("start_up", START_UP) + SPAWNED
 
     def of(self, kind, units=0.0):
         """Seconds of a task."""
@@ -80,7 +83,7 @@ def remember(path, done):
     Parameters
     ----------
     path : Path
-        JSON file: sums of usual and of measured seconds by kind, and a job's start-up.
+        JSON file: sums of usual and of measured seconds by kind, and a job's imports.
     done : iterable of Path
         Files of jobs that hold a `Work.summary`; those older than the file at `path` are in it already.
     """
