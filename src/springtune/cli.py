@@ -2,7 +2,6 @@
 
 import inspect
 import json
-import os
 from pathlib import Path
 
 import click
@@ -10,6 +9,7 @@ import click
 from . import __version__
 from .loads import LOADS
 from .reference.unit import unit_problem
+from .whole import write_text
 
 SCHEMA = "study.schema.json"
 MANUAL = "README.md"
@@ -180,9 +180,7 @@ def schema(write, folder):
     except (OSError, ValueError) as error:
         raise click.ClickException(f"{folder / MANUAL}: {getattr(error, 'strerror', None) or error}") from None
     for name, text in ((SCHEMA, schema_text()), (MANUAL, manual)):
-        unfinished = folder / f"{name}.unfinished"
-        unfinished.write_text(text)
-        os.replace(unfinished, folder / name)
+        write_text(folder / name, text)
 
 
 @main.command()
@@ -259,9 +257,7 @@ def _tables(command, text, group, dataset, page):
         raise click.ClickException(
             f"{page}: the marks around the generated tables are missing; put {begin.strip()} and {end.strip()}"
         )
-    unfinished = page.with_name(page.name + ".unfinished")
-    unfinished.write_text(before + begin + "\n" + tables + "\n" + end + after)
-    os.replace(unfinished, page)
+    write_text(page, before + begin + "\n" + tables + "\n" + end + after)
 
 
 # -- scenes ------------------------------------------------------------------------------------------------------------

@@ -317,8 +317,8 @@ def contrast(setup):
     for i, ratio in enumerate(ratios):
         stiffer = Network(setup.coarse, network.held, base * np.where(soft, 1.0, ratio), like=network)
         problem, s = StaticProblem(stiffer, weights(setup.coarse, "axial")), setup.force / reference
-        _noted(result, i, lambda problem=problem, s=s: (problem, s, problem.linear(s)))
         found = problem.linear(s)
+        _noted(result, i, lambda problem=problem, s=s, found=found: (problem, s, found))
         exact = _refined(problem, s, found.displacements)
         result["error"][i] = np.abs(found.displacements - exact).max() / np.abs(exact).max()
         missing = s * problem.load - stiffer.linear_resistance(found.displacements)

@@ -162,7 +162,7 @@ class StaticProblem:
         residual = float(np.linalg.norm(missing)) / (abs(s) * self.load_norm)
         correction = self.correction(self.rest_factor, missing, displacements)
         good = correction <= CORRECTION
-        reason = "" if good else f"ill-conditioned: {correction:.1e} of the displacements is uncertain"
+        reason = "" if good else _uncertain(correction)
         return Equilibrium(displacements, not reason, 1, residual, self.rest_factor, reason=reason)
 
     def correction(self, factor, missing, displacements):
@@ -333,7 +333,7 @@ class StaticProblem:
                 if correction <= CORRECTION:  # rounding hides a smaller residual
                     return end()
                 if _norm(step) <= CORRECTION * _norm(displacements):
-                    return end(f"ill-conditioned: {correction:.1e} of the displacements is uncertain")
+                    return end(_uncertain(correction))
                 return end("line search found no descent")
             steps += 1
             keep = trial_residual <= KEEP_TANGENT * residual
@@ -343,7 +343,7 @@ class StaticProblem:
                 if correction <= CORRECTION:
                     return end()
                 if stalled == 3:
-                    return end(f"ill-conditioned: {correction:.1e} of the displacements is uncertain")
+                    return end(_uncertain(correction))
                 stalled += 1
 
     def _in_steps(self, s, iterations, smallest=1 / 64):
@@ -373,6 +373,10 @@ class StaticProblem:
                 return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
             else:
                 step *= 0.5
+
+
+def _uncertain(correction):
+    return f"ill-conditioned: {correction:.1e} of the displacements is uncertain"
 
 
 def _norm(vector):

@@ -40,8 +40,8 @@ def of_study(study):
     Returns
     -------
     dict of str to dict
-        ``sensitivity``, ``size``, ``deformed``, ``definitions``, ``block``, ``laying`` and ``stability``, each a dict
-        of selections by stem; empty where the study does not ask for the kind.
+        ``sensitivity``, ``size``, ``deformed``, ``definitions``, ``block``, ``laying``, ``stability`` and
+        ``benchmark``, each a dict of selections by stem; empty where the study does not ask for the kind.
     """
     curves = [_labels(curve) for curve in study.curves if curve.kinematics == "nonlinear"]
     scenes = [_labels(scene) for scene in study.scenes if scene.kinematics == "nonlinear"]

@@ -155,11 +155,6 @@ def _number(seconds, size, start_up, cores, most):
     return max(1, min(max(count, min(cores, ceil(seconds / (2 * start_up)))), most))
 
 
-def laying_units(mesh_size):
-    """What the cost of laying a strip on a mesh of some size [m] is in proportion to."""
-    return (1e-3 / mesh_size) ** 3
-
-
 def work_of(folder):
     """Files of a study's jobs that say what their tasks cost."""
     return sorted(Path(folder).glob("done/*_*.json"))

@@ -2,8 +2,9 @@
 
 import hashlib
 import json
-import os
 from pathlib import Path
+
+from ..whole import write_text
 
 
 def key(*parts):
@@ -14,11 +15,7 @@ def key(*parts):
 
 def write_json(path, content):
     """Write JSON; the file appears whole or not at all."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".unfinished")
-    unfinished.write_text(json.dumps(content, indent=1) + "\n")
-    os.replace(unfinished, path)
+    write_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def read_json(path):

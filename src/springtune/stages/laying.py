@@ -10,7 +10,7 @@ from ..laying import lay
 from ..materials import Material
 from ..springs import DefinitionError
 from . import files, store
-from .work import Work
+from .work import Work, laying_units
 
 
 def run(tasks, done):
@@ -31,7 +31,7 @@ def run(tasks, done):
         if task["key"] not in store.stored(path):
             begin = time.perf_counter()
             store.add(path, {task["key"]: _lay(task)})
-            work.add("laying", (1e-3 / task["mesh_size"]) ** 3, time.perf_counter() - begin)
+            work.add("laying", laying_units(task["mesh_size"]), time.perf_counter() - begin)
     files.write_json(done, work.summary())
 
 

@@ -24,8 +24,8 @@ def run(tasks, done):
         JSON file to write: what the work was.
     """
     tasks, work = files.read_json(tasks), Work()
-    for kind, solve in (("reference", _unit), ("finite", _finite)):
-        for task in tasks[f"{kind}s" if kind == "reference" else kind]:
+    for kind, asked, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
+        for task in tasks[asked]:
             path = Path(tasks["folder"]) / f"{task['key']}.h5"
             if task["key"] in store.stored(path):
                 continue

@@ -19,6 +19,7 @@ from ..reference.unit import unit_problem, unit_scales
 from ..study import MeshSpec
 from . import bundles, files
 from .code import definition_digest, digest
+from .work import laying_units
 
 COSTS = "costs.json"
 """File beside the studies' folders: what tasks cost on this machine."""
@@ -103,7 +104,7 @@ def _bundles(study, folder, cores):
         },
         "solve": costs,
         "moduli": of_patches,
-        "laying": {name: machine.of("laying", bundles.laying_units(one.mesh_size)) for name, one in strips.items()},
+        "laying": {name: machine.of("laying", laying_units(one.mesh_size)) for name, one in strips.items()},
         "stability": {name: machine.of(one.name) for name, one in experiments.items()},
     }
     found = {

@@ -48,11 +48,7 @@ def check_names(config, problems):
         known(("laying", "strip"), "beam", config.laying.strip, config.beams)
         for key in ("material", "support"):
             known(("laying", key), "material", getattr(config.laying, key), config.materials)
-        for name in config.laying.definition:
-            if DEFINITIONS[name].needs or 3 not in DEFINITIONS[name].cells:
-                able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
-                message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
-                problems.add(("laying", "definition"), f"{message}; choose of {', '.join(able)}")
+        _check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
         base = config.laying.trapezoid
         if not base.upper_base < base.lower_base:
             problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
@@ -79,6 +75,21 @@ def check_names(config, problems):
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
 
 
+def _check_for_triangles(names, path, problems):
+    """Definitions that derive a stiffness on triangles from mesh and material alone."""
+    able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+    for name in names:
+        if name not in able:
+            message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
+            problems.add(path, f"{message}; choose of {', '.join(able)}")
+
+
+def _check_density(config, name, path, problems):
+    """What moves has a density; materials that are not declared are another problem."""
+    if name in config.materials and config.materials[name].density is None:
+        problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
+
+
 def _check_benchmark(config, known, problems):
     """Names and numbers of the benchmark."""
     asked = config.benchmark
@@ -86,9 +97,7 @@ def _check_benchmark(config, known, problems):
         place = ("benchmark", "scenes", name)
         known((*place, "beam"), "beam", scene.beam, config.beams)
         known((*place, "material"), "material", scene.material, config.materials)
-        if scene.material in config.materials and config.materials[scene.material].density is None:
-            message = f"'{scene.material}' has no density; add one to it under materials, such as density: 7850 kg/m^3"
-            problems.add((*place, "material"), message)
+        _check_density(config, scene.material, (*place, "material"), problems)
         if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
             problems.add((*place, "load"), f"'{scene.load}' is not raced; choose traction, bending or pressure")
         if scene.beam in config.beams:
@@ -116,14 +125,8 @@ def _check_stability(config, known, problems):
     asked = config.stability
     known(("stability", "beam"), "beam", asked.beam, config.beams)
     known(("stability", "material"), "material", asked.material, config.materials)
-    if asked.material in config.materials and config.materials[asked.material].density is None:
-        message = f"'{asked.material}' has no density; add one to it under materials, such as density: 7850 kg/m^3"
-        problems.add(("stability", "material"), message)
-    for name in asked.definition:
-        if DEFINITIONS[name].needs or 3 not in DEFINITIONS[name].cells:
-            able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
-            message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
-            problems.add(("stability", "definition"), f"{message}; choose of {', '.join(able)}")
+    _check_density(config, asked.material, ("stability", "material"), problems)
+    _check_for_triangles(asked.definition, ("stability", "definition"), problems)
     made = [name for name in MESH_TYPES if name not in QUADS]
     if asked.mesh_type not in made:
         message = f"'{asked.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"

@@ -1,10 +1,11 @@
 """The page of the benchmark: every number from the dataset."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 
+from ..whole import write_text
+from .markdown import table
 from .names import BENCHMARK
 
 TARGETS = (0.01, 0.001, 0.0001)
@@ -25,10 +26,7 @@ def write(tree, folder):
     list of str
         Names of the files written.
     """
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    unfinished = Path(folder) / f"{BENCHMARK}.unfinished"
-    unfinished.write_text(page(tree), encoding="utf-8")
-    os.replace(unfinished, Path(folder) / BENCHMARK)
+    write_text(Path(folder) / BENCHMARK, page(tree))
     return [BENCHMARK]
 
 
@@ -43,11 +41,6 @@ def page(tree):
         parts += [f"### {scene}: methods on one mesh size", "", *_one_size(race), ""]
     parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
     return "\n".join([*parts, "### A sensitivity curve", "", *_curve(data), ""])
-
-
-def _table(heads, rows):
-    lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
-    return [f"| {' | '.join(line)} |" for line in lines]
 
 
 def _time(seconds):
@@ -79,7 +72,7 @@ def _quickest(race):
                 size = 1e3 * float(race.mesh_size.values[good[i].argmin()])
                 row.append(f"`{race.method.values[i]}`, {size:g} mm: {_time(best[i])}")
         rows.append(row + [""] * (4 - len(row)))
-    return _table(["error", "first", "second", "third"], rows)
+    return table(["error", "first", "second", "third"], rows)
 
 
 def _one_size(race):
@@ -100,7 +93,7 @@ def _one_size(race):
         ])  # fmt: skip
     heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", "meshing", "assembling", "factorising",
              "solving", "memory [MB]", "order", "exponent of cost"]  # fmt: skip
-    return _table(heads, rows)
+    return table(heads, rows)
 
 
 def _solvers(data):
@@ -114,7 +107,7 @@ def _solvers(data):
         ]
         for size in sizes
     ]
-    return _table(["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)], rows)
+    return table(["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)], rows)
 
 
 def _curve(data):
@@ -122,7 +115,7 @@ def _curve(data):
         [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
         for count in data.curve_count.values
     ]  # fmt: skip
-    lines = _table(["stiffnesses", "one path", "solve by solve"], rows)
+    lines = table(["stiffnesses", "one path", "solve by solve"], rows)
     lines += ["", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
               f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
     if "explicit_steps" in data and np.isfinite(data.explicit_steps):

@@ -2,12 +2,12 @@
 
 import csv
 import io
-import os
 from pathlib import Path
 
 import numpy as np
 
 from ..dataset import PATCH, SCENE, STATUS, most_asked
+from ..whole import write_text
 from .names import DEFINITIONS
 
 SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
@@ -30,11 +30,8 @@ def write(tree, folder):
     """
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
     texts = (_csv(root, SCENE, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
-    Path(folder).mkdir(parents=True, exist_ok=True)
     for name, text in zip(DEFINITIONS, texts):
-        unfinished = Path(folder) / f"{name}.unfinished"
-        unfinished.write_text(text, encoding="utf-8")
-        os.replace(unfinished, Path(folder) / name)
+        write_text(Path(folder) / name, text)
     return list(DEFINITIONS)
 
 

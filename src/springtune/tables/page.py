@@ -2,13 +2,13 @@
 
 import csv
 import io
-import os
 from pathlib import Path
 
 import jinja2
 import numpy as np
 
 from ..dataset import STATUS
+from ..whole import write_text
 from .names import TABLE, stem
 
 ROW = ("beam", "mesh_size")
@@ -42,11 +42,8 @@ def write(tree, folder):
     written["index.html"] = page.render(
         tables=tables, further=further, kinematics=kinematics, attributes=tree.attrs, missing=np.nan
     )
-    Path(folder).mkdir(parents=True, exist_ok=True)
     for name, text in written.items():
-        unfinished = Path(folder) / f"{name}.unfinished"
-        unfinished.write_text(text, encoding="utf-8")
-        os.replace(unfinished, Path(folder) / name)
+        write_text(Path(folder) / name, text)
     return list(written)
 
 

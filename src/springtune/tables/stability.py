@@ -1,11 +1,12 @@
 """The page of the experiments on stability: tables and rules of thumb, every number from the dataset."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 
 from ..dataset import STATUS
+from ..whole import write_text
+from .markdown import table
 from .names import STABILITY
 
 
@@ -23,10 +24,7 @@ def write(tree, folder):
     list of str
         Names of the files written.
     """
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    unfinished = Path(folder) / f"{STABILITY}.unfinished"
-    unfinished.write_text(page(tree), encoding="utf-8")
-    os.replace(unfinished, Path(folder) / STABILITY)
+    write_text(Path(folder) / STABILITY, page(tree))
     return [STABILITY]
 
 
@@ -53,14 +51,6 @@ def page(tree):
 def _definitions(data, name):
     there = data[name].notnull().any([dimension for dimension in data[name].dims if dimension != "definition"])
     return [str(label) for label in data.definition.values[there.values]]
-
-
-def _table(heads, rows):
-    return [
-        f"| {' | '.join(heads)} |",
-        "|---|" + "---:|" * (len(heads) - 1),
-        *(f"| {' | '.join(row)} |" for row in rows),
-    ]
 
 
 def _number(value, digits=3):
@@ -90,7 +80,7 @@ def _limits(data):
             )
     heads = ["definition", "mesh [mm]", "2/ω_max [ns]", "bound from particles [ns]"]
     heads += [f"damping {ratio:g} that lags: times" for ratio in data.damping_ratio.values[1:]]
-    return lines + _table(heads, rows)
+    return lines + table(heads, rows)
 
 
 def _drift(data):
@@ -99,7 +89,7 @@ def _drift(data):
                         for kind in ("energy_drift", "energy_swing", "momentum_drift"))]
         for name in data.integrator.values
     ]  # fmt: skip
-    return ["### Energy and momentum, no damping, half of the limit", ""] + _table(
+    return ["### Energy and momentum, no damping, half of the limit", ""] + table(
         ["integrator", "drift of energy", "swing of energy", "drift of momentum"], rows
     )
 
@@ -121,7 +111,7 @@ def _rest(data):
             rows.append(
                 [f"{1e3 * size:g} mm", str(count) if count else "direct", *(_number(x, 2) for x in cells.values)]
             )
-    return lines + _table(["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)], rows)
+    return lines + table(["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)], rows)
 
 
 def _contrast(data):
@@ -131,7 +121,7 @@ def _contrast(data):
          _number(data.contrast_estimate.sel(stiffness_contrast=contrast), 2)]
         for contrast in data.stiffness_contrast.values
     ]  # fmt: skip
-    return ["### Stiff parts beside soft ones", ""] + _table(["contrast", "status", "error", "estimated"], rows)
+    return ["### Stiff parts beside soft ones", ""] + table(["contrast", "status", "error", "estimated"], rows)
 
 
 def _poisson(data):
@@ -141,7 +131,7 @@ def _poisson(data):
                         for nu in ratios)]
         for name in _definitions(data, "poisson_step_limit")
     ]  # fmt: skip
-    return ["### Largest step [ns] over Poisson's ratio", ""] + _table(
+    return ["### Largest step [ns] over Poisson's ratio", ""] + table(
         ["definition", *(f"{nu:g}" for nu in ratios)], rows
     )
 
@@ -153,7 +143,7 @@ def _sizes(data):
         for scale in data["scale"].values
     ]  # fmt: skip
     heads = ["mesh [mm]", "step over mesh size [s/m]", *(f"error, {kind}" for kind in data.precision.values)]
-    return ["### Scale and precision", ""] + _table(heads, rows)
+    return ["### Scale and precision", ""] + table(heads, rows)
 
 
 def _strains(data):
@@ -174,7 +164,7 @@ def _strains(data):
                 texts.append(text + (f" ({pivots:.0f})" if pivots > 0 else f" ({share:.2f})" if share < 1 else ""))
             rows.append([f"`{name}`", *texts])
         heads = [f"{100 * strain:g} %".replace("-", "−") for strain in data.strain.values]
-        lines += [f"{load}:", "", *_table(["definition", *heads], rows), ""]
+        lines += [f"{load}:", "", *table(["definition", *heads], rows), ""]
     return lines[:-1]
 
 
@@ -188,7 +178,7 @@ def _perturbation(data):
         for name in _definitions(data, "inverted_starts_right")
     ]  # fmt: skip
     heads = ["definition", *(f"{share:g} a" for share in shares), "inverted starts: right", "wrong"]
-    return ["### Displacement with particles moved at random, and Newton's method from inverted starts", ""] + _table(
+    return ["### Displacement with particles moved at random, and Newton's method from inverted starts", ""] + table(
         heads, rows
     )
 
@@ -200,7 +190,7 @@ def _slivers(data):
         cells = data.sel(definition=name)
         limits = cells.sliver_step_limit.values
         rows.append([f"`{name}`", *(_number(limit / limits[0]) for limit in limits)])
-    return ["### Largest step with a sliver, over that at 30 degrees", ""] + _table(
+    return ["### Largest step with a sliver, over that at 30 degrees", ""] + table(
         ["definition", *(f"{angle:g}°" for angle in angles)], rows
     )
 
@@ -212,7 +202,7 @@ def _buckling(data):
         for name in _definitions(data, "buckling_load")
     ]
     heads = ["definition", *(f"{count} rows" for count in data.rows.values)]
-    return ["### Buckling load of a slender column over Euler's", "", *_table(heads, rows)]
+    return ["### Buckling load of a slender column over Euler's", "", *table(heads, rows)]
 
 
 def _scenes(root):
@@ -227,4 +217,4 @@ def _scenes(root):
         rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)],
                      "" if np.isnan(pivots) else f"{pivots:.0f}"])  # fmt: skip
     lines = ["### Scenes of the study", "", f"{int((flags == 1).sum())} scenes are solved and stable; the others:", ""]
-    return [*lines, *_table(["scene", "status", "negative pivots"], rows), ""] if rows else []
+    return [*lines, *table(["scene", "status", "negative pivots"], rows), ""] if rows else []
