@@ -19,6 +19,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
+
 from mechanics import (
     LONG,
     Body,
@@ -32,7 +33,6 @@ from mechanics import (
     spring_forces,
     squares_forces,
 )
-
 from springtune.loads import LOADS
 from springtune.materials import Material
 from springtune.mesh import MESH_TYPES
@@ -87,7 +87,7 @@ class Verdict:
     force: float = math.nan
     error: float = math.nan
     lowest: float = math.nan
-    merged: tuple = ()
+    merged: dict = field(default_factory=dict)
     unknowns: int = 0
 
 
@@ -231,9 +231,17 @@ def masses_of(mesh):
 
 
 def merged_modes(body, unknowns, force, masses):
-    """Places, from the lowest, of modes whose eigenvalue is complex or negative."""
+    """Modes whose eigenvalue is negative or complex, by their place from the lowest, and the damping that holds each.
+
+    Returns
+    -------
+    dict of int to float
+        Ratio of damping to the critical one from which a merged mode decays; infinite where it is negative.
+    """
     values = body.modes(unknowns, force, masses)
-    return tuple(int(i) for i in np.flatnonzero((np.abs(values.imag) > MERGED) | (values.real < 0)))
+    bad = np.flatnonzero((np.abs(values.imag) > MERGED) | (values.real < 0))
+    # The frequency is the root of the eigenvalue: its imaginary part over its real one is half of the eigenvalue's.
+    return {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
 
 
 class _NoReferences:
@@ -353,8 +361,9 @@ def _check_nonlinear(verdict, body, force, result, mesh, masses, sound, path):
     else:
         verdict.merged = merged_modes(body, exact, force, masses)
         if verdict.merged:
-            place = "low" if verdict.merged[0] < LOW else "high"
-            verdict.wrong.append(f"{place}-mode flutter: {verdict.merged} of {body.size} merged or negative")
+            place = "low" if min(verdict.merged) < LOW else "high"
+            held = ", ".join(f"{mode} ({ratio:.1e})" for mode, ratio in verdict.merged.items())
+            verdict.wrong.append(f"{place}-mode flutter: modes (damping ratio) {held} of {body.size}")
     if path and not verdict.wrong:
         end, share, why = body.follow(force, judge=sound if body.follower else None)
         if why:

@@ -3,12 +3,12 @@
 import math
 from dataclasses import replace
 
-import audit
-import mechanics
 import numpy as np
 import pytest
-from mechanics import LONG, Body, Part, spring_forces
 
+import audit
+import mechanics
+from mechanics import LONG, Body, Part, spring_forces
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 
@@ -95,7 +95,7 @@ def test_toggle_snaps_at_its_limit_point():
 
 
 def test_toggle_of_steep_springs_buckles_sideways_before_it_snaps():
-    """k sum (1 - L/l + L/l n n^T) along x: 2 (1 - L y^2 / l^3), zero at y^2 = l^3 / L ... in closed form by its root."""
+    """Stiffness along x is 2 (1 - L y^2 / l^3) at height y: its root on the way down is where the force stands."""
     rise = 3.0
     length = math.sqrt(1 + rise**2)
     heights = np.linspace(0.5, rise, 2_000_001)
