@@ -340,8 +340,8 @@ class StaticProblem:
             found = self.newton(s, start(s))
             iterations += found.iterations
             if found.converged:
-                stretched = self.network.largest_stretch(found.displacements) > FAR
-                if not stretched and self.network.largest_change(found.displacements) <= TURNED:
+                change = self.network.largest_change(found.displacements)  # never below the stretch
+                if change <= FAR or change <= TURNED and self.network.largest_stretch(found.displacements) <= FAR:
                     return replace(found, iterations=iterations)
                 break
         return self._in_steps(s, iterations)
@@ -396,6 +396,7 @@ class StaticProblem:
             if not keep:
                 if factorised == max_iterations:
                     return end("too many iterations")
+                factor = None  # which gives its room back
                 try:
                     factor = self._factorize(s, here[0])
                 except SingularError:
@@ -403,10 +404,10 @@ class StaticProblem:
                 factorised += 1
             step = network.expand(factor.solve(here[1]))
             there = self._step(s, here, step, halvings=0 if watched else MAX_HALVINGS)
-            if there is None and keep:  # the tangent is of an earlier iterate
+            lower = there is not None and there[2] <= (1.0 - 1e-4) * best[2]
+            if keep and not lower:  # the tangent is of an earlier iterate
                 keep = False
                 continue
-            lower = there is not None and there[2] <= (1.0 - 1e-4) * best[2]
             if watched and not lower and (there is None or since == WATCHED):
                 here, keep, watched = best, False, False
                 continue
@@ -416,7 +417,30 @@ class StaticProblem:
             keep = there[2] <= KEEP_TANGENT * here[2]
             here = there
             best, since = (here, 0) if lower else (best, since + 1)
-        return self._settle(s, *here, factor, steps)
+        factor = None
+        try:
+            factor = self._factorize(s, here[0])
+            refined, correction = self._refine(s, here, factor)
+            if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
+                factor = None
+                factor = self._factorize(s, refined[0])
+        except SingularError:
+            return end("singular tangent")
+        displacements, _, residual = refined
+        reason = "" if correction <= CORRECTION else _uncertain(correction)
+        return Equilibrium(displacements, not reason, steps, residual, factor, reason, correction)
+
+    def _refine(self, s, here, factor):
+        """Steps with one tangent for as long as each of them halves the estimated error; where they end, and that."""
+        correction = self._correction(factor, here[1], here[0])
+        while correction > REFINED:
+            displacements = here[0] + self.network.expand(factor.solve(here[1]))
+            there = displacements, *self._balance(s, displacements)
+            better = self._correction(factor, there[1], displacements)
+            if not better <= 0.5 * correction or self.network.inverted(displacements):
+                break
+            here, correction = there, better
+        return here, correction
 
     def _step(self, s, here, step, halvings):
         """Where a step leads, halved until the residual falls; as it is where it may not be halved.
@@ -425,7 +449,7 @@ class StaticProblem:
         """
         displacements, _, residual = here
         length = 1.0
-        if not halvings:
+        if not halvings and 2 * np.abs(step).max() > LONGEST_STEP * self.network.rest_lengths.min():
             length /= max(1.0, self.network.largest_change(step) / LONGEST_STEP)
         for _ in range(max(halvings, 1)):
             trial = displacements + length * step
@@ -435,37 +459,6 @@ class StaticProblem:
                 return trial, missing, found
             length *= 0.5
         return None
-
-    def _settle(self, s, displacements, missing, residual, factor, steps):
-        """The equilibrium at balanced displacements: refined, with the tangent there and an error that is bounded."""
-        network = self.network
-
-        def refined(factor, error):
-            """Steps with one tangent for as long as each of them halves the next one."""
-            nonlocal displacements, missing, residual, steps
-            left = error(factor, missing, displacements)
-            while left > REFINED:
-                trial = displacements + network.expand(factor.solve(missing))
-                missing_there, residual_there = self._balance(s, trial)
-                left_there = error(factor, missing_there, trial)
-                if not left_there <= 0.5 * left or network.inverted(trial):
-                    break
-                displacements, missing, residual = trial, missing_there, residual_there
-                left, steps = left_there, steps + 1
-            return left
-
-        try:
-            if factor is not None:
-                refined(factor, _next_step)
-            before = displacements
-            factor = self._factorize(s, displacements)
-            correction = refined(factor, self._correction)
-            if displacements is not before:
-                factor = self._factorize(s, displacements)
-        except SingularError:
-            return Equilibrium(displacements, False, steps, residual, None, "singular tangent")
-        reason = "" if correction <= CORRECTION else _uncertain(correction)
-        return Equilibrium(displacements, not reason, steps, residual, factor, reason, correction)
 
     def _in_steps(self, s, iterations, smallest=1 / 64):
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
@@ -494,11 +487,6 @@ class StaticProblem:
                 return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
             else:
                 step *= 0.5
-
-
-def _next_step(factor, missing, displacements):
-    """Size of the next step over that of the displacements [1]."""
-    return _norm(factor.estimate(missing)) / (_norm(displacements.ravel()) or 1.0)
 
 
 def _uncertain(correction):
