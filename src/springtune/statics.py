@@ -242,17 +242,39 @@ class StaticProblem:
         SingularError
             If the tangent is singular, as it is at a limit point.
         """
-        return self._stability(s, found)[0]
+        return self.stability(s, found.displacements, found.factor)[0]
 
-    def _stability(self, s, found):
-        """Number of negative eigenvalues of the tangent, and whether the network flutters."""
-        if self.follower is None or found.factor is self.rest_factor:
-            return found.factor.negative_pivots, False
-        modes = self.modes(s, found)
-        complex_ones = np.abs(modes.imag) > MERGED * np.abs(modes)
-        return int((modes.real < 0)[~complex_ones].sum()), bool(complex_ones.any())
+    def stability(self, s, displacements, factor):
+        """Whether an equilibrium is stable.
 
-    def modes(self, s, found):
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        factor : Factor
+            Tangent factorised there; that at rest for linear kinematics.
+
+        Returns
+        -------
+        negative : int
+            Number of negative eigenvalues of the tangent.
+        flutters : bool
+            Whether two modes have merged, as they may under a follower pressure alone.
+
+        Raises
+        ------
+        SingularError
+            If the tangent is singular, as it is at a limit point.
+        """
+        if self.follower is None or factor is self.rest_factor:
+            return factor.negative_pivots, False
+        modes = self.modes(s, displacements, factor)
+        merged = np.abs(modes.imag) > MERGED * np.abs(modes)
+        return int((modes.real < 0)[~merged].sum()), bool(merged.any())
+
+    def modes(self, s, displacements, factor):
         """Eigenvalues nearest to zero of the tangent over the masses, at an equilibrium under a follower pressure.
 
         Such a tangent is not symmetric: besides one of them passing zero, where a beam buckles, two may merge and leave
@@ -263,7 +285,10 @@ class StaticProblem:
         ----------
         s : float
             Force over the reference stiffness [m].
-        found : Equilibrium
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        factor : Factor
+            Tangent factorised there.
 
         Returns
         -------
@@ -273,11 +298,11 @@ class StaticProblem:
         network = self.network
         mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
         if len(mass) <= 4 * MODES:
-            tangent = network.tangent(found.displacements, (s, self.follower))
+            tangent = network.tangent(displacements, (s, self.follower))
             values = np.linalg.eigvals(tangent.toarray() / mass[:, None])
             return values[np.argsort(abs(values))][:MODES]
         # The largest eigenvalues of the inverse.
-        inverse = LinearOperator((len(mass),) * 2, lambda right: found.factor.solve(mass * right.ravel()), dtype=float)
+        inverse = LinearOperator((len(mass),) * 2, lambda right: factor.solve(mass * right.ravel()), dtype=float)
         start = np.random.default_rng(0).standard_normal(len(mass))
         return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
 
@@ -302,7 +327,7 @@ class StaticProblem:
         if not found.converged:
             return "not_converged", f"{found.reason}; last residual {found.residual:.1e}", np.nan
         try:
-            pivots, flutters = self._stability(s, found)
+            pivots, flutters = self.stability(s, found.displacements, found.factor)
         except SingularError:
             return "unstable", "limit point: the tangent is singular", np.nan
         if pivots:
@@ -348,7 +373,7 @@ class StaticProblem:
 
     def _unstable(self, s, found):
         try:
-            return any(self._stability(s, found))
+            return any(self.stability(s, found.displacements, found.factor))
         except SingularError:
             return True
 
