@@ -112,7 +112,7 @@ def _correct(problem, factorize, forces, u, at, du, ds, scale, most=12):
             return None
         factor = factorize(u, at)
         if size <= TOLERANCE * scale:
-            return u, at, factor.negative_pivots, step
+            return u, at, problem.stability(at, network.expand(u), factor)[0], step
         back, forth = factor.solve(missing), factor.solve(load)
         change = -(across @ back) / (across @ forth)
         u, at = u + back + change * forth, at + change

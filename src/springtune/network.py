@@ -88,23 +88,54 @@ class Network:
     # -- mechanics --------------------------------------------------------------------------------------------------
 
     def resistance(self, displacements):
-        """Force with which the springs resist displacements, over the reference stiffness [m], shape (unknowns,).
+        """Force with which the springs resist displacements, over the reference stiffness [m], shape (unknowns,)."""
+        resistance = np.zeros(self.unknowns)
+        if self.has_springs:
+            resistance -= self.gather(self._pulls(displacements))
+        for energy in self.energies:
+            resistance += self.reduce(self._pattern.sum_cells(energy.corners, energy.forces(displacements)))
+        return resistance
+
+    def _pulls(self, displacements):
+        """Force of each spring on its first end, over the reference stiffness [m], shape (n_springs, 2).
 
         The elongation is taken as ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose as many digits as the
         strain is small.
         """
-        resistance = np.zeros(self.unknowns)
-        if self.has_springs:
-            relative = self.stretch(displacements)
-            vectors = self.rest_vectors + relative
-            lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-            squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
-            resistance -= self.gather(pull[:, None] * vectors)
-        for energy in self.energies:
-            resistance += self.reduce(self._pattern.sum_cells(energy.corners, energy.forces(displacements)))
-        return resistance
+        relative = self.stretch(displacements)
+        vectors = self.rest_vectors + relative
+        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+        squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
+        return pull[:, None] * vectors
+
+    def rounding(self, displacements, linear=False):
+        """Size of the rounding errors in the resistance to displacements [m], shape (unknowns,).
+
+        The forces of a spring on its two ends are equal but for their sign, and those of a cell balance to rounding:
+        what is left is the rounding of their sums at each particle.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        linear : bool, optional
+            Whether it is `linear_resistance` that is meant.
+        """
+        total = np.zeros(self.held.shape)
+        if linear:
+            normals = self.rest_vectors / self.rest_lengths[:, None]
+            apart = self.stretch(displacements)
+            sizes = np.abs((self.stiffness * np.einsum("ij,ij->i", normals, apart))[:, None] * normals)
+            if self.energies:
+                sizes = sizes + np.einsum("abn,bn->na", np.abs(self._rest_couplings), np.abs(apart.T))
+        else:
+            sizes = np.abs(self._pulls(displacements)) if self.has_springs else np.zeros(self.rest_vectors.shape)
+            for energy in self.energies:
+                total += self._pattern.sum_cells(energy.corners, np.abs(energy.forces(displacements)))
+        total += self._pattern.sum_springs(sizes, -sizes)
+        return np.finfo(float).eps * self.reduce(total)
 
     def linear_resistance(self, displacements):
         """As `resistance`, of a network that is linear in the displacements."""

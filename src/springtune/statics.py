@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from .factors import SingularError
 from .path import Expansion
@@ -15,20 +16,39 @@ from .path import Expansion
 TOLERANCE = 1e-10
 """Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
 
-MAX_ITERATIONS = 12
+MAX_ITERATIONS = 16
 MAX_HALVINGS = 12
 CORRECTION = 1e-6
 """Largest estimated error of a solution's displacements: a residual alone says nothing where the stiffness is
 ill-conditioned."""
 
-FRESH = 2e-3
-"""Residual up to which the tangent of an iterate has the inertia of the solution."""
+REFINED = 1e-9
+"""Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
+
+REPRESENTATION = 4.0
+"""Residual that counts as balance, over what rounding of the displacements alone makes of it."""
+
+WATCHED = 4
+"""Steps of Newton's method in a row that may leave the residual above the least one seen: a slender beam that turns is
+stretched by one step and released by the next."""
+
+LONGEST_STEP = 0.5
+"""Largest change of a spring's vector over its length in such a step."""
 
 FAR = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
 
+TURNED = 0.3
+"""Change of a spring's vector over its length, turns included, beyond which it is, too."""
+
 SURPRISE = 0.1
 """Distance of a spring's vector from where it was expected, over its length, beyond which a load step is halved."""
+
+MODES = 12
+"""Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
+
+MERGED = 1e-6
+"""Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
 
 KEEP_TANGENT = 0.03
 """Share of the residual that a step may leave for its tangent to serve once more."""
@@ -51,11 +71,11 @@ class Equilibrium:
     residual : float
         Norm of the out-of-balance force over that of the load [1].
     factor : Factor or None
-        The last factorised tangent.
-    factor_residual : float
-        Residual where it was taken.
+        Factorised tangent: that at the solution, where it converged.
     reason : str
         Why it did not converge, empty where it did.
+    error_estimate : float
+        Estimated error of the displacements over their size [1]; NaN where there is no balance.
     unstable_share : float
         Share of the load at which the path to it is unstable [1]; NaN where no such place is known.
     load_share : float
@@ -69,8 +89,8 @@ class Equilibrium:
     iterations: int
     residual: float
     factor: object
-    factor_residual: float = 0.0
     reason: str = ""
+    error_estimate: float = np.nan
     unstable_share: float = np.nan
     load_share: float = 1.0
     last: np.ndarray | None = None
@@ -131,9 +151,28 @@ class StaticProblem:
         return self.network.rest_factor
 
     @cached_property
+    def _slope(self):
+        """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
+        factor, network = self.rest_factor, self.network
+        slope = network.expand(factor.solve(self.load))
+
+        def step(slope):
+            missing = self.load - network.linear_resistance(slope)
+            return missing, self._correction(factor, missing, slope, linear=True)
+
+        missing, correction = step(slope)
+        while correction > REFINED:
+            better = slope + network.expand(factor.solve(missing))
+            missing_better, correction_better = step(better)
+            if not correction_better <= 0.5 * correction:
+                break
+            slope, missing, correction = better, missing_better, correction_better
+        return slope, _norm(missing) / self.load_norm, correction
+
+    @property
     def slope(self):
         """Displacements of the linear network over ``s`` [1], shape (n_points, 2)."""
-        return self.network.expand(self.rest_factor.solve(self.load))
+        return self._slope[0]
 
     @cached_property
     def start(self):
@@ -157,18 +196,14 @@ class StaticProblem:
         -------
         Equilibrium
         """
-        displacements = s * self.slope
-        missing = s * self.load - self.network.linear_resistance(displacements)
-        residual = float(np.linalg.norm(missing)) / (abs(s) * self.load_norm)
-        correction = self.correction(self.rest_factor, missing, displacements)
-        good = correction <= CORRECTION
-        reason = "" if good else _uncertain(correction)
-        return Equilibrium(displacements, not reason, 1, residual, self.rest_factor, reason=reason)
+        slope, residual, correction = self._slope
+        reason = "" if correction <= CORRECTION else _uncertain(correction)
+        return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, correction)
 
-    def correction(self, factor, missing, displacements):
+    def _correction(self, factor, missing, displacements, linear=False):
         """Estimated error of displacements over their size [1].
 
-        The Newton step that is left, and what rounding of the displacements does to the forces.
+        The Newton step that is left, and what rounding of the forces does to the displacements.
 
         Parameters
         ----------
@@ -178,30 +213,98 @@ class StaticProblem:
             Load less resistance [m].
         displacements : ndarray of float, shape (n_points, 2)
             [m]
+        linear : bool, optional
+            Whether the network has linear kinematics.
         """
-        rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
+        rounding = self.network.rounding(displacements, linear)
         signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
         return _norm(factor.estimate(missing + signs * rounding)) / (_norm(displacements.ravel()) or 1.0)
 
-    def negative_pivots(self, s, found):
-        """Number of negative eigenvalues of the tangent at an equilibrium; 0 where it is stable.
+    def _balanced(self, s, displacements, residual):
+        """Whether a residual is within the tolerance, or what rounding of the displacements alone makes of it."""
+        if residual <= TOLERANCE:
+            return True
+        rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
+        return residual * abs(s) * self.load_norm <= REPRESENTATION * _norm(rounding)
 
-        The last factorised tangent answers, unless it was taken too far from the solution.
+    def negative_pivots(self, s, found):
+        """Number of negative eigenvalues of the tangent at an equilibrium; 0 where it is stable under dead loads.
 
         Parameters
         ----------
         s : float
             Force over the reference stiffness [m].
         found : Equilibrium
+            Its factor is that of the tangent there.
 
         Raises
         ------
         SingularError
             If the tangent is singular, as it is at a limit point.
         """
-        if found.factor_residual <= FRESH:
-            return found.factor.negative_pivots
-        return self.network.factorize(found.displacements, self.follower and (s, self.follower)).negative_pivots
+        return self.stability(s, found.displacements, found.factor)[0]
+
+    def stability(self, s, displacements, factor):
+        """Whether an equilibrium is stable.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        factor : Factor
+            Tangent factorised there; that at rest for linear kinematics.
+
+        Returns
+        -------
+        negative : int
+            Number of negative eigenvalues of the tangent.
+        flutters : bool
+            Whether two modes have merged, as they may under a follower pressure alone.
+
+        Raises
+        ------
+        SingularError
+            If the tangent is singular, as it is at a limit point.
+        """
+        if self.follower is None or factor is self.rest_factor:
+            return factor.negative_pivots, False
+        modes = self.modes(s, displacements, factor)
+        merged = np.abs(modes.imag) > MERGED * np.abs(modes)
+        return int((modes.real < 0)[~merged].sum()), bool(merged.any())
+
+    def modes(self, s, displacements, factor):
+        """Eigenvalues nearest to zero of the tangent over the masses, at an equilibrium under a follower pressure.
+
+        Such a tangent is not symmetric: besides one of them passing zero, where a beam buckles, two may merge and leave
+        the real axis, and the beam flutters (Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are
+        those of a uniform sheet; damping, which can lower the critical load, is none.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        factor : Factor
+            Tangent factorised there.
+
+        Returns
+        -------
+        ndarray of complex, shape (n,)
+            Squares of the frequencies, over stiffness and mass of the whole sheet; at most `MODES`.
+        """
+        network = self.network
+        mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
+        if len(mass) <= 4 * MODES:
+            tangent = network.tangent(displacements, (s, self.follower))
+            values = np.linalg.eigvals(tangent.toarray() / mass[:, None])
+            return values[np.argsort(abs(values))][:MODES]
+        # The largest eigenvalues of the inverse.
+        inverse = LinearOperator((len(mass),) * 2, lambda right: factor.solve(mass * right.ravel()), dtype=float)
+        start = np.random.default_rng(0).standard_normal(len(mass))
+        return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
 
     def judge(self, s, found):
         """What an equilibrium is worth.
@@ -224,12 +327,14 @@ class StaticProblem:
         if not found.converged:
             return "not_converged", f"{found.reason}; last residual {found.residual:.1e}", np.nan
         try:
-            pivots = self.negative_pivots(s, found)
+            pivots, flutters = self.stability(s, found.displacements, found.factor)
         except SingularError:
             return "unstable", "limit point: the tangent is singular", np.nan
         if pivots:
             many = "s" if pivots > 1 else ""
             return "unstable", f"unstable equilibrium: the tangent has {pivots} negative pivot{many}", pivots
+        if flutters:
+            return "unstable", "unstable equilibrium: it flutters, two modes have merged into a complex pair", pivots
         if found.unstable_share < 1:
             share = f"{100 * found.unstable_share:.3g} %"
             return "unstable", f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
@@ -240,7 +345,7 @@ class StaticProblem:
 
         Newton's method from the series about rest; where that fails, from the linear solution, which next to buckling
         is the nearer guess; where that fails, in load steps from rest. So are solutions with springs stretched beyond
-        `FAR` of their length: there may be other equilibria, and the one asked for is on the path from rest.
+        `FAR` or turned beyond `TURNED`: there may be other equilibria, and the one asked for is on the path from rest.
 
         Parameters
         ----------
@@ -250,6 +355,7 @@ class StaticProblem:
         Returns
         -------
         Equilibrium
+            Its factor is that of the tangent at the solution.
         """
         iterations = 0
         starts = [lambda s: s * self.slope]
@@ -259,22 +365,34 @@ class StaticProblem:
             found = self.newton(s, start(s))
             iterations += found.iterations
             if found.converged:
-                if self.network.largest_stretch(found.displacements) <= FAR:
+                change = self.network.largest_change(found.displacements)  # never below the stretch
+                if change <= FAR or change <= TURNED and self.network.largest_stretch(found.displacements) <= FAR:
                     return replace(found, iterations=iterations)
                 break
         return self._in_steps(s, iterations)
 
     def _unstable(self, s, found):
         try:
-            return self.negative_pivots(s, found) > 0
+            return any(self.stability(s, found.displacements, found.factor))
         except SingularError:
             return True
 
-    def newton(self, s, start, max_iterations=MAX_ITERATIONS):
-        """Newton's method with the exact tangent and a line search on the norm of the residual.
+    def _balance(self, s, displacements):
+        """Load less resistance [m], and its norm over that of the load [1]."""
+        load = self.load if self.follower is None else self.network.reduce(self.follower.forces(displacements))
+        missing = s * load - self.network.resistance(displacements)
+        return missing, _norm(missing) / (abs(s) * self.load_norm)
 
-        A step is halved until the residual falls and no triangle is inverted. A factorised tangent serves as long as
-        its steps cut the residual by `KEEP_TANGENT`: near the solution a new one costs ten such steps.
+    def _factorize(self, s, displacements):
+        return self.network.factorize(displacements, self.follower and (s, self.follower))
+
+    def newton(self, s, start, max_iterations=MAX_ITERATIONS):
+        """Newton's method with the exact tangent.
+
+        A few steps may leave the residual above the least one seen, before the iterate with that is taken up again and
+        steps are halved until the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell,
+        Math. Programming Study 16:1, 1982). No step may invert a cell. A factorised tangent serves as long as its steps
+        cut the residual by `KEEP_TANGENT`: near the solution a new one costs ten such steps.
 
         Parameters
         ----------
@@ -283,68 +401,89 @@ class StaticProblem:
         start : ndarray of float, shape (n_points, 2)
             First guess of the displacements [m].
         max_iterations : int, optional
-            Largest number of factorisations.
+            Largest number of factorisations on the way; one more is that of the tangent at the solution.
 
         Returns
         -------
         Equilibrium
         """
         network = self.network
-        scale = abs(s) * self.load_norm
+        here = start, *self._balance(s, start)  # displacements, what is missing and the residual
+        if not np.isfinite(here[2]) or network.inverted(start):
+            here = np.zeros_like(start), s * self.load, 1.0
+        factor, factorised, steps, keep = None, 0, 0, False
+        best, since, watched = here, 0, True
 
-        def balance(displacements):
-            load = self.load if self.follower is None else network.reduce(self.follower.forces(displacements))
-            missing = s * load - network.resistance(displacements)
-            return missing, _norm(missing) / scale
+        def end(reason):
+            return Equilibrium(here[0], False, steps, here[2], factor, reason)
 
-        displacements, factor, factorised, steps, taken = start, None, 0, 0, 0.0
-        missing, residual = balance(displacements)
-        if not np.isfinite(residual) or network.inverted(displacements):
-            displacements = np.zeros_like(start)
-            missing, residual = s * self.load, 1.0
-
-        def end(reason=""):
-            return Equilibrium(displacements, not reason, steps, residual, factor, taken, reason)
-
-        keep, stalled = False, 0
-        while True:
+        while not self._balanced(s, here[0], here[2]):
             if not keep:
                 if factorised == max_iterations:
                     return end("too many iterations")
+                factor = None  # which gives its room back
                 try:
-                    factor = network.factorize(displacements, self.follower and (s, self.follower))
+                    factor = self._factorize(s, here[0])
                 except SingularError:
                     return end("singular tangent")
-                factorised, taken = factorised + 1, residual
-            step = network.expand(factor.solve(missing))
-            length = 1.0
-            for _ in range(MAX_HALVINGS):
-                trial = displacements + length * step
-                trial_missing, trial_residual = balance(trial)
-                better = trial_residual <= max((1.0 - 1e-4 * length) * residual, 0.1 * TOLERANCE)
-                if better and not network.inverted(trial):
-                    break
-                length *= 0.5
-            else:
-                if keep:  # the tangent is of an earlier iterate
-                    keep = False
-                    continue
-                correction = self.correction(factor, missing, displacements)
-                if correction <= CORRECTION:  # rounding hides a smaller residual
-                    return end()
-                if _norm(step) <= CORRECTION * _norm(displacements):
-                    return end(_uncertain(correction))
+                factorised += 1
+            step = network.expand(factor.solve(here[1]))
+            there = self._step(s, here, step, halvings=0 if watched else MAX_HALVINGS)
+            lower = there is not None and there[2] <= (1.0 - 1e-4) * best[2]
+            if keep and not lower:  # the tangent is of an earlier iterate
+                keep = False
+                continue
+            if watched and not lower and (there is None or since == WATCHED):
+                here, keep, watched = best, False, False
+                continue
+            if there is None:
                 return end("line search found no descent")
             steps += 1
-            keep = trial_residual <= KEEP_TANGENT * residual
-            displacements, missing, residual = trial, trial_missing, trial_residual
-            if residual <= TOLERANCE:
-                correction = self.correction(factor, missing, displacements)
-                if correction <= CORRECTION:
-                    return end()
-                if stalled == 3:
-                    return end(_uncertain(correction))
-                stalled += 1
+            keep = there[2] <= KEEP_TANGENT * here[2]
+            here = there
+            best, since = (here, 0) if lower else (best, since + 1)
+        factor = None
+        try:
+            factor = self._factorize(s, here[0])
+            refined, correction = self._refine(s, here, factor)
+            if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
+                factor = None
+                factor = self._factorize(s, refined[0])
+        except SingularError:
+            return end("singular tangent")
+        displacements, _, residual = refined
+        reason = "" if correction <= CORRECTION else _uncertain(correction)
+        return Equilibrium(displacements, not reason, steps, residual, factor, reason, correction)
+
+    def _refine(self, s, here, factor):
+        """Steps with one tangent for as long as each of them halves the estimated error; where they end, and that."""
+        correction = self._correction(factor, here[1], here[0])
+        while correction > REFINED:
+            displacements = here[0] + self.network.expand(factor.solve(here[1]))
+            there = displacements, *self._balance(s, displacements)
+            better = self._correction(factor, there[1], displacements)
+            if not better <= 0.5 * correction or self.network.inverted(displacements):
+                break
+            here, correction = there, better
+        return here, correction
+
+    def _step(self, s, here, step, halvings):
+        """Where a step leads, halved until the residual falls; as it is where it may not be halved.
+
+        None where no such step keeps all cells from turning inside out.
+        """
+        displacements, _, residual = here
+        length = 1.0
+        if not halvings and 2 * np.abs(step).max() > LONGEST_STEP * self.network.rest_lengths.min():
+            length /= max(1.0, self.network.largest_change(step) / LONGEST_STEP)
+        for _ in range(max(halvings, 1)):
+            trial = displacements + length * step
+            missing, found = self._balance(s, trial)
+            lower = not halvings or found <= (1.0 - 1e-4 * length) * residual
+            if lower and np.isfinite(found) and not self.network.inverted(trial):
+                return trial, missing, found
+            length *= 0.5
+        return None
 
     def _in_steps(self, s, iterations, smallest=1 / 64):
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""

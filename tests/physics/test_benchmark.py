@@ -152,3 +152,5 @@ def test_multigrid_refuses_a_network_beyond_its_buckling_load(monkeypatch):
     across = problem.network.reduce(np.stack([0 * mesh.points[:, 0], mesh.points[:, 0] ** 2], axis=1))
     with pytest.raises(factors.SingularError):
         factor.solve(across)
+    assert factor.negative_pivots == 1  # without being shown where to look
+    assert problem.network.factorize(0.01 * bent).negative_pivots == 0

@@ -12,7 +12,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.network import Network
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs import DEFINITIONS
-from springtune.statics import FollowerPressure, StaticProblem
+from springtune.statics import MODES, FollowerPressure, StaticProblem
 
 BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
 FORCE = -20.0  # .1 MPa on 200 x 1 mm
@@ -103,3 +103,58 @@ def test_few_newton_steps_under_follower_pressure():
     problem, s, _ = block("area", 0.49, size=5e-3, follower=True)
     found = problem.newton(s, s * problem.slope)
     assert found.converged and found.iterations <= 12
+
+
+def column(definition, length, height, size, follower, mesh_type="structured"):
+    """A sheet that stands on its lower side, and the force over stiffness that would strain it by 1."""
+    mesh = MESH_TYPES[mesh_type](length, height, size)
+    springs = DEFINITIONS[definition].springs(mesh, Material("rubber", 1e6, 0.3), 1e-3)
+    network = Network(mesh, held(mesh, "face"), springs.relative, springs.energies)
+    turning = FollowerPressure(mesh, *loaded_edges(mesh, "face")) if follower else None
+    return StaticProblem(network, weights(mesh, "face"), turning), -1e6 * 1e-3 * length / springs.reference
+
+
+def frequencies(problem, s, displacements):
+    """Squares of all frequencies over stiffness and mass, by dense linear algebra, the lowest first."""
+    network = problem.network
+    mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
+    tangent = network.tangent(displacements, problem.follower and (s, problem.follower)).toarray()
+    values = np.linalg.eigvals(tangent / mass[:, None])
+    return values[np.argsort(np.abs(values))]
+
+
+@pytest.mark.parametrize(
+    "definition, mesh_type", [("delingette", "structured"), ("lattice", "free"), ("area", "right")]
+)
+@pytest.mark.parametrize("strain", [0.02, 0.04, 0.05, 0.06, 0.065, 0.08])
+def test_a_tall_sheet_under_a_follower_pressure_is_solved_only_where_it_does_not_flutter(definition, mesh_type, strain):
+    problem, unit = column(definition, 0.02, 0.1, 5e-3, follower=True, mesh_type=mesh_type)
+    found = problem.nonlinear(strain * unit)
+    status, message, pivots = problem.judge(strain * unit, found)
+    assert found.converged and pivots == 0  # inertia has nothing to say
+    lowest = frequencies(problem, strain * unit, found.displacements)[:MODES]
+    flutters = (np.abs(lowest.imag) > 1e-6 * np.abs(lowest)).any()
+    assert status == ("unstable" if flutters else "solved")
+    assert ("flutters" in message) == flutters
+    modes = problem.modes(strain * unit, found.displacements, found.factor)
+    assert np.sort(np.abs(modes)) == pytest.approx(np.abs(lowest), rel=1e-6)
+
+
+def test_a_slender_column_flutters_at_becks_load():
+    """20.05 EI/L^2 where a dead load buckles it at pi^2/4 EI/L^2, whatever its bending stiffness."""
+
+    def critical(follower, low, high):
+        problem, unit = column("delingette", 0.01, 0.2, 2.5e-3, follower)
+        assert problem.judge(low * unit, problem.nonlinear(low * unit))[0] == "solved"
+        assert problem.judge(high * unit, problem.nonlinear(high * unit))[0] == "unstable"
+        while high - low > 2e-3 * high:
+            middle = 0.5 * (low + high)
+            stable = problem.judge(middle * unit, problem.nonlinear(middle * unit))[0] == "solved"
+            low, high = (middle, high) if stable else (low, middle)
+        return high
+
+    euler = np.pi**2 / 4 / 12 * 0.05**2  # strain
+    # The sheet is a twentieth as wide as high: shear and strain count some percent.
+    assert critical(True, 6 * euler, 11 * euler) / critical(False, 0.9 * euler, 1.4 * euler) == pytest.approx(
+        20.05 / (np.pi**2 / 4), rel=0.04
+    )
