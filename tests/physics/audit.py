@@ -43,8 +43,11 @@ PROMISED = 1e-6
 """Largest error of the displacements of a solved scene, relative: `springtune.statics.CORRECTION`."""
 
 MERGED = 1e-6
-"""Imaginary part of an eigenvalue over the largest one's size from which two modes have merged: rounding leaves 1e-8 of
-two equal ones."""
+"""Imaginary part of an eigenvalue over its size from which two modes have merged; a load 1e-6 above the one that merges
+them gives some 1e-3."""
+
+ROUNDING = 1e-12
+"""Imaginary part over the largest eigenvalue that rounding may give."""
 
 LOW = 10
 """Modes below this number are counted as low ones."""
@@ -239,7 +242,7 @@ def merged_modes(body, unknowns, force, masses):
         Ratio of damping to the critical one from which a merged mode decays; infinite where it is negative.
     """
     values = body.modes(unknowns, force, masses)
-    bad = np.flatnonzero((np.abs(values.imag) > MERGED) | (values.real < 0))
+    bad = np.flatnonzero((np.abs(values.imag) > MERGED * np.abs(values) + ROUNDING) | (values.real < 0))
     # The frequency is the root of the eigenvalue: its imaginary part over its real one is half of the eigenvalue's.
     return {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
 
