@@ -5,11 +5,13 @@
 prints how many scenes ended in which status, and every one whose answer is wrong. A ``solved`` scene is wrong where
 
 - its displacements are further than `PROMISED` from the equilibrium next to them, or none is next to them;
-- that equilibrium has a negative eigenvalue, or under a following pressure two modes that have merged (flutter);
+- that equilibrium has a negative eigenvalue, or under a following pressure two of its lowest modes have merged
+  (flutter), or two higher ones that a damping ratio of `HELD` does not hold;
 - it is not on the path that leads from rest, step by step, through stable equilibria.
 
-What is refused though the path reaches its load stably is counted, too. Scenes depend on seed and number alone, so
-``--only 17`` shows one of them again.
+Higher modes that have merged but are held by less damping are printed and counted beside, and so is what is refused
+though the path reaches its load stably. Scenes depend on seed and number alone, so ``--only 17`` shows one of them
+again.
 """
 
 import argparse
@@ -49,8 +51,11 @@ them gives some 1e-3."""
 ROUNDING = 1e-12
 """Imaginary part over the largest eigenvalue that rounding may give."""
 
-LOW = 10
-"""Modes below this number are counted as low ones."""
+LOW = 12
+"""Modes below this number, from the lowest, are those that tell of flutter: `springtune.statics.MODES`."""
+
+HELD = 0.01
+"""Damping ratio that holds any structure's higher modes: pairs of them that need less are counted, not called wrong."""
 
 WAYS = ("moderate", "critical", "large")
 """How far a scene is loaded: within the linear range, next to the loss of stability, or far beyond the linear range."""
@@ -90,7 +95,7 @@ class Verdict:
     force: float = math.nan
     error: float = math.nan
     lowest: float = math.nan
-    merged: dict = field(default_factory=dict)
+    held: dict = field(default_factory=dict)
     unknowns: int = 0
 
 
@@ -238,13 +243,16 @@ def merged_modes(body, unknowns, force, masses):
 
     Returns
     -------
-    dict of int to float
-        Ratio of damping to the critical one from which a merged mode decays; infinite where it is negative.
+    fluttering, held : dict of int to float
+        Ratio of damping to the critical one from which a merged mode decays, infinite where it is negative: of modes
+        that make the body unstable, and of higher ones that little damping holds.
     """
     values = body.modes(unknowns, force, masses)
     bad = np.flatnonzero((np.abs(values.imag) > MERGED * np.abs(values) + ROUNDING) | (values.real < 0))
     # The frequency is the root of the eigenvalue: its imaginary part over its real one is half of the eigenvalue's.
-    return {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
+    needed = {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
+    fluttering = {mode: ratio for mode, ratio in needed.items() if mode < LOW or ratio > HELD}
+    return fluttering, {mode: ratio for mode, ratio in needed.items() if mode not in fluttering}
 
 
 class _NoReferences:
@@ -295,7 +303,7 @@ def audit(scene, path=True):
     def sound(unknowns, force):
         if body.follower is None:
             return body.stable(unknowns, force)
-        return not merged_modes(body, unknowns, force, masses)
+        return not merged_modes(body, unknowns, force, masses)[0]
 
     force = unit_force(scene) * scene.level
     if scene.way == "critical":
@@ -345,7 +353,8 @@ def _check_nonlinear(verdict, body, force, result, mesh, masses, sound, path):
         end, share, why = body.follow(force, judge=sound if body.follower else None)
         if not why and not body.inside_out(end, mesh.cells.values()):
             verdict.lowest = float(body.lowest(end, force)[0]) if body.follower is None else math.nan
-            verdict.refused = "though the path from rest is stable up to the load"
+            if not verdict.lowest <= 0:  # by less than what ends a path
+                verdict.refused = "though the path from rest is stable up to the load"
         return
     found = result["displacements"].ravel()[body.free].astype(LONG)
     exact = body.newton(found, force)
@@ -362,11 +371,10 @@ def _check_nonlinear(verdict, body, force, result, mesh, masses, sound, path):
         if verdict.lowest <= 0:
             verdict.wrong.append(f"eigenvalue {verdict.lowest:.1e}")
     else:
-        verdict.merged = merged_modes(body, exact, force, masses)
-        if verdict.merged:
-            place = "low" if min(verdict.merged) < LOW else "high"
-            held = ", ".join(f"{mode} ({ratio:.1e})" for mode, ratio in verdict.merged.items())
-            verdict.wrong.append(f"{place}-mode flutter: modes (damping ratio) {held} of {body.size}")
+        fluttering, verdict.held = merged_modes(body, exact, force, masses)
+        if fluttering:
+            modes = ", ".join(f"{mode} ({ratio:.1e})" for mode, ratio in fluttering.items())
+            verdict.wrong.append(f"flutter: modes (damping that holds each) {modes} of {body.size}")
     if path and not verdict.wrong:
         end, share, why = body.follow(force, judge=sound if body.follower else None)
         if why:
@@ -388,8 +396,8 @@ def main():
     for number in numbers:
         verdict = audit(draw(asked.seed, number), path=number % 3 == 0)
         verdicts.append(verdict)
-        if verdict.wrong or verdict.refused or asked.only is not None:
-            said = "; ".join(verdict.wrong) or verdict.refused
+        if verdict.wrong or verdict.refused or verdict.held or asked.only is not None:
+            said = "; ".join(verdict.wrong) or verdict.refused or "higher modes merged"
             print(f"{asked.seed}:{number} {verdict.status} [{verdict.message}] {said} | {verdict}", flush=True)
     print(summary(verdicts))
     print(f"{time.perf_counter() - begin:.0f} s")
@@ -404,11 +412,15 @@ def summary(verdicts):
         ("wrong by way", lambda v: v.scene.way if v.wrong else None),
         ("wrong by mesh type", lambda v: v.scene.mesh_type if v.wrong else None),
         ("wrong for", lambda v: " and ".join(w.split()[0] for w in v.wrong) if v.wrong else None),
+        ("solved with higher modes merged", lambda v: v.scene.load if v.held and not v.wrong else None),
         ("refused though stable", lambda v: f"{v.status}, {v.scene.load}, {v.scene.way}" if v.refused else None),
     ):
         counts = Counter(value(v) for v in verdicts)
         counts.pop(None, None)
         lines.append(f"{title}: " + (", ".join(f"{name} {n}" for name, n in counts.most_common()) or "none"))
+    ratios = [ratio for v in verdicts for ratio in v.held.values()]
+    if ratios:
+        lines.append(f"damping ratio that holds these: {min(ratios):.1e} to {max(ratios):.1e}")
     errors = np.array([v.error for v in verdicts if not math.isnan(v.error)])
     if len(errors):
         lines.append(f"error of solved scenes: median {np.median(errors):.1e}, largest {errors.max():.1e}")
