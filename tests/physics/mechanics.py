@@ -17,6 +17,13 @@ STEP = 1e-40
 """Imaginary step: its square is nothing beside 1."""
 
 
+NEAR = 0.02
+"""Change of an edge over its length between where a step of a path was to lead and where it led."""
+
+CROSSED = 2.0**-12
+"""Share of the load between a stable and an unstable point of a path, within which it loses its stability."""
+
+
 def dot(a, b):
     """Scalar product along the last axis; a sum of two terms is several times faster than a reduction."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
@@ -327,11 +334,12 @@ class Body:
         positions = (self.rest + self._field(unknowns)).astype(float)
         return any((area_of(positions[corners]) <= 0).any() for corners in cells)
 
-    def follow(self, force, step=0.125, smallest=1 / 2048, near=0.05, judge=None):
+    def follow(self, force, judge=None):
         """The path from rest in small load steps, as far as it is stable.
 
-        A step is taken again at half its length where Newton's method fails or where an edge ends further than `near`
-        of its length from where the last two points of the path say.
+        A step is taken again at half its length where Newton's method fails, where an edge ends further than `NEAR` of
+        its length from where the last two points of the path say, or where the equilibrium found is unstable: a path
+        that turns sharply, as that of a column not quite straight, is not to be left for another one.
 
         Returns
         -------
@@ -344,7 +352,7 @@ class Body:
         """
         judge = judge or self.stable
         last = before = np.zeros(self.size, LONG)
-        done, last_step = 0.0, None
+        done, step, last_step = 0.0, 0.125, None
         while done < 1:
             step = min(step, 1 - done)
             if last_step is None:
@@ -352,13 +360,13 @@ class Body:
             else:
                 guess = last + (last - before) * (step / last_step)
             found = self.newton(guess, force * (done + step), most=8, tolerance=1e-9)
-            if found is None or self.change(found - guess) > near:
+            if found is None or self.change(found - guess) > NEAR:
                 step /= 2
-                if step < smallest:
+                if step < 2.0**-18:
                     return last, done, "no equilibrium"
                 continue
             if not judge(found, force * (done + step)):
-                if step <= 1 / 64:
+                if step <= CROSSED:
                     return last, done, "unstable"
                 step /= 2
                 continue
@@ -377,7 +385,7 @@ class Body:
         last, done, why = self.follow(force, judge=judge)
         if not why:
             return None
-        low, high, here, there = done, min(1.0, done + 1 / 32), None, None
+        low, high, here, there = done, min(1.0, done + 2 * CROSSED), None, None
         small = 1e-10 * abs(self.lowest(np.zeros(self.size, LONG), 0.0)[0])
         while high - low > 1e-9 * high:
             middle = 0.5 * (low + high)
