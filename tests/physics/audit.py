@@ -397,7 +397,7 @@ def main():
         verdict = audit(draw(asked.seed, number), path=number % 3 == 0)
         verdicts.append(verdict)
         if verdict.wrong or verdict.refused or verdict.held or asked.only is not None:
-            said = "; ".join(verdict.wrong) or verdict.refused or "higher modes merged"
+            said = "; ".join(verdict.wrong) or verdict.refused or "higher modes merged" * bool(verdict.held)
             print(f"{asked.seed}:{number} {verdict.status} [{verdict.message}] {said} | {verdict}", flush=True)
     print(summary(verdicts))
     print(f"{time.perf_counter() - begin:.0f} s")

@@ -255,14 +255,14 @@ class Body:
             return 0.0, vector
         vector = vector.astype(LONG)
         value = float(vector @ self.along(unknowns, force, vector) / (vector @ vector)) / size
-        if value > 0 and not self._positive(matrix):
+        if value > 0 and not self._above(matrix, -1):
             value = float(np.linalg.eigvalsh(self.dense(matrix), UPLO="L")[0]) / size
         return value, vector
 
-    def _positive(self, matrix):
-        """Whether no eigenvalue is negative by more than rounding."""
+    def _above(self, matrix, sign):
+        """Whether all eigenvalues are above what rounding may do to them, times a sign, by Cholesky's method."""
         lower = matrix[self.band :].copy()
-        lower[0] += 1e-14 * math.sqrt(self.size) * np.abs(matrix).max()
+        lower[0] -= sign * 1e-14 * math.sqrt(self.size) * np.abs(matrix).max()
         try:
             cholesky_banded(lower, lower=True, check_finite=False)
         except LinAlgError:
@@ -270,8 +270,11 @@ class Body:
         return True
 
     def stable(self, unknowns, force):
-        """Whether no eigenvalue is negative by more than rounding."""
-        return self._positive(self.tangent(unknowns, force))
+        """Whether no eigenvalue is negative."""
+        matrix = self.tangent(unknowns, force)
+        if self._above(matrix, 1):
+            return True
+        return self._above(matrix, -1) and self.lowest(unknowns, force, matrix)[0] > 0
 
     def modes(self, unknowns, force, masses):
         """Eigenvalues of the tangent over the masses, which is not symmetric under a follower, over the largest."""
