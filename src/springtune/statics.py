@@ -44,6 +44,12 @@ TURNED = 0.3
 SURPRISE = 0.1
 """Distance of a spring's vector from where it was expected, over its length, beyond which a load step is halved."""
 
+SMALLEST_STEP = 1 / 64
+"""Load step in which Newton's method has to converge, over the load."""
+
+SHORTEST = 1 / 2048
+"""Load step down to which springs that turn fast are told from springs that snap."""
+
 MODES = 12
 """Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
 
@@ -485,7 +491,7 @@ class StaticProblem:
             length *= 0.5
         return None
 
-    def _in_steps(self, s, iterations, smallest=1 / 64):
+    def _in_steps(self, s, iterations):
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
         done, step = 0.0, 0.25  # of the load
         last = before = np.zeros(self.network.held.shape)
@@ -497,7 +503,7 @@ class StaticProblem:
             iterations += found.iterations
             # Where springs are far from where the path pointed, some of them have snapped.
             missed = self.network.largest_change(found.displacements - guess) > SURPRISE
-            if found.converged and (step <= smallest or not missed):
+            if found.converged and (step <= SHORTEST or not missed):
                 if missed and np.isnan(unstable):
                     unstable = done
                 before, last, last_step = last, found.displacements, step
@@ -507,7 +513,7 @@ class StaticProblem:
                 if np.isnan(unstable) and self._unstable(done * s, found):
                     unstable = done
                 step *= 1.5
-            elif step <= smallest:
+            elif step <= SMALLEST_STEP and not found.converged:
                 reason = f"{found.reason} beyond {100 * done:.3g} % of the load"
                 return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
             else:

@@ -6,12 +6,12 @@ prints how many scenes ended in which status, and every one whose answer is wron
 
 - its displacements are further than `PROMISED` from the equilibrium next to them, or none is next to them;
 - that equilibrium has a negative eigenvalue, or under a following pressure two of its lowest modes have merged
-  (flutter), or two higher ones that a damping ratio of `HELD` does not hold;
+  (flutter);
 - it is not on the path that leads from rest, step by step, through stable equilibria.
 
-Higher modes that have merged but are held by less damping are printed and counted beside, and so is what is refused
-though the path reaches its load stably. Scenes depend on seed and number alone, so ``--only 17`` shows one of them
-again.
+Higher modes that have merged, which are the mesh's rather than the sheet's and which little damping holds, are counted
+beside with the damping ratio that they need, and so is what is refused though the path reaches its load stably. Scenes
+depend on seed and number alone, so ``--only 17`` shows one of them again.
 """
 
 import argparse
@@ -53,9 +53,6 @@ ROUNDING = 1e-12
 
 LOW = 12
 """Modes below this number, from the lowest, are those that tell of flutter: `springtune.statics.MODES`."""
-
-HELD = 0.01
-"""Damping ratio that holds any structure's higher modes: pairs of them that need less are counted, not called wrong."""
 
 WAYS = ("moderate", "critical", "large")
 """How far a scene is loaded: within the linear range, next to the loss of stability, or far beyond the linear range."""
@@ -251,7 +248,7 @@ def merged_modes(body, unknowns, force, masses):
     bad = np.flatnonzero((np.abs(values.imag) > MERGED * np.abs(values) + ROUNDING) | (values.real < 0))
     # The frequency is the root of the eigenvalue: its imaginary part over its real one is half of the eigenvalue's.
     needed = {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
-    fluttering = {mode: ratio for mode, ratio in needed.items() if mode < LOW or ratio > HELD}
+    fluttering = {mode: ratio for mode, ratio in needed.items() if mode < LOW}
     return fluttering, {mode: ratio for mode, ratio in needed.items() if mode not in fluttering}
 
 
