@@ -248,7 +248,7 @@ def merged_modes(body, unknowns, force, masses):
     bad = np.flatnonzero((np.abs(values.imag) > MERGED * np.abs(values) + ROUNDING) | (values.real < 0))
     # The frequency is the root of the eigenvalue: its imaginary part over its real one is half of the eigenvalue's.
     needed = {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
-    fluttering = {mode: ratio for mode, ratio in needed.items() if mode < LOW}
+    fluttering = {mode: ratio for mode, ratio in needed.items() if mode < LOW or ratio == np.inf}
     return fluttering, {mode: ratio for mode, ratio in needed.items() if mode not in fluttering}
 
 
