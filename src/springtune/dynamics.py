@@ -4,9 +4,13 @@ A network whose loads, stiffnesses and energies are over a reference stiffness k
 ``(m/k) u'' + (c/k) u' + r(u) = s p``: masses enter as inertia m/k [s2], dampers as c/k [s], and frequencies and steps
 are in seconds all the same.
 
-Explicit schemes never factorise, and assemble nothing but the rows of a linear network. Their steps are bounded before
-the run by `Motion.step_limit`; where the bound is not kept, and in every other case of a run that came to nothing, the
+Explicit steps factorise nothing, and assemble nothing but the rows of a linear network. They are bounded before the
+run by `Motion.step_limit`; where the bound is not kept, and in every other case of a run that came to nothing, the
 status and the message of a `Run` say so.
+
+A run ends at rest on any equilibrium, be it one that the least push would end: a straight column above its buckling
+load. The tangent where a run came to rest is therefore factorised, once and for all kinds of runs, and its negative
+pivots are counted.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +20,7 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg, eigsh
 
-from .factors import factorised
+from .factors import SingularError, factorised
 from .network import Network
 from .schemes import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED
 from .statics import TOLERANCE
@@ -92,7 +96,8 @@ class Run:
     displacements, velocities : ndarray of float, shape (n_points, 2)
         Where it ended [m], [m/s].
     status : str
-        ``"rest"``, ``"moving"`` (all steps are done), ``"diverged"`` or ``"inverted"``.
+        ``"rest"`` (on a stable equilibrium), ``"unstable"`` (at rest on one that is not), ``"moving"`` (all steps are
+        done), ``"diverged"`` or ``"inverted"``.
     message : str
         What went wrong and what to do; empty where nothing did.
     steps : int
@@ -291,7 +296,8 @@ class Motion:
             Where it starts [m], [m/s]; at rest without.
         rest : float, optional
             Ends the run where the out-of-balance force is at most this share of the load, and the particles are as
-            slow; it goes on without.
+            slow; it goes on without. Whether the equilibrium is stable is judged by the tangent there: loads as near to
+            a critical one as the run is to balance may be misjudged.
         sample : int, optional
             Steps between samples of energy and momentum; none without.
         precision : str, optional
@@ -351,6 +357,10 @@ class Motion:
                 "inverted",
                 f"triangles are inverted after {done} steps; use less load or smaller steps",
             )
+        if status == "rest":
+            status, message = self._judge(u)
+            if status == "unstable" and integrator == "backward-euler":
+                message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
         if status == "moving" and rest is not None:
             message = f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
         samples = np.array(samples).reshape(-1, 4)
@@ -362,6 +372,26 @@ class Motion:
         # Speed that the load would give its particles in free fall through the static displacement.
         work = abs(float((self.load * u).sum())) or 1.0
         return 0.5 * float((self.inertia * v**2).sum()) <= rest**2 * work
+
+    def _judge(self, u):
+        """Status and message of a run that came to rest: whether its equilibrium is stable."""
+        network = self.network
+        x, y = (network.mesh.points - network.mesh.points.mean(axis=0)).T / np.ptp(network.mesh.points)
+        one, none = np.ones(len(x)), np.zeros(len(x))
+        motions = np.stack([[one, none], [none, one], [-y, x]]).transpose(2, 1, 0)[network.held]
+        if np.linalg.matrix_rank(motions) < 3:
+            return "rest", "the body is free to move as a whole, so whether it is stable was not checked"
+        try:
+            pivots = (network.rest_factor if self.linear else network.factorize(u)).negative_pivots
+        except SingularError:
+            return "unstable", "at rest on a limit point: the tangent is singular; use another load"
+        if not pivots:
+            return "rest", ""
+        many = "s" if pivots > 1 else ""
+        return "unstable", (
+            f"at rest on an unstable equilibrium: the tangent has {pivots} negative pivot{many}, and the least push "
+            f"would end it; push the body sideways, by a force of a thousandth of the load, say, and run again"
+        )
 
     def _why(self, integrator, step, done):
         limit = self.step_limit(integrator)
@@ -567,11 +597,12 @@ RELAX_CHECK = 40
 
 
 def relax(network, load, *, linear=False, tolerance=TOLERANCE, max_steps=200_000):
-    r"""Equilibrium by dynamic relaxation: explicit steps with masses and damping made for it; nothing is factorised.
+    r"""Equilibrium by dynamic relaxation: explicit steps with masses and damping made for it.
 
     Masses of twice the row sums of stiffness make a step of 1 stable and all local frequencies alike; the damping is
     critical for the frequency :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` of the motion at
     hand (Underwood, Dynamic relaxation, in: Computational methods for transient analysis, 1983, ch. 5).
+    No step factorises; what came to rest is judged by one factorisation, as a `Motion.run` is.
 
     Parameters
     ----------
@@ -601,9 +632,11 @@ def relax(network, load, *, linear=False, tolerance=TOLERANCE, max_steps=200_000
             return replace(found, steps=done, message="dynamic relaxation diverged; use load steps or Newton's method")
         u, v = found.displacements, found.velocities
         if found.residual <= tolerance:
-            inverted = network.inverted(u)
-            message = "triangles are inverted; use a smaller load" if inverted else ""
-            return replace(found, status="inverted" if inverted else "rest", message=message, steps=done)
+            if network.inverted(u):
+                status, message = "inverted", "triangles are inverted; use a smaller load"
+            else:
+                status, message = motion._judge(u)
+            return replace(found, status=status, message=message, steps=done)
         resistance = -motion.missing(u)
         if before is not None:
             moved = network.reduce(u) - before[0]

@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from springtune import factors
 from springtune.boundary import held, weights
+from springtune.continuation import buckling_load
 from springtune.dynamics import EXPLICIT, INTEGRATORS, Motion, centre, masses, rayleigh, relax
 from springtune.materials import Material
 from springtune.mesh import MESH_TYPES, Mesh, lattice
+from springtune.moduli import ends
 from springtune.network import Network
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import uniform
@@ -288,7 +290,7 @@ def test_single_precision_keeps_six_digits():
 
 
 @pytest.mark.parametrize("integrator", EXPLICIT)
-def test_explicit_runs_factorise_nothing(integrator, monkeypatch):
+def test_explicit_steps_factorise_nothing(integrator, monkeypatch):
     def refuse(*arguments, **options):
         raise AssertionError("factorised")
 
@@ -296,7 +298,124 @@ def test_explicit_runs_factorise_nothing(integrator, monkeypatch):
     monkeypatch.setattr(factors.Analysis, "factorise", refuse)
     motion = beam()
     assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200).status == "moving"
+    assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200, rest=1e-9).status == "moving"
+    assert relax(motion.network, motion.load, max_steps=200).status == "moving"
+
+
+def test_an_explicit_run_to_rest_factorises_once(monkeypatch):
+    motion, taken = beam(), []
+    factorize = Network.factorize
+    monkeypatch.setattr(Network, "factorize", lambda *given: taken.append(given) or factorize(*given))
     assert relax(motion.network, motion.load).status == "rest"
+    assert len(taken) == 1
+    found = motion.critical()
+    taken.clear()
+    step = 0.8 * motion.step_limit("central-difference")
+    assert found.run("central-difference", step, 100_000, rest=1e-6).status == "rest"
+    assert len(taken) == 1
+
+
+# -- where a run comes to rest -----------------------------------------------------------------------------------------
+
+
+def column(share, sideways=0.0, linear=False):
+    """A column of squares with both diagonals, so alike on both sides that it stays straight; its buckling load.
+
+    Pressed by a share of that load, and pushed sideways by a share of the pressing force.
+    """
+    mesh = MESH_TYPES["braced"](0.1, 0.01, 5e-3)
+    springs = DEFINITIONS["lattice"].springs(mesh, STEEL, THICKNESS)
+    network = Network(mesh, held(mesh, "axial"), springs.relative)
+    euler = np.pi**2 * STEEL.young_modulus * THICKNESS * 0.01**3 / 12 / (4 * 0.1**2)
+    along, across = weights(mesh, "axial"), weights(mesh, "bending")
+    critical = buckling_load(StaticProblem(network, along), -euler / springs.reference)
+    load = share * critical * (along + sideways * across)
+    return Motion(network, masses(mesh, DENSITY, THICKNESS) / springs.reference, load, linear=linear)
+
+
+def to_rest(motion, way):
+    """Brought to rest by relaxation or an integrator."""
+    if way == "relax":
+        return relax(motion.network, motion.load, linear=motion.linear)
+    motion = motion.critical()
+    step = 0.8 * motion.step_limit("symplectic-euler") if way in EXPLICIT else 0.1 / motion.loaded_frequency
+    return motion.run(way, step, 20_000, rest=1e-4)
+
+
+@pytest.mark.parametrize("way", ["relax", *INTEGRATORS])
+@pytest.mark.parametrize("share", [0.8, 1.3, 2.0])
+def test_rest_on_an_unstable_equilibrium_is_told(share, way):
+    """Above its buckling load a straight column is in balance, and nothing but noise would move it."""
+    found = to_rest(column(share), way)
+    assert np.abs(found.displacements[:, 1]).max() < 1e-4  # straight but for Poisson's effect
+    if share < 1:
+        assert (found.status, found.message) == ("rest", "")
+    else:
+        assert found.status == "unstable"
+        assert "1 negative pivot" in found.message and "sideways" in found.message
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_the_buckling_load_divides_rest_from_unstable(share):
+    assert to_rest(column(share), "relax").status == ("rest" if share < 1 else "unstable")
+
+
+@pytest.mark.parametrize("way", ["relax", *INTEGRATORS])
+def test_linear_kinematics_never_buckle(way):
+    found = to_rest(column(2.0, linear=True), way)
+    assert (found.status, found.message) == ("rest", "")
+
+
+def test_large_steps_of_backward_euler_stay_on_an_unstable_equilibrium():
+    """A mode that grows as exp(r t) grows in steps h below 2 / r only: its factor is 1 / (1 - r h)."""
+    motion = column(1.3, sideways=1e-3)
+    found = motion.run("backward-euler", 1e-2, 1000, rest=1e-6)
+    assert found.status == "unstable" and "smaller steps" in found.message
+
+
+@pytest.mark.parametrize("way", ["relax", "backward-euler"])
+def test_a_column_pushed_sideways_rests_bent(way):
+    """The remedy of the message: it then finds the bent equilibrium, which is stable."""
+    motion = column(1.3, sideways=1e-3)
+    if way == "relax":
+        found = relax(motion.network, motion.load)
+    else:
+        found = motion.run(way, 1e-4, 20_000, rest=1e-6)
+    assert (found.status, found.message) == ("rest", "")
+    assert np.abs(found.displacements[:, 1]).max() > 0.02
+    assert motion.network.factorize(found.displacements).negative_pivots == 0
+
+
+def test_an_arch_that_snaps_through_rests_behind():
+    """Pushed beyond its limit load, a shallow arch jumps to the far side, where it is stable."""
+    flat = MESH_TYPES["braced"](0.1, 4e-3, 2e-3)
+    points = flat.points.copy()
+    points[:, 1] += 4e-3 * np.sin(np.pi * points[:, 0] / 0.1)
+    mesh = Mesh(points, flat.triangles, flat.quads)
+    springs = DEFINITIONS["lattice"].springs(flat, STEEL, THICKNESS)
+    directions = np.zeros(points.shape, dtype=bool)
+    directions[np.isin(flat.points[:, 0], [0.0, 0.1])] = True
+    network = Network(mesh, directions, springs.relative)
+    middle = np.argmin(np.hypot(flat.points[:, 0] - 0.05, flat.points[:, 1] - 4e-3))
+    load = np.zeros(points.shape)
+    load[middle, 1] = -1e-4
+    found = relax(network, load)
+    assert (found.status, found.message) == ("rest", "")
+    assert found.displacements[middle, 1] < -6e-3
+
+
+def test_a_body_that_floats_is_not_judged():
+    """Its rigid motions cost nothing: pivots are zero but for rounding, and say nothing."""
+    mesh = lattice(6, 4)
+    network = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), uniform(mesh))
+    pull = np.zeros(mesh.points.shape)
+    for particles, sign in zip(ends(mesh), (-1, 1)):
+        pull[particles, 0] = sign * 1e-3 / len(particles)
+    pull -= pull.mean(axis=0)
+    found = Motion(network, np.ones(len(mesh.points)), pull, mass_damping=0.5).run(
+        "central-difference", 0.3, 20_000, rest=1e-6
+    )
+    assert found.status == "rest" and "free to move as a whole" in found.message
 
 
 def test_a_run_records_the_bound_of_its_step():
