@@ -176,6 +176,16 @@ class Motion:
             return None
         return Network(self.network.mesh, self.network.held, self.dampers, like=self.network).tangent()
 
+    def damper_tangent(self, displacements):
+        """Derivative of the dampers' forces by the velocities [s], the springs turned by displacements [m]; or None."""
+        if self.dampers is None or self.linear:
+            return self.damper_matrix
+        along = self.network.rest_vectors + self.network.stretch(displacements)
+        along = along / np.linalg.norm(along, axis=1)[:, None]
+        apart = np.concatenate([along, -along], axis=1)
+        matrices = self.dampers[:, None, None] * apart[:, :, None] * apart[:, None, :]
+        return self.network.stiffness_of(self.network.mesh.edges, matrices)
+
     @cached_property
     def particle_bound(self):
         """Bound of the highest frequency from each particle's springs alone [rad/s]: above `omega_max`, never below.
@@ -513,15 +523,17 @@ class _BackwardEuler(_Stepper):
         for _ in range(steps):
             if self.solve is None or not motion.linear:
                 self.stiffness = motion.stiffness_matrix if motion.linear else network.tangent(self.u)
-                extra = motion.damper_matrix
+                self.damping = motion.damper_tangent(self.u)
                 mass = diags_array(motion.mass * (1 + h * motion.mass_damping))
-                matrix = mass + h * (h + self.beta) * self.stiffness + (0 if extra is None else h * extra)
+                matrix = mass + h * (h + self.beta) * self.stiffness
+                if self.damping is not None:
+                    matrix = matrix + h * self.damping
                 self.solve = self._solver(csc_array(matrix))
             v = network.reduce(self.v)
             right = motion.missing(self.u) - (h + self.beta) * (self.stiffness @ v)
             right -= motion.mass_damping * motion.mass * v
-            if motion.dampers is not None:
-                right -= motion.damper_matrix @ v
+            if self.damping is not None:
+                right -= self.damping @ v
             v = v + self.solve(h * right)
             self.v = network.expand(v)
             self.u = self.u + h * self.v
@@ -562,8 +574,10 @@ class _Midpoint(_Stepper):
                     return
                 if self.factor is None or (size > 0.1 * last and not fresh):
                     stiffness = motion.stiffness_matrix if motion.linear else network.tangent(at)
-                    extra = 0 if motion.dampers is None else motion.damper_matrix
-                    self.factor = factorised(csc_array(diags_array(inertia + damping) + extra + 0.5 * h * stiffness))
+                    matrix = diags_array(inertia + damping) + 0.5 * h * stiffness
+                    if motion.dampers is not None:
+                        matrix = matrix + motion.damper_tangent(at)
+                    self.factor = factorised(csc_array(matrix))
                     fresh = True
                 elif size >= last:
                     if size <= 1e-9 * scale:  # rounding

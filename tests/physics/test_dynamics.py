@@ -124,7 +124,7 @@ def test_the_bound_by_particles_is_above_the_highest_frequency(definition, mesh_
     assert motion.omega_max <= motion.particle_bound <= 2 * motion.omega_max
 
 
-@pytest.mark.parametrize("xi, expected", [(0.05, 0.951), (0.3, 0.744), (1.0, 0.414)])
+@pytest.mark.parametrize("xi, expected", [(0.05, 0.951), (0.2, 0.820), (0.3, 0.744), (1.0, 0.414)])
 def test_limit_of_one_mode_with_lagged_damping(xi, expected):
     """Numbers of formulas.md; and dampers along springs, by the general way, agree with the formula."""
     lagged = oscillator(mass_damping=2 * xi).step_limit("central-difference-lagged")
@@ -137,7 +137,9 @@ def test_limit_of_one_mode_with_lagged_damping(xi, expected):
 DAMPINGS = {
     "none": lambda motion: {},
     "mass": lambda motion: {"mass_damping": 0.6 * motion.omega_max},
+    "mass, ratio 0.2": lambda motion: {"mass_damping": 0.4 * motion.omega_max},
     "springs": lambda motion: {"dampers": 0.3 / motion.omega_max * motion.network.stiffness},
+    "springs, ratio 0.2": lambda motion: {"dampers": 0.4 / motion.omega_max * motion.network.stiffness},
     "uneven": lambda motion: {
         "mass_damping": 0.1 * motion.omega_max,
         "dampers": 0.5 / motion.omega_max * np.random.default_rng(1).uniform(0, 1, len(motion.network.first)),
@@ -161,6 +163,17 @@ def test_limit_of_the_step_is_within_one_percent(integrator, damping, linear):
     assert grown
     if linear:
         assert growing.status == "diverged" and "take at most" in growing.message
+
+
+@pytest.mark.parametrize("integrator", EXPLICIT)
+@pytest.mark.parametrize("damper", ["mass", "springs"])
+def test_limit_at_a_fifth_of_critical_damping_is_the_closed_form(integrator, damper):
+    """The highest mode sets it: ``(2 / omega) (sqrt(1 + xi^2) - xi)`` where damping lags, ``2 / omega`` where not."""
+    motion = beam(force=0.0)
+    damped = with_(motion, **DAMPINGS[f"{damper}, ratio 0.2"](motion))
+    lags = damper == "springs" or integrator != "central-difference"
+    expected = 2 / motion.omega_max * (np.sqrt(1 + 0.2**2) - 0.2 if lags else 1.0)
+    assert damped.step_limit(integrator) == pytest.approx(expected, rel=1e-6)
 
 
 def test_limit_of_a_network_with_energies_besides_springs():
@@ -227,6 +240,93 @@ def test_order_of_convergence(integrator, order, linear):
     exact = motion.run("implicit-midpoint", time / 8192, 8192, start).displacements
     errors = [np.abs(motion.run(integrator, time / n, n, start).displacements - exact).max() for n in (512, 1024)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+DAMPED = {
+    "mass": lambda ratio, low, high: (2 * ratio * low, 0.0),
+    "springs": lambda ratio, low, high: (0.0, 2 * ratio / low),
+    "both": lambda ratio, low, high: rayleigh((ratio, ratio), (low, high)),
+}
+"""Damping over mass and over stiffness that gives the lower of two modes a ratio."""
+
+ORDERS = {
+    "symplectic-euler": 1,
+    "central-difference-lagged": 1,
+    "central-difference": 2,
+    "backward-euler": 1,
+    "implicit-midpoint": 2,
+}
+
+
+def modes(motion):
+    """Angular frequencies [rad/s], ascending, and shapes of unit inertia, in columns."""
+    root = 1 / np.sqrt(motion.mass)
+    squares, shapes = np.linalg.eigh(motion.stiffness_matrix.toarray() * np.outer(root, root))
+    return np.sqrt(squares), shapes * root[:, None]
+
+
+@pytest.mark.parametrize("linear", [True, False])
+@pytest.mark.parametrize("damping, number", [("mass", 0), ("springs", 0), ("both", 0), ("both", 3)])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_free_decay_of_a_mode(integrator, damping, number, linear):
+    """A mode let go at a damping ratio of 0.2, after one period 2 pi / (omega sqrt(1 - xi^2)).
+
+    It is then smaller by the logarithmic decrement 2 pi xi / sqrt(1 - xi^2), and stands still; both are missed by no
+    more than the scheme's order allows. Dampers along springs lag in all explicit schemes, which makes them first order.
+    """
+    xi = 0.2
+    motion = beam(size=0.01, length=0.04, force=0.0, linear=linear)
+    omegas, shapes = modes(motion)
+    alpha, beta = DAMPED[damping](xi, omegas[0], omegas[3])
+    motion = with_(motion, load=None, mass_damping=alpha, dampers=beta * motion.network.stiffness if beta else None)
+    omega, shape = omegas[number], shapes[:, number]
+    start = motion.network.expand(1e-7 * shape / np.abs(shape).max())
+    period = 2 * np.pi / (omega * np.sqrt(1 - xi**2))
+
+    def missed(steps):
+        found = motion.run(integrator, period / steps, steps, start)
+        before, after, speed = (
+            (motion.mass * shape) @ motion.network.reduce(field)
+            for field in (start, found.displacements, found.velocities)
+        )
+        decrement = np.log(before / after) - 2 * np.pi * xi / np.sqrt(1 - xi**2)
+        return np.abs([decrement, speed / (omega * after)])
+
+    # Explicit steps are short enough for the highest mode, which dampers along springs narrow most.
+    coarse = 2048 if integrator in EXPLICIT else 128
+    errors = np.array([missed(coarse), missed(2 * coarse)])
+    order = 1 if damping != "mass" and integrator in EXPLICIT else ORDERS[integrator]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx([order, order], abs=0.1)
+    assert (errors[1] <= {1: 30, 2: 60}[order] / (2 * coarse) ** order).all()
+
+
+def test_stiffness_damping_of_backward_euler_is_that_of_dampers():
+    """Rayleigh's beta and a damper of beta times the stiffness on each spring are the same matrix."""
+    motion = beam(size=0.01, length=0.04)
+    beta = 0.4 / modes(motion)[0][0]
+    for linear in (True, False):
+        moving = with_(motion, linear=linear, load=1e-6 * motion.load)
+        ours = moving.run("backward-euler", 1e-5, 50, stiffness_damping=beta).displacements
+        springs = with_(moving, dampers=beta * motion.network.stiffness).run("backward-euler", 1e-5, 50).displacements
+        assert np.abs(ours - springs).max() <= 1e-5 * np.abs(ours).max()
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_dampers_turn_with_their_springs(integrator):
+    """A body that spins by a radian is not slowed by dampers along its springs; schemes agree to their order."""
+    mesh = lattice(3, 2)
+    network = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), uniform(mesh))
+    motion = Motion(network, np.ones(len(mesh.points)), dampers=2.0 * uniform(mesh))
+    radius = mesh.points - mesh.points.mean(axis=0)
+    velocities = 0.05 * radius[:, ::-1] * [-1, 1]
+    exact = motion.run("implicit-midpoint", 20 / 1024, 1024, velocities=velocities).displacements
+    errors = []
+    for steps in (200, 400):
+        found = motion.run(integrator, 20 / steps, steps, velocities=velocities)
+        errors.append(np.abs(found.displacements - exact).max())
+    order = 2 if integrator == "implicit-midpoint" else 1
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+    assert errors[1] <= 0.05 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("integrator", ["symplectic-euler", "central-difference", "implicit-midpoint"])
