@@ -272,7 +272,7 @@ def test_free_decay_of_a_mode(integrator, damping, number, linear):
     """A mode let go at a damping ratio of 0.2, after one period 2 pi / (omega sqrt(1 - xi^2)).
 
     It is then smaller by the logarithmic decrement 2 pi xi / sqrt(1 - xi^2), and stands still; both are missed by no
-    more than the scheme's order allows. Dampers along springs lag in all explicit schemes, which makes them first order.
+    more than the scheme's order allows. Dampers along springs lag in all explicit schemes: these are then first order.
     """
     xi = 0.2
     motion = beam(size=0.01, length=0.04, force=0.0, linear=linear)
@@ -319,7 +319,7 @@ def test_dampers_turn_with_their_springs(integrator):
     motion = Motion(network, np.ones(len(mesh.points)), dampers=2.0 * uniform(mesh))
     radius = mesh.points - mesh.points.mean(axis=0)
     velocities = 0.05 * radius[:, ::-1] * [-1, 1]
-    exact = motion.run("implicit-midpoint", 20 / 1024, 1024, velocities=velocities).displacements
+    exact = motion.run("implicit-midpoint", 20 / 2048, 2048, velocities=velocities).displacements
     errors = []
     for steps in (200, 400):
         found = motion.run(integrator, 20 / steps, steps, velocities=velocities)
