@@ -6,44 +6,16 @@
         ->|    sheet           |->
           o------o------o------o          both given on the whole outline, as for even shear: G
 
-Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1].
+Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1]. They are those of the
+mesh that is given: rows of triangles fitted to a box are stretched, and their moduli differ from the exact lattice's
+(`springtune.mesh.lattice`) by a few percent.
 """
 
 from functools import cached_property
 
 import numpy as np
 
-from .mesh import ISOSCELES, ROW_HEIGHT, lattice, row_height
 from .network import Network
-
-
-def patch_mesh(made, mesh_type, length, height, size):
-    """Mesh of a patch test.
-
-    Rows of triangles come as the exact lattice, not stretched to the box and with staggered ends; what they are fitted
-    for is another matter.
-
-    Parameters
-    ----------
-    made : callable
-        Makes the mesh of a box from length, height and size.
-    mesh_type : str
-        Key of `springtune.mesh.MESH_TYPES`, or the name of a mesh from files.
-    length, height : float
-        Extent of the box [m].
-    size : float
-        Length of an edge [m].
-
-    Returns
-    -------
-    Mesh
-    """
-    heights = {"structured": ROW_HEIGHT * size}
-    heights |= {name: row_height(size, nu) for name, nu in ISOSCELES.items()}
-    if mesh_type not in heights:
-        return made(length, height, size)
-    cells, rows = max(1, round(length / size)), max(1, round(height / heights[mesh_type]))
-    return lattice(cells, rows, size, heights[mesh_type])
 
 
 def ends(mesh):

@@ -238,6 +238,8 @@ def _sensitivity(study, folder, displacements, axes):
 
 def _moduli(study, folder, axes):
     moduli = _Filler(dataset.empty(axes, dataset.MODULI_VARIABLES))
+    box = {"patch_length": study.patch.length, "patch_height": study.patch.height}
+    moduli.data.attrs = {"comment": "of the mesh that a beam of this length and height [m] gets"} | box
     patches = defaultdict(dict)
     for one in study.moduli:
         patches[tasks.patch_name(one)][tasks.moduli_key(study, one)] = one

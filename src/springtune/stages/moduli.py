@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from ..materials import Material
-from ..moduli import PatchTest, patch_mesh
+from ..moduli import PatchTest
 from ..springs import DEFINITIONS, DefinitionError
 from ..springs.identification import patch_cases
 from . import files, store
@@ -19,8 +19,8 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder`` and ``patches``, each with ``name``, ``mesh_type``, ``mesh_size``, ``mesh`` (what the
-        stage `mesh` takes) and ``asked``, each of these with ``key, definition, poisson_ratio``.
+        JSON file: ``folder`` and ``patches``, each with ``name``, ``mesh`` (what the stage `mesh` takes) and ``asked``,
+        each of these with ``key, definition, poisson_ratio``.
     done : str or Path
         JSON file to write: what the work was.
     """
@@ -31,9 +31,7 @@ def run(tasks, done):
         missing = [asked for asked in patch["asked"] if asked["key"] not in present]
         if not missing:
             continue
-        source = patch["mesh"]
-        box = source["length"], source["height"]
-        mesh = patch_mesh(lambda *_: make(source), patch["mesh_type"], *box, patch["mesh_size"])  # noqa: B023
+        mesh = make(patch["mesh"])
         measure = _Measure(mesh)
         results = {}
         for asked in missing:

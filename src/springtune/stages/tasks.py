@@ -230,7 +230,7 @@ def scene_key(study, scene):
 def moduli_key(study, one):
     """Key of the effective moduli of a definition on a patch."""
     mesh = patch_mesh(study, one)
-    parameters = [_mesh_source(mesh), one.mesh_type, one.mesh_size, one.definition, one.poisson_ratio]
+    parameters = [_mesh_source(mesh), one.definition, one.poisson_ratio]
     code = _stage_key("moduli", "numpy", "scipy", "cvxopt", "netgen-mesher"), definition_digest(one.definition)
     return files.key(parameters, *code)
 
@@ -382,9 +382,8 @@ def _patches(study):
     """What is asked of each patch, by its name."""
     patches = {}
     for one in study.moduli:
-        labels = {"name": patch_name(one), "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
-        source = {"mesh": _mesh_source(patch_mesh(study, one))}
-        patch = patches.setdefault(patch_name(one), labels | source | {"asked": []})
+        source = {"name": patch_name(one), "mesh": _mesh_source(patch_mesh(study, one))}
+        patch = patches.setdefault(patch_name(one), source | {"asked": []})
         asked = {"key": moduli_key(study, one), "definition": one.definition, "poisson_ratio": one.poisson_ratio}
         patch["asked"].append(asked)
     return patches

@@ -160,7 +160,7 @@ class MeshFileConfig(Section):
 class PatchConfig(Section):
     """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
 
-    Rows of triangles come as the exact lattice there, with staggered ends, not stretched to the box.
+    They are those of the mesh that a beam of this extent gets: give the extent of the beam that they stand beside.
     """
 
     length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
