@@ -10,13 +10,14 @@ import resource
 import statistics
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from . import factors
 from .boundary import held, weights
 from .calculix import installed
+from .compare import assured, unbeaten
 from .dynamics import Motion, masses
 from .geometry import Beam
 from .loads import LOADS
@@ -77,7 +78,7 @@ class _Clock:
         self.seconds[part] += time.perf_counter() - begin
 
 
-def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0):
+def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0, second_beam=None):
     """All methods on all sizes, from coarse to fine, as long as a run is not expected to take too long.
 
     Parameters
@@ -93,6 +94,8 @@ def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0):
         Methods that may take more,
     most_thorough : float, optional
         so many seconds.
+    second_beam : Beam, optional
+        Another beam, on which each case that was raced is solved once more, for its error alone.
 
     Returns
     -------
@@ -136,7 +139,22 @@ def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0):
                 values[i, j] = found[name]
     result |= arrays | {"status": status, "message": message}
     result["error"] = (arrays["displacement"] - reference.displacement) / abs(reference.displacement)
+    result["second_error"] = _second(scene, second_beam, methods, sizes, status == 1)
+    result["assured_error"] = assured(result["error"], result["second_error"])
     return result | _rates(result, sizes)
+
+
+def _second(scene, beam, methods, sizes, raced):
+    """Errors on another beam of the cases that were raced [1]; NaN without one."""
+    errors = np.full(raced.shape, np.nan)
+    if beam is None:
+        return errors
+    scene, meshes = replace(scene, beam=beam), {}
+    reference = solve_small_strain(beam, scene.material, scene.force, kind=scene.kind).displacement
+    for i, j in np.argwhere(raced):
+        found = _in_process(scene, methods[i], sizes[j], meshes, once=True)
+        errors[i, j] = found.get("displacement", np.nan) / reference - 1
+    return errors * np.sign(reference)
 
 
 def _growth(seconds, sizes):
@@ -148,7 +166,7 @@ def _growth(seconds, sizes):
     return particles ** float(np.clip(exponent, 1.0, 2.0))
 
 
-def _in_process(scene, method, size, meshes):
+def _in_process(scene, method, size, meshes, once=False):
     """Result of a case from a process of its own; the mesh of a definition is made before, and its time counted."""
     mesh, meshing = None, 0.0
     if method not in METHODS:
@@ -161,7 +179,7 @@ def _in_process(scene, method, size, meshes):
         mesh, meshing = meshes[mesh_type, size]
     context = multiprocessing.get_context("fork")
     receive, send = context.Pipe(duplex=False)
-    process = context.Process(target=_repeat, args=(send, scene, method, size, mesh, meshing))
+    process = context.Process(target=_repeat, args=(send, scene, method, size, mesh, meshing, once))
     process.start()
     send.close()
     try:
@@ -172,7 +190,7 @@ def _in_process(scene, method, size, meshes):
         process.join()
 
 
-def _repeat(send, scene, method, size, mesh, meshing):
+def _repeat(send, scene, method, size, mesh, meshing, once):
     base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     seconds, parts = [], []
     try:
@@ -185,7 +203,7 @@ def _repeat(send, scene, method, size, mesh, meshing):
             seconds.append(time.perf_counter() - begin + meshing)
             parts.append(clock.seconds | ({"meshing": meshing} if mesh is not None else {}))
             # The first run is cold, which a long one does not feel.
-            wanted = 1 if seconds[0] > LONG else 1 + REPETITIONS * (2 if seconds[-1] < BRIEF else 1)
+            wanted = 1 if once or seconds[0] > LONG else 1 + REPETITIONS * (2 if seconds[-1] < BRIEF else 1)
             if len(seconds) >= wanted:
                 break
     except DefinitionError as error:
@@ -215,11 +233,7 @@ def _rates(result, sizes):
         if large.sum() >= 2 and np.ptp(result["unknowns"][i][large]) > 0:
             logs = np.log(result["unknowns"][i][large]), np.log(result["seconds"][i][large])
             exponents[i] = np.polyfit(*logs, 1)[0]
-    errors, seconds = np.abs(result["error"]), result["seconds"]
-    best = np.zeros(errors.shape, dtype=np.int8)
-    for place in np.argwhere(np.isfinite(errors)):
-        i, j = place
-        best[i, j] = not ((errors < errors[i, j]) & (seconds <= seconds[i, j])).any()
+    best = unbeaten(np.abs(result["error"]), result["seconds"]).astype(np.int8)
     return {"error_rate": rates, "cost_exponent": exponents, "pareto": best}
 
 

@@ -58,3 +58,36 @@ def best_stiffness(stiffness, displacement, reference):
     if values[0] * values[1] >= 0:  # an end is a root but for rounding
         return float(1.0 / ends[np.argmin(np.abs(values))])
     return float(1.0 / brentq(curve, *ends, xtol=1e-15 * ends[0], rtol=1e-14))
+
+
+def assured(errors, second):
+    """Largest error of each mesh size and all finer ones that were run, on both beams [1].
+
+    An error that happens to cross zero at one mesh size, or on one beam, promises nothing: what is finer, or another
+    beam, shows it. Nothing does for the finest one.
+
+    Parameters
+    ----------
+    errors, second : ndarray of float, shape (n_methods, n_sizes)
+        Errors on the beam and on the second one, from the finest mesh size to the coarsest [1].
+
+    Returns
+    -------
+    ndarray of float, shape (n_methods, n_sizes)
+        NaN for the finest size that was run, and from where a finer one failed or has no second beam.
+    """
+    errors, second = np.abs(errors), np.abs(second)
+    found = np.full(errors.shape, np.nan)
+    for i, run_on in enumerate(np.isfinite(errors)):
+        for j in np.flatnonzero(run_on)[1:]:
+            finest = int(np.argmax(run_on))
+            found[i, j] = np.maximum(errors[i, finest : j + 1], second[i, finest : j + 1]).max()
+    return found
+
+
+def unbeaten(errors, seconds):
+    """Whether no other case has a smaller error in no more time; not where an error is NaN."""
+    best = np.zeros(errors.shape, dtype=bool)
+    for place in map(tuple, np.argwhere(np.isfinite(errors))):
+        best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
+    return best

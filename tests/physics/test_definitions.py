@@ -1,7 +1,5 @@
 """Each definition against the moduli that it must have: closed forms where there are any, else measured tables."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

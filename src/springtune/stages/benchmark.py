@@ -34,9 +34,9 @@ def run(tasks, done):
 
 def _race(task):
     scene = benchmark.Scene(Beam(**task["beam"]), Material(**task["material"]), task["load"], task["force"])
-    found = benchmark.run(
-        scene, task["methods"], task["mesh_sizes"], task["most_seconds"], task["thorough"], task["most_thorough"]
-    )
+    second = Beam(**task["second_beam"]) if task["second_beam"] else None
+    limits = task["most_seconds"], task["thorough"], task["most_thorough"]
+    found = benchmark.run(scene, task["methods"], task["mesh_sizes"], *limits, second)
     if task["curves"]:
         size = max(CURVE_SIZE, min(task["mesh_sizes"]))
         found |= benchmark.curves(scene, size) | benchmark.explicit(scene, size)

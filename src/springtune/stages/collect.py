@@ -83,6 +83,8 @@ def run(config, folder, output):
             "material_density": np.nan if material.density is None else material.density,
         }
         root.put(values, material=material.name)
+    for beam in {scene.mesh.beam for scene in study.scenes}:
+        root.put({"beam_length": beam.length, "beam_height": beam.height}, beam=beam.name)
     _printed(study, root)
     data = root.data
     data["deformation_error"].values = deformation_error(
@@ -374,6 +376,7 @@ def _benchmark(study, folder, axes):
     """Errors and seconds of the scenes of the benchmark."""
     data = dataset.empty(axes, dataset.BENCHMARK_VARIABLES)
     for race in study.benchmark:
+        data.attrs["second_beam"] = race.second_beam.name if race.second_beam else ""
         key = tasks.race_key(race)
         result = store.read(folder / "benchmark" / f"{key}.h5", [key], dataset.BENCHMARK_VARIABLES)[key]
         place = {"scene": race.name, "mesh_size": list(race.mesh_sizes)}

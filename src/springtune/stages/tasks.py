@@ -364,6 +364,7 @@ def _experiment(one):
 def race_key(race):
     """Key of a scene of the benchmark."""
     parameters = asdict(race) | {"beam": _beam(race.beam), "material": asdict(race.material) | {"name": ""}}
+    parameters["second_beam"] = race.second_beam and _beam(race.second_beam)
     code = _stage_key("benchmark", "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "netgen-mesher", "pyamg")
     definitions = sorted({method.partition("/")[0] for method in race.methods if "/" in method})
     return files.key(parameters, code, [definition_digest(name) for name in definitions])

@@ -202,6 +202,8 @@ class Race:
     most_seconds, most_thorough : float
         Seconds that a run may take: of most methods, and of those below.
     thorough : tuple of str
+    second_beam : Beam or None
+        Beam on which errors are checked.
     """
 
     name: str
@@ -214,6 +216,7 @@ class Race:
     most_seconds: float
     most_thorough: float
     thorough: tuple
+    second_beam: Beam | None
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,15 @@ def _check_density(config, name, path, problems):
 def _check_benchmark(config, known, problems):
     """Names and numbers of the benchmark."""
     asked = config.benchmark
+    if asked.second_beam:
+        known(("benchmark", "second_beam"), "beam", asked.second_beam, config.beams)
+    for beam in dict.fromkeys([*(scene.beam for scene in asked.scenes.values()), asked.second_beam]):
+        if beam in config.beams:
+            side = min(config.beams[beam].length, config.beams[beam].height)
+            if max(asked.mesh_size) > side / 2:
+                large = f"{1e3 * max(asked.mesh_size):g} mm"
+                message = f"{large} is too large for '{beam}'; give at most {500 * side:g} mm"
+                problems.add(("benchmark", "mesh_size"), message)
     for name, scene in asked.scenes.items():
         place = ("benchmark", "scenes", name)
         known((*place, "beam"), "beam", scene.beam, config.beams)
@@ -100,12 +109,6 @@ def _check_benchmark(config, known, problems):
         _check_density(config, scene.material, (*place, "material"), problems)
         if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
             problems.add((*place, "load"), f"'{scene.load}' is not raced; choose traction, bending or pressure")
-        if scene.beam in config.beams:
-            side = min(config.beams[scene.beam].length, config.beams[scene.beam].height)
-            if max(asked.mesh_size) > side / 2:
-                large = f"{1e3 * max(asked.mesh_size):g} mm"
-                message = f"{large} is too large for '{scene.beam}'; give at most {500 * side:g} mm"
-                problems.add(("benchmark", "mesh_size"), message)
     for name in asked.definition:
         if DEFINITIONS[name].needs:
             able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)

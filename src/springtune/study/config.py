@@ -238,6 +238,11 @@ class BenchmarkConfig(Section):
     """Run time against error: every definition on every mesh type, and other methods; one method at a time."""
 
     scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
+    second_beam: BeamName | None = Field(
+        None,
+        description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
+        "it keeps that on both. None is called the quickest without.",
+    )
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness and need no reference."
     )

@@ -204,15 +204,20 @@ def _benchmark(config, materials):
     """Scenes of the benchmark."""
     asked = config.benchmark
     races = []
+
+    def beam(name):
+        one = config.beams[name]
+        return Beam(name, one.length, one.height, one.thickness)
+
     for name, scene in asked.scenes.items() if asked else ():
-        beam = config.beams[scene.beam]
         races.append(
             Race(
-                name, Beam(scene.beam, beam.length, beam.height, beam.thickness), materials[scene.material],
+                name, beam(scene.beam), materials[scene.material],
                 scene.load, LOADS[scene.load].sign * scene.force,
                 method_names([one for one in DEFINITIONS if one in asked.definition], asked.mesh_type,
                              [one for one in RIVALS if one in asked.method]),
                 tuple(sorted(asked.mesh_size)), asked.most_seconds, asked.most_thorough, tuple(asked.thorough),
+                beam(asked.second_beam) if asked.second_beam else None,
             )
         )  # fmt: skip
     return tuple(races)

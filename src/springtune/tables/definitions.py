@@ -70,35 +70,69 @@ ADVICE = (
 )
 
 
+COARSENESS = (0.05, 0.1, np.inf)
+"""Mesh size over the height of the beam [1] up to which errors are summed up together."""
+
+
 def _advice(root):
-    """What to use, with errors on the finest mesh of the beam that most scenes are of."""
-    beam, kinematics = most_asked(root, "beam"), most_asked(root, "kinematics")
-    materials = _materials(root, beam)
+    """What to use, with the range of its errors over all beams and mesh sizes, by mesh size over height."""
+    kinematics = most_asked(root, "kinematics")
+    materials = _materials(root, most_asked(root, "beam"))
     loads = [load for load in LOADS if load in root["load"].values]
-    here = root.deformation_error.sel(beam=beam, kinematics=kinematics).sel(mesh_size=min(root.mesh_size.values))
+    here = root[["deformation_error", "status"]].sel(kinematics=kinematics)
+    ratios = root.mesh_size.values / root.beam_height.values[:, None]
     heads = [f"{load}, ν = {nu:g}" for load in loads for nu in materials]
-    lines = [f"| what you have | use | {' | '.join(heads)} |", "|---|---|" + "---:|" * len(heads)]
+    rows, seen = [], np.zeros((len(COARSENESS), *ratios.shape), dtype=bool)
     for situation, name, mesh_type in ADVICE:
         if name not in here.definition.values or mesh_type not in here.mesh_type.values:
             continue
-        cell = here.sel(definition=name, mesh_type=mesh_type)
-        values = [cell.sel(load=load, material=material) for load in loads for material in materials.values()]
-        if all(np.isfinite(value) for value in values):
-            lines.append(f"| {situation} | `{name}` | {' | '.join(map(_signed, values))} |")
-    return lines
+        cells = here.sel(definition=name, mesh_type=mesh_type, load=loads, material=list(materials.values()))
+        cells = cells.transpose("load", "material", "beam", "mesh_size")
+        shape = (len(heads), *ratios.shape)
+        errors, flags = (cells[part].values.reshape(shape) for part in ("deformation_error", "status"))
+        low = 0.0
+        for number, high in enumerate(COARSENESS):
+            within = (ratios > low * (1 + 1e-9)) & (ratios <= high * (1 + 1e-9)) & (flags != 0).any(axis=0)
+            low = high
+            if within.any():
+                seen[number] |= within
+                texts = [_range(error[within], flag[within]) for error, flag in zip(errors, flags)]
+                size = f"to {min(high, ratios[within].max()):.3g}"
+                rows.append([situation, f"`{name}`", mesh_type, size, str(within.sum()), *texts])
+    if not rows:
+        return []
+    lines = [f"| what you have | use | mesh type | a/H | meshes | {' | '.join(heads)} |"]
+    lines.append("|---|---|---|---|---:|" + "---:|" * len(heads))
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    meshes = "; ".join(
+        ", ".join(f"{root.beam.values[i]} at {1e3 * root.mesh_size.values[j]:g} mm" for i, j in np.argwhere(group))
+        for group in seen if group.any()
+    )  # fmt: skip
+    return [*lines, "", f"Each line is the range over all meshes of the study up to its a/H: {meshes}."]
+
+
+def _range(errors, flags):
+    """Lowest to highest error of the cells that were asked for, and how many have none."""
+    there = errors[flags == 1]
+    ends = list(dict.fromkeys(_signed(value) for value in (there.min(), there.max()))) if len(there) else []
+    text = " to ".join([*(end.removesuffix(" %") for end in ends[:-1]), *ends[-1:]])
+    missing, asked = int((flags > 1).sum()), int((flags != 0).sum())
+    notes = [f"{missing} not solved"] if missing else []
+    notes += [f"{asked} of {len(flags)}"] if 0 < asked < len(flags) else []
+    return f"{text} ({', '.join(notes)})".strip() if notes else text
 
 
 def decision(tree):
     """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells.
 
-    Every figure is a cell of the dataset, or a median or largest one of cells that the heading names.
+    Every figure is a cell of the dataset, or the range, median or largest one of cells that the table names.
     """
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
     advice = _advice(root)
-    parts = ["### In short", "", *advice, ""] if len(advice) > 2 else []
+    parts = ["### In short", "", *advice, ""] if advice else []
     for mesh_type in MESH_TYPES:
         lines = _attained(root, moduli, mesh_type) if mesh_type in root.mesh_type.values else []
-        if len(lines) > 2:
+        if lines:
             parts += [f"### Mesh type `{mesh_type}`", "", *lines, ""]
     cells = _paper_cells(root)
     return "\n".join(parts + (["### The paper's cells", "", *cells, ""] if cells else []))
@@ -118,29 +152,27 @@ def _materials(root, beam):
 
 
 def _attained(root, moduli, mesh_type):
-    """Moduli on the middle patch and deformation errors on the finest mesh, of the beam that most scenes are of."""
+    """Moduli and deformation errors of one and the same mesh size, the finest, of the beam that most scenes are of."""
     beam = most_asked(root, "beam")
     materials = _materials(root, beam)
     loads = [load for load in LOADS if load in root["load"].values]
-    middle, fine = sorted(root.mesh_size.values)[len(root.mesh_size) // 2], min(root.mesh_size.values)
+    fine, height = min(root.mesh_size.values), float(root.beam_height.sel(beam=beam))
     here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_asked(root, "kinematics"))
     ratios = [ratio for ratio in materials if ratio in moduli.poisson_ratio.values]
     heads = [f"E at {nu:g}" for nu in ratios] + [f"ν at {nu:g}" for nu in ratios]
     heads += [f"{load}, {nu:g}" for load in loads for nu in materials]
-    lines = [f"| definition | {' | '.join(heads)} | cost |", "|---|" + "---:|" * (len(heads) + 1)]
+    rows = []
     for name in root.definition.values:
         if name not in moduli.definition.values or mesh_type not in moduli.mesh_type.values:
             continue
-        patch = moduli.sel(definition=name, mesh_type=mesh_type)
-        patched = patch.mesh_size.values[(patch.status == 1).any("poisson_ratio").values]
-        sizes = here.mesh_size.values[(here.status.sel(definition=name) == 1).any(["material", "load"]).values]
-        if not len(patched) or not len(sizes):
+        patch, scenes = moduli.sel(definition=name, mesh_type=mesh_type), here.sel(definition=name)
+        both = (patch.status == 1).any("poisson_ratio") & (scenes.status == 1).any(["material", "load"])
+        if not both.any():
             continue
-        patch = patch.sel(mesh_size=middle if middle in patched else max(patched))
+        size = float(both.mesh_size[both.values].min())
+        patch, scene = patch.sel(mesh_size=size), scenes.sel(mesh_size=size)
         cells = [_signed(patch.young_modulus_error.sel(poisson_ratio=nu)) for nu in ratios]
         cells += [_plain(patch.effective_poisson_ratio.sel(poisson_ratio=nu), 3) for nu in ratios]
-        size = fine if fine in sizes else max(sizes)
-        scene = here.sel(definition=name, mesh_size=size)
         cells += [
             _signed(scene.deformation_error.sel(load=load, material=material))
             for load in loads
@@ -149,8 +181,16 @@ def _attained(root, moduli, mesh_type):
         seconds = float(scene.definition_seconds.max())
         cells.append(f"{1e3 * seconds:.0f} ms" if seconds >= 5e-4 else "< 1 ms")
         mark = "" if size == fine else f" ({1e3 * size:g} mm)"
-        lines.append(f"| `{name}`{mark} | {' | '.join(cells)} |")
-    return lines
+        rows.append(f"| `{name}`{mark} | {' | '.join(cells)} |")
+    if not rows:
+        return []
+    box = [1e3 * moduli.attrs[f"patch_{part}"] for part in ("length", "height")]
+    same = np.allclose(box, [1e3 * float(root[f"beam_{part}"].sel(beam=beam)) for part in ("length", "height")])
+    extent = f"{box[0]:g} x {box[1]:g} mm"
+    of = f"beam of {extent}" if same else f"beam {beam}; moduli are of the meshes of a {extent} sheet"
+    note = f"All at {1e3 * fine:g} mm (a/H = {fine / height:.3g}), but where a row says otherwise; {of}."
+    head = [f"| definition | {' | '.join(heads)} | cost |", "|---|" + "---:|" * (len(heads) + 1)]
+    return [note, "", *head, *rows]
 
 
 def _paper_cells(root):

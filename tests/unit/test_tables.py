@@ -1,0 +1,188 @@
+"""Pages made from datasets: what they print, and that nothing of one mesh stands there as if it were of all."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from springtune import dataset
+from springtune.compare import assured
+from springtune.tables import benchmark, definitions
+
+
+def cells(line):
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def tables(text):
+    """Rows of every table of a page, by the heading above it: a list of dicts each."""
+    found, heading, heads = {}, "", None
+    for line in text.splitlines():
+        if line.startswith("#"):
+            heading, heads = line.strip("# "), None
+        elif line.startswith("|") and heads is None:
+            heads = cells(line)
+            found.setdefault(heading, [])
+        elif line.startswith("|") and not line.startswith(("|-", "| -")):
+            found[heading].append(dict(zip(heads, cells(line))))
+    return found
+
+
+# -- which definition --------------------------------------------------------------------------------------------------
+
+SIZES = (1e-3, 2e-3, 5e-3)
+BEAMS = {"100x20": 0.02, "200x40": 0.04}
+
+
+def compared():
+    """Dataset of `area` on the free mesh, whose error is a tenth of a/H, on two beams, and moduli that tell sizes."""
+    axes = {
+        "beam": tuple(BEAMS), "mesh_type": ("structured", "free"), "mesh_size": SIZES, "material": ("steel", "nu-0.5"),
+        "load": ("traction", "bending", "shear"), "definition": ("area", "adjoint"), "kinematics": ("linear",),
+        "poisson_ratio": (0.3, 0.5),
+    }  # fmt: skip
+    root = dataset.empty(axes, dataset.ROOT_VARIABLES)
+    root["material_poisson_ratio"].values[:] = 0.3, 0.5
+    root["beam_height"].values[:] = tuple(BEAMS.values())
+    root["beam_length"].values[:] = 0.1, 0.2
+    for beam, height in BEAMS.items():
+        for size in SIZES:
+            place = {"beam": beam, "mesh_type": "free", "mesh_size": size, "definition": "area"}
+            root["deformation_error"].loc[place] = 0.1 * size / height * (-1 if beam == "200x40" else 1)
+            root["status"].loc[place] = 1
+    place = {"beam": "100x20", "mesh_type": "free", "mesh_size": 5e-3, "definition": "adjoint"}
+    root["deformation_error"].loc[place], root["status"].loc[place] = 0.5, 1
+    # More scenes of the first beam, so that its tables are printed.
+    root["status"].loc[{"beam": "100x20", "mesh_type": "structured", "definition": "area"}] = 1
+    moduli = dataset.empty(axes, dataset.MODULI_VARIABLES)
+    for size in SIZES:
+        place = {"definition": "area", "mesh_size": size}
+        moduli["young_modulus_error"].loc[place] = size / 1e-3 / 100  # 1 % at 1 mm
+        moduli["effective_poisson_ratio"].loc[place] = size / 1e-2
+        moduli["status"].loc[place] = 1
+    place = {"definition": "adjoint", "mesh_size": 5e-3}
+    moduli["young_modulus_error"].loc[place], moduli["status"].loc[place] = 0.05, 1
+    moduli.attrs = {"patch_length": 0.1, "patch_height": 0.02}
+    return xr.DataTree.from_dict({"/": root, "/moduli": moduli})
+
+
+def test_moduli_and_errors_of_a_row_are_of_one_mesh_size():
+    text = definitions.decision(compared())
+    rows = {row["definition"]: row for row in tables(text)["Mesh type `free`"]}
+    assert rows["`area`"]["E at 0.3"] == "+1.0 %"  # at 1 mm, as the errors
+    assert rows["`area`"]["ν at 0.3"] == "0.100"
+    assert rows["`area`"]["traction, 0.3"] == "+0.5 %"
+    assert rows["`adjoint` (5 mm)"]["E at 0.3"] == "+5.0 %"
+    assert rows["`adjoint` (5 mm)"]["traction, 0.3"] == "+50.0 %"
+    assert "1 mm (a/H = 0.05)" in text and "100 x 20 mm" in text
+
+
+def test_a_definition_without_moduli_on_its_mesh_size_is_left_out():
+    tree = compared()
+    tree["moduli"]["status"].loc[{"mesh_size": 1e-3}] = 0
+    rows = {row["definition"]: row for row in tables(definitions.decision(tree))["Mesh type `free`"]}
+    assert "`area` (2 mm)" in rows and "`area`" not in rows
+    assert rows["`area` (2 mm)"]["E at 0.3"] == "+2.0 %"
+
+
+def test_moduli_of_another_box_than_the_beam_are_said():
+    tree = compared()
+    tree["moduli"].attrs["patch_height"] = 0.04
+    assert "moduli are of the meshes of a 100 x 40 mm sheet" in definitions.decision(tree)
+
+
+def test_summary_gives_the_range_over_all_meshes():
+    found = tables(definitions.decision(compared()))["In short"]
+    rows = {row["a/H"]: row for row in found if row["use"] == "`area`"}
+    assert list(rows) == ["to 0.05", "to 0.1", "to 0.25"]
+    # 200x40 at 1 and 2 mm (-.25, -.5 %), 100x20 at 1 mm (.5 %); 100x20 at 2 mm; 5 mm on both.
+    assert [row["meshes"] for row in rows.values()] == ["3", "1", "2"]
+    assert rows["to 0.05"]["traction, ν = 0.3"] == "−0.5 to +0.5 %"
+    assert rows["to 0.1"]["traction, ν = 0.3"] == "+1.0 %"
+    assert rows["to 0.25"]["shear, ν = 0.5"] == "−1.2 to +2.5 %"
+
+
+@pytest.mark.parametrize("spoiled", ["load", "mesh"])
+def test_a_range_never_hides_a_mesh_that_is_not_solved(spoiled):
+    """What has no answer on a mesh of a row says so there."""
+    tree = compared()
+    place = {"beam": "200x40", "mesh_type": "free", "mesh_size": 5e-3, "definition": "area"}
+    if spoiled == "load":
+        place["load"] = "shear"
+    tree["deformation_error"].loc[place], tree["status"].loc[place] = np.nan, 5
+    found = tables(definitions.decision(tree))["In short"]
+    rows = {row["a/H"]: row for row in found if row["use"] == "`area`"}
+    assert "1 not solved" in rows["to 0.25"]["shear, ν = 0.3"]
+    assert ("not solved" in rows["to 0.25"]["traction, ν = 0.3"]) == (spoiled == "mesh")
+
+
+def test_a_load_that_was_not_asked_on_all_meshes_says_on_how_many():
+    tree = compared()
+    place = {"beam": "200x40", "mesh_type": "free", "load": "bending", "definition": "area"}
+    tree["deformation_error"].loc[place], tree["status"].loc[place] = np.nan, 0
+    rows = {row["a/H"]: row for row in tables(definitions.decision(tree))["In short"] if row["use"] == "`area`"}
+    assert rows["to 0.05"]["bending, ν = 0.3"] == "+0.5 % (1 of 3)"
+
+
+# -- the benchmark -----------------------------------------------------------------------------------------------------
+
+RACED = (1e-3, 2e-3, 5e-3, 1e-2)
+
+
+def race(errors, second, seconds=(0.08, 0.02, 0.004, 0.001)):
+    """Group of a benchmark of made-up errors, from the finest mesh size to the coarsest, method by method."""
+    axes = {"scene": ("traction",), "method": tuple(errors), "mesh_size": RACED, "linear_solver": ("SuperLU",),
+            "curve_count": (1,)}  # fmt: skip
+    data = dataset.empty(axes, dataset.BENCHMARK_VARIABLES)
+    data["machine_load"].values[:] = 0.0
+    data["error"].values[0], data["second_error"].values[0] = list(errors.values()), list(second.values())
+    data["seconds"].values[:] = np.where(np.isfinite(data.error), seconds, np.nan)
+    values = data.error.values[0], data.second_error.values[0]
+    data["assured_error"].values[0] = assured(*values)
+    data.attrs = {"second_beam": "120x30"}
+    return xr.DataTree.from_dict({"/benchmark": data})
+
+
+def quickest(errors, second):
+    """Winners of each error: method and mesh size."""
+    rows = tables(benchmark.page(race(errors, second)))["traction: the quickest ways to an error"]
+    return {row["error"]: [row[place].split(":")[0] for place in ("first", "second", "third") if row[place]]
+            for row in rows}  # fmt: skip
+
+
+STEADY = (0.0002, 0.0008, 0.005, 0.02)
+
+
+def test_a_size_counts_only_with_all_finer_ones():
+    """An error that crosses zero at 10 mm on its way to 15 % is not the quickest way to anything."""
+    errors = {"steady": STEADY, "crossing": (0.15, 0.12, 0.06, 0.0002)}
+    found = quickest(errors, errors)
+    assert found == {"1 %": ["`steady`, 5 mm"], "0.1 %": ["`steady`, 2 mm"], "0.01 %": []}
+
+
+def test_a_crossing_at_the_finest_size_does_not_count():
+    """Nothing finer was run, so nothing says that it stays."""
+    errors = {"steady": STEADY, "last": (0.00001, 0.02, 0.04, 0.06), "alone": (np.nan, np.nan, np.nan, 0.00001)}
+    assert quickest(errors, errors)["0.01 %"] == []
+
+
+def test_a_size_counts_only_on_a_second_beam_too():
+    errors = {"lucky": (0.0001, 0.0002, 0.0003, 0.0004), "steady": STEADY}
+    second = {"lucky": (0.03, 0.03, 0.03, 0.03), "steady": STEADY}
+    assert quickest(errors, second) == {"1 %": ["`steady`, 5 mm"], "0.1 %": ["`steady`, 2 mm"], "0.01 %": []}
+    assert quickest(errors, errors)["0.1 %"] == ["`lucky`, 10 mm", "`steady`, 2 mm"]
+
+
+def test_signs_do_not_matter_and_failures_do():
+    errors = {"signed": (-0.0002, 0.0008, -0.005, 0.02), "failed": (0.0001, np.nan, 0.0003, 0.0004)}
+    assert quickest(errors, errors) == {"1 %": ["`signed`, 5 mm"], "0.1 %": ["`signed`, 2 mm"], "0.01 %": []}
+
+
+def test_without_a_second_beam_nothing_is_called_the_quickest():
+    errors = {"steady": STEADY}
+    text = benchmark.page(race(errors, {"steady": [np.nan] * 4}))
+    assert "no second beam" in text and "`steady`, 5 mm" not in text
+
+
+def test_the_page_states_the_rule():
+    text = benchmark.page(race({"steady": STEADY}, {"steady": STEADY}))
+    assert "all finer ones" in text and "120x30" in text
