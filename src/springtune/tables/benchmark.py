@@ -64,8 +64,8 @@ def _rule(data):
     if not np.isfinite(data.assured_error).any():
         return "Nothing is called the quickest way to an error: the study has no second beam to check it on."
     return (
-        "The quickest ways to an error: a mesh size of an approach counts where it and all finer ones that were run, at "
-        "least one, stay within the error, on the beam and on a second one "
+        "The quickest ways to an error: a mesh size of an approach counts where it and all finer ones that were run, "
+        "at least one, stay within the error, on the beam and on a second one "
         f"({data.attrs['second_beam']}). An error that happens to cross zero on its way counts for nothing."
     )
 
