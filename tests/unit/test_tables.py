@@ -6,7 +6,7 @@ import xarray as xr
 
 from springtune import dataset
 from springtune.compare import assured
-from springtune.tables import benchmark, definitions
+from springtune.tables import benchmark, definitions, stability
 
 
 def cells(line):
@@ -186,3 +186,37 @@ def test_without_a_second_beam_nothing_is_called_the_quickest():
 def test_the_page_states_the_rule():
     text = benchmark.page(race({"steady": STEADY}, {"steady": STEADY}))
     assert "all finer ones" in text and "120x30" in text
+
+
+# -- the experiments on stability --------------------------------------------------------------------------------------
+
+
+def stressed():
+    """Groups of a root with one unstable and one solved scene, and of strains with one that flutters."""
+    axes = {
+        "beam": ("100x20",), "mesh_type": ("free",), "mesh_size": (1e-3,), "material": ("steel",),
+        "load": ("compression",), "definition": ("lattice", "area"), "kinematics": ("nonlinear",),
+        "experiment": ("strains",), "strain_load": ("axial", "follower-pressure"), "strain": (-0.1, 0.1),
+    }  # fmt: skip
+    root = dataset.empty(axes, dataset.ROOT_VARIABLES)
+    root["status"].loc[{"definition": "lattice"}], root["message"].loc[{"definition": "lattice"}] = 4, "why not"
+    root["status"].loc[{"definition": "area"}] = 1
+    used = [name for name, one in dataset.STABILITY_VARIABLES.items() if set(one[0]) <= set(axes)]
+    strains = dataset.empty(axes, {name: dataset.STABILITY_VARIABLES[name] for name in used})
+    strains["strain_status"].values[:], strains["strain_load_share"].values[:] = 1, 1.0
+    strains["negative_pivots"].values[:] = 0.0
+    place = {"definition": "area", "strain_load": "follower-pressure", "strain": 0.1}
+    strains["strain_status"].loc[place] = 4
+    strains["strain_message"].loc[place] = "flutter: two modes have merged"
+    place = {"definition": "area", "strain_load": "axial", "strain": -0.1}
+    strains["strain_status"].loc[place], strains["negative_pivots"].loc[place] = 4, 2.0
+    return xr.DataTree.from_dict({"/": root, "/stability": strains})
+
+
+def test_page_tells_flutter_from_buckling_and_says_why_a_scene_is_not_solved():
+    text = stability.page(stressed())
+    assert "| `area` | unstable (2) | solved |" in text
+    assert "| `area` | solved | unstable (flutter) |" in text
+    rows = tables(text)["Scenes of the study"]
+    assert [(row["status"], row["message"]) for row in rows] == [("unstable", "why not")]
+    assert "1 of 2 scenes are solved" in text

@@ -99,6 +99,7 @@ def _advice(root):
                 texts = [_range(error[within], flag[within]) for error, flag in zip(errors, flags)]
                 size = f"to {min(high, ratios[within].max()):.3g}"
                 rows.append([situation, f"`{name}`", mesh_type, size, str(within.sum()), *texts])
+                situation = ""
     if not rows:
         return []
     lines = [f"| what you have | use | mesh type | a/H | meshes | {' | '.join(heads)} |"]

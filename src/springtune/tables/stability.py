@@ -150,7 +150,7 @@ def _strains(data):
     lines = [
         "### Large loads",
         "",
-        "Status, in brackets the share of the load that is reached or the negative pivots.",
+        "Status, in brackets the share of the load that is reached, or the negative pivots, or flutter.",
         "",
     ]
     for load in data.strain_load.values:
@@ -158,10 +158,12 @@ def _strains(data):
         for name in _definitions(data, "strain_load_share"):
             cells = data.sel(definition=name, strain_load=load)
             texts = []
-            for flag, pivots, share in zip(cells.strain_status.values, cells.negative_pivots.values,
-                                           cells.strain_load_share.values):  # fmt: skip
-                text = STATUS[int(flag)].replace("_", " ")
-                texts.append(text + (f" ({pivots:.0f})" if pivots > 0 else f" ({share:.2f})" if share < 1 else ""))
+            for flag, pivots, share, message in zip(cells.strain_status.values, cells.negative_pivots.values,
+                                                    cells.strain_load_share.values,
+                                                    cells.strain_message.values):  # fmt: skip
+                note = " (flutter)" if "flutter" in message.lower() else ""
+                note = f" ({pivots:.0f})" if pivots > 0 else f" ({share:.2f})" if share < 1 else note
+                texts.append(STATUS[int(flag)].replace("_", " ") + note)
             rows.append([f"`{name}`", *texts])
         heads = [f"{100 * strain:g} %".replace("-", "−") for strain in data.strain.values]
         lines += [f"{load}:", "", *table(["definition", *heads], rows), ""]
@@ -206,15 +208,13 @@ def _buckling(data):
 
 
 def _scenes(root):
-    """Static scenes of the study that are not stable, and how many are."""
+    """Static scenes of the study that are not solved, and why; and how many are."""
     flags = root.status.values
     rows = []
     for place in np.argwhere(flags > 1):
         labels = {name: root[name].values[i] for name, i in zip(root.status.dims, place)}
         cell = root.sel(labels)
         labels["mesh_size"] = f"{1e3 * labels['mesh_size']:g} mm"
-        pivots = float(cell.negative_pivots)
-        rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)],
-                     "" if np.isnan(pivots) else f"{pivots:.0f}"])  # fmt: skip
-    lines = ["### Scenes of the study", "", f"{int((flags == 1).sum())} scenes are solved and stable; the others:", ""]
-    return [*lines, *table(["scene", "status", "negative pivots"], rows), ""] if rows else []
+        rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)], str(cell.message.item())])
+    solved = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
+    return ["### Scenes of the study", "", solved, "", *table(["scene", "status", "message"], rows), ""] if rows else []
