@@ -1,5 +1,7 @@
 """The rivals of the benchmark against each other and the reference, and how a race is run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -93,6 +95,19 @@ def test_a_race_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
     assert np.abs(found["error"][2, 2]) < 0.01
     parts = sum(found[f"{part}_seconds"][1] for part in benchmark.PARTS)
     assert (parts > 0).all() and (found["factorising_seconds"][1] > 0).all()
+
+
+def test_errors_are_checked_on_a_second_beam():
+    """A definition's error there is what a race of that beam has, and the assured error is the largest of all."""
+    second = Beam("60x15", 0.06, 0.015, 1e-3)
+    methods, sizes = ("lattice/structured", "linear-triangles"), (2e-3, 5e-3)
+    found = benchmark.run(SCENES["block"], methods, sizes, 10.0, second_beam=second)
+    there = benchmark.run(replace(SCENES["block"], beam=second), methods, sizes, 10.0)
+    assert found["second_error"] == pytest.approx(there["error"], rel=1e-9)
+    assert np.isnan(found["assured_error"][:, 0]).all()  # nothing finer was run
+    both = np.abs([found["error"], found["second_error"]])
+    assert found["assured_error"][:, 1] == pytest.approx(both.max(axis=(0, 2)))
+    assert np.isnan(there["second_error"]).all() and np.isnan(there["assured_error"]).all()
 
 
 def test_a_case_that_fails_is_stored_with_its_message():

@@ -860,3 +860,36 @@ laying:
     def test_outputs_need_what_they_show(self, refusal, output, words):
         message = refusal(SMALL.replace("grids:", f"outputs: {output}\ngrids:"))
         assert f"outputs: '{output}' shows" in message and words in message
+
+
+# -- the benchmark -----------------------------------------------------------------------------------------------------
+
+RACED = SMALL.replace("poisson_ratio: 0.3}", "poisson_ratio: 0.3, density: 7850 kg/m^3}").replace(
+    "grids:",
+    """\
+benchmark:
+  scenes:
+    traction: {beam: long, material: steel, load: traction, force: 300 kN}
+  second_beam: short
+  definition: lattice
+  mesh_type: structured
+  mesh_size: [2 mm, 5 mm]
+grids:""",
+)
+
+
+class TestBenchmark:
+    def test_second_beam_goes_with_every_scene(self, load):
+        race = load(RACED).benchmark[0]
+        assert (race.beam.name, race.second_beam.name, race.second_beam.height) == ("long", "short", 0.02)
+        assert load(RACED.replace("  second_beam: short\n", "")).benchmark[0].second_beam is None
+
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            ("second_beam: short", "second_beam: shirt", "unknown beam 'shirt'; did you mean 'short'?"),
+            ("mesh_size: [2 mm, 5 mm]\ngrids", "mesh_size: 12 mm\ngrids", "12 mm is too large for 'short'"),
+        ],
+    )
+    def test_unfit_second_beams_are_refused(self, refusal, old, new, message):
+        assert old in RACED and message in refusal(RACED.replace(old, new))
