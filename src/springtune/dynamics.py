@@ -393,8 +393,8 @@ class Motion:
             return "rest", "the body is free to move as a whole, so whether it is stable was not checked"
         try:
             pivots = (network.rest_factor if self.linear else network.factorize(u)).negative_pivots
-        except SingularError:
-            return "unstable", "at rest on a limit point: the tangent is singular; use another load"
+        except SingularError as error:
+            return "unstable", f"at rest on a limit point, where the tangent is singular ({error}); use another load"
         if not pivots:
             return "rest", ""
         many = "s" if pivots > 1 else ""

@@ -504,6 +504,17 @@ def test_an_arch_that_snaps_through_rests_behind():
     assert found.displacements[middle, 1] < -6e-3
 
 
+def test_rest_on_a_singular_tangent_is_unstable():
+    """Two springs in a line: nothing holds the particle between them sideways, as at a limit point."""
+    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]), np.array([[0, 1, 3], [1, 2, 3]]))
+    directions = np.ones((4, 2), dtype=bool)
+    directions[1] = False
+    level = (mesh.points[mesh.edges][:, :, 1] == 0).all(axis=1)
+    motion = Motion(Network(mesh, directions, 1.0 * level), np.ones(4), mass_damping=1.0)
+    found = motion.run("central-difference", 0.5, 100, rest=1e-6)
+    assert found.status == "unstable" and "singular" in found.message
+
+
 def test_a_body_that_floats_is_not_judged():
     """Its rigid motions cost nothing: pivots are zero but for rounding, and say nothing."""
     mesh = lattice(6, 4)

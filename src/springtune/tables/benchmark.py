@@ -37,7 +37,8 @@ def page(tree):
     parts = [f"Machine load at the start of each scene: {loads}.", "", _rule(data), ""]
     for scene in map(str, data.scene.values):
         race = data.sel(scene=scene)
-        parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(race), ""]
+        if np.isfinite(race.assured_error).any():
+            parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(race), ""]
         parts += [f"### {scene}: methods on one mesh size", "", *_one_size(race), ""]
     parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
     return "\n".join([*parts, "### A sensitivity curve", "", *_curve(data), ""])
