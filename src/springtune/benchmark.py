@@ -221,14 +221,17 @@ def _repeat(send, scene, method, size, mesh, meshing, once):
 
 
 def _rates(result, sizes):
-    """Order of the error in the mesh size, exponent of the seconds in the unknowns, and which cases nothing beats."""
+    """Order of the error in the mesh size, exponent of the seconds in the unknowns, and which cases nothing beats.
+
+    An error that changes its sign or does not fall with the mesh size has no order.
+    """
     count = len(result["error"])
     rates, exponents = np.full(count, np.nan), np.full(count, np.nan)
     for i in range(count):
-        errors = np.abs(result["error"][i])
-        good = np.isfinite(errors) & (errors > 0)
-        if good.sum() >= 3:
-            rates[i] = np.polyfit(np.log(np.asarray(sizes)[good]), np.log(errors[good]), 1)[0]
+        good = np.isfinite(result["error"][i])
+        errors, signs = np.abs(result["error"][i])[good], np.sign(result["error"][i])[good]
+        if len(errors) >= 3 and np.abs(signs.sum()) == len(signs) and (np.diff(errors) > 0).all():
+            rates[i] = np.polyfit(np.log(np.asarray(sizes)[good]), np.log(errors), 1)[0]
         large = np.isfinite(result["seconds"][i]) & (result["unknowns"][i] >= 3000)
         if large.sum() >= 2 and np.ptp(result["unknowns"][i][large]) > 0:
             logs = np.log(result["unknowns"][i][large]), np.log(result["seconds"][i][large])

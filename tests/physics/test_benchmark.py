@@ -110,6 +110,14 @@ def test_errors_are_checked_on_a_second_beam():
     assert np.isnan(there["second_error"]).all() and np.isnan(there["assured_error"]).all()
 
 
+def test_an_error_that_crosses_zero_or_stays_has_no_order():
+    sizes = np.array([1e-3, 2e-3, 4e-3, 8e-3])
+    errors = np.array([3e3 * sizes**2, -3e3 * sizes**2, 3e3 * (sizes - 3e-3) ** 2, sizes - 3e-3, 0 * sizes + 0.1])
+    shown = {"error": errors, "seconds": np.full(errors.shape, np.nan), "unknowns": np.full(errors.shape, np.nan)}
+    found = benchmark._rates(shown, sizes)["error_rate"]
+    assert found[:2] == pytest.approx([2, 2]) and np.isnan(found[2:]).all()
+
+
 def test_a_case_that_fails_is_stored_with_its_message():
     found = benchmark.run(SCENES["traction"], ("van-gelder/braced",), (5e-3,), 1.0)
     assert found["status"][0, 0] == 5 and found["message"][0, 0]
