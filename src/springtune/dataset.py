@@ -311,7 +311,12 @@ BENCHMARK_VARIABLES = {
     "pareto": (CASE, "1", "1 where no method of the scene is both more accurate and faster", 0),
     "status": (CASE, "1", "what became of the case", 0),
     "message": (CASE, "1", "why there are no numbers", ""),
-    "error_rate": (("scene", "method"), "1", "exponent of the error in the mesh size", np.nan),
+    "error_rate": (
+        ("scene", "method"),
+        "1",
+        "exponent of the error in the mesh size, where it falls with that and keeps its sign",
+        np.nan,
+    ),
     "cost_exponent": (("scene", "method"), "1", "exponent of the seconds in the unknowns, from 3000 on", np.nan),
     "reference_displacement": (RACE, "m", "displacement of the converged reference", np.nan),
     "reference_error_estimate": (RACE, "1", "estimated relative error of the reference", np.nan),
