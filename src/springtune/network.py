@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from . import factors
-from .factors import Factor
+from .factors import Factor, SingularError
 from .mesh.cells import DIAGONALS, SIDES
 from .ordering import nested_dissection
 
@@ -286,6 +286,21 @@ class Network:
             return self._multigrid(matrix)
         order, places, indices, pointers = self._pattern.elimination
         return Factor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
+
+    def is_stable(self, displacements):
+        """Whether the tangent at displacements is positive definite; asks less than a factorisation for use.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2)
+        """
+        matrix = self.tangent(displacements)
+        if factors.CHOLESKY and self.unknowns <= LARGEST:
+            return self._pattern.analysis.factorise(matrix.data) is not None
+        try:
+            return self.factorized(matrix).negative_pivots == 0
+        except SingularError:
+            return False
 
     def _multigrid(self, matrix):
         from .multigrid import Multigrid

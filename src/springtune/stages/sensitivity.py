@@ -9,7 +9,7 @@ import numpy as np
 from ..boundary import held, measured, weights
 from ..mesh import read_mesh
 from ..network import Network
-from ..path import stable_until, trace
+from ..path import trace
 from ..springs.lattice import uniform
 from ..statics import StaticProblem
 from . import files, store
@@ -53,9 +53,7 @@ def _trace(problem, weights, curve):
         displacement = targets * np.tensordot(problem.slope, weights, axes=2)
         stable = np.ones(len(targets), dtype=bool)
     else:
-        displacement, _ = trace(problem, weights, targets)
-        # A beam in tension does not buckle.
-        stable = stable_until(problem, targets) if curve["force"] < 0 else np.ones(len(targets), dtype=bool)
+        displacement, stable = trace(problem, weights, targets)
     return {"displacement": displacement, "stable": stable, "seconds": time.perf_counter() - begin}
 
 
