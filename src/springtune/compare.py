@@ -1,8 +1,15 @@
 """Comparing networks with references: errors, and the stiffness at which a sensitivity curve has none."""
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
+
+ROOT = 1e-10
+"""Relative tolerance of a best stiffness, below that of the curve."""
+
+HALVINGS = 12
+"""Of the way to where a curve ends, in search of its best stiffness there."""
 
 
 def deformation_error(displacement, reference):
@@ -51,11 +58,32 @@ def left_out(x, y):
     return result
 
 
-def best_stiffness(stiffness, displacement, reference):
+@dataclass(frozen=True)
+class Best:
     """Stiffness at which a sensitivity curve meets the reference.
 
-    Along a curve the displacement is close to a multiple of ``1/k``; a cubic spline of it over ``1/k`` is accurate to
-    some 1e-9 between the 61 points of a curve.
+    Attributes
+    ----------
+    stiffness : float
+        [N/m]; NaN where there is none.
+    status : str
+        ``"solved"``; ``"unstable"`` where the curve meets the reference where it is unstable alone;
+        ``"not_converged"`` where it may in a gap; ``"failed"`` where it does not, or there is no reference.
+    message : str
+        Why there is none; empty where there is one.
+    """
+
+    stiffness: float
+    status: str
+    message: str = ""
+
+
+def best_stiffness(stiffness, displacement, stable, reference, solve):
+    """Stiffness at which the stable part of a sensitivity curve meets the reference.
+
+    Between two stable points on either side of the reference the equation ``solve(k) = reference`` is solved for
+    ``1/k``, in which the curve is nearly straight. Between the last stable point and the next one, where the curve
+    loses its stability or was not followed, stable points are sought by bisection.
 
     Parameters
     ----------
@@ -63,28 +91,75 @@ def best_stiffness(stiffness, displacement, reference):
         Ascending [N/m].
     displacement : ndarray of float, shape (n,)
         Displacement of the network [m]; NaN where there is none.
+    stable : ndarray of bool, shape (n,)
+        Whether it is of a stable equilibrium.
     reference : float
         Displacement of the reference [m].
+    solve : callable
+        Displacement [m] of the stable equilibrium at a stiffness [N/m], NaN where there is none.
 
     Returns
     -------
-    float
-        Stiffness [N/m]; the stiffest where the curve meets the reference more than once, NaN where it never does.
+    Best
+        The stiffest where the curve meets the reference more than once.
     """
-    known = np.isfinite(displacement)
-    if known.sum() < 2 or not np.isfinite(reference):
-        return np.nan
-    softness, error = 1.0 / stiffness[known][::-1], displacement[known][::-1] - reference
-    # Bracketed by the samples: the roots of the pieces lose one that rounding puts on the seam of two pieces.
-    met = np.flatnonzero(np.sign(error[:-1]) * np.sign(error[1:]) <= 0)
-    if not len(met):
-        return np.nan
-    ends = softness[met[0] : met[0] + 2]
-    curve = CubicSpline(softness, error)
-    values = curve(ends)
-    if values[0] * values[1] >= 0:  # an end is a root but for rounding
-        return float(1.0 / ends[np.argmin(np.abs(values))])
-    return float(1.0 / brentq(curve, *ends, xtol=1e-15 * ends[0], rtol=1e-14))
+    if not np.isfinite(reference):
+        return Best(np.nan, "failed", "the reference has no displacement")
+    softness, error = 1.0 / np.asarray(stiffness)[::-1], np.asarray(displacement)[::-1] - reference
+    solved = np.asarray(stable)[::-1] & np.isfinite(error)
+    met = (np.sign(error[:-1]) * np.sign(error[1:]) <= 0) & np.isfinite(error[:-1] * error[1:])
+    for place in range(len(error) - 1):
+        if solved[place] and solved[place + 1]:
+            if met[place]:
+                ends = *softness[place : place + 2], *error[place : place + 2]
+                return Best(_root(solve, reference, *ends), "solved")
+        elif solved[place] and (met[place] or not np.isfinite(error[place + 1])):
+            gap = np.flatnonzero(np.isfinite(error[place + 1 :]))
+            end = softness[place + 1 + gap[0]] if len(gap) else softness[-1]
+            found = _last_root(solve, reference, softness[place], end, error[place])
+            if found is not None:
+                return Best(found, "solved")
+    if len(error) == 1 and solved[0] and error[0] == 0:
+        return Best(float(stiffness[0]), "solved")
+    if met.any():
+        place = int(np.argmax(met))
+        between = f"{1 / softness[place + 1]:.6g} and {1 / softness[place]:.6g} N/m"
+        return Best(np.nan, "unstable", f"the curve meets the reference where it is unstable, between {between}")
+    known = np.flatnonzero(np.isfinite(error))
+    across = [pair for pair in zip(known[:-1], known[1:]) if error[pair[0]] * error[pair[1]] <= 0]
+    if not len(known) or across or len(known) < len(error) and known[-1] < len(error) - 1:
+        first, last = across[0] if across else (known[-1] if len(known) else 0, len(error) - 1)
+        gap = f"between {1 / softness[last]:.6g} and {1 / softness[first]:.6g} N/m"
+        return Best(np.nan, "not_converged", f"the curve may meet the reference in its gap {gap}")
+    asked = f"from {stiffness[0]:.6g} to {stiffness[-1]:.6g} N/m"
+    return Best(np.nan, "failed", f"the curve does not meet the reference {asked}; widen `sensitivity`")
+
+
+def _root(solve, reference, first, last, error_first, error_last):
+    """Stiffness between two softnesses at which the displacement is the reference's."""
+    known = {first: error_first, last: error_last}
+    if 0.0 in known.values():
+        return float(1.0 / next(softness for softness, error in known.items() if error == 0))
+
+    def error(softness):
+        return known[softness] if softness in known else solve(1.0 / softness) - reference
+
+    return float(1.0 / brentq(error, first, last, xtol=1e-15 * first, rtol=ROOT))
+
+
+def _last_root(solve, reference, softness, unsolved, error):
+    """Stiffness between a softness that has an equilibrium and one that has none; None where there is no root."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (softness + unsolved)
+        there = solve(1.0 / middle) - reference
+        if not np.isfinite(there):
+            unsolved = middle
+        elif there * error <= 0:
+            return _root(solve, reference, softness, middle, error, there)
+        else:
+            softness, error = middle, there
+    return None
+
 
 
 def assured(errors, second):

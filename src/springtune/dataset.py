@@ -126,7 +126,10 @@ SENSITIVITY_VARIABLES = {
         np.nan,
     ),
     "status": ((*CURVE, "stiffness_ratio"), "1", "what became of the point", 0),
-    "best_stiffness": (CURVE, "N/m", "stiffness with no deformation error", np.nan),
+    "message": (CURVE, "1", "why the curve is not solved throughout", ""),
+    "best_stiffness": (CURVE, "N/m", "stiffness of a stable equilibrium with no deformation error", np.nan),
+    "best_stiffness_status": (CURVE, "1", "what became of the best stiffness", 0),
+    "best_stiffness_message": (CURVE, "1", "why there is no best stiffness", ""),
     "predicted_stiffness": (CURVE, "N/m", "stiffness by closed form, full outline", np.nan),
     "curve_seconds": (CURVE, "s", "time to trace the curve, networks shared", np.nan),
 }

@@ -32,11 +32,18 @@ three times their length lose their stability and gain it again within .25."""
 STEP = 1e-3
 """Difference of two approximants over the way from the point that ends a step along the path."""
 
+WAY_ORDER = 10
+"""Order of a series along the path."""
+
 MAX_SERIES = 3
 """Series of the load, that about rest with them."""
 
 MAX_CORRECTIONS = 4
 """Steps of Newton's method with one tangent that bring a prediction to an equilibrium."""
+
+MOST_UNKNOWNS = 4000
+"""Unknowns beyond which the path is followed to single loads alone: a curve's few samples next to buckling would take
+longer than all others."""
 
 MAX_STEPS = 60
 """Steps along the path beyond the series about rest."""
@@ -44,8 +51,8 @@ MAX_STEPS = 60
 LIMIT = 1e-3
 """Share of the load that a path may still rise to a limit point where it is left."""
 
-GROWTH = 10
-"""Power of the way along a series with which its error is taken to grow; of order 14 it grows faster."""
+GROWTH = 8
+"""Power of the way along a series with which its error is taken to grow; that of order 10 grows faster."""
 
 MAX_HALVINGS = 6
 """Of a step at whose end there is no stable equilibrium."""
@@ -179,8 +186,8 @@ class Expansion:
     def _shares(self, sigma, less=0):
         """Factors of the coefficients in their approximant of one denominator, shape (order + 1,).
 
-        The denominator is of half the order, or of a degree `less`. The numerator has the rest where the series is asked
-        for far beyond its radius, and all orders where the path may turn within it.
+        The denominator is of half the order, or of a degree `less`. The numerator has the rest where the series is
+        asked for far beyond its radius, and all orders where the path may turn within it.
         """
         lower = self.order // 2 - less
         upper = self.order if self.turning else self.order - lower
@@ -351,7 +358,7 @@ class StablePath:
     stable_to : float
         Largest load, without its sign, that the path is known to carry [m].
     end : str
-        Why the path ends before the last target; empty where it does not.
+        Why the path ends before the last target; empty where it does not, or was not followed that far.
     """
 
     def __init__(self, problem, weights, targets):
@@ -542,17 +549,26 @@ class StablePath:
 
     def _follow(self, loads, values, good, stable, found):
         """Values at the loads that the series about rest does not serve, as far as the path is stable."""
-        for place in np.flatnonzero(~found):
-            point = self._point(self.problem.rest, loads[place], values[place]) if good[place] else None
-            if point is not None and point.error <= CURVE_TOLERANCE and not point.stable:
-                return  # from here on the series is of another path, which the beam would leave
+        places = np.flatnonzero(~found)
+        if good[places].any() and self.problem.network.unknowns > MOST_UNKNOWNS:
+            return
+        for place in places:
+            if good[place] and self._elsewhere(loads[place]):
+                return
             values[place] = self._reach(abs(loads[place]))
             found[place] = stable[place] = np.isfinite(values[place])
             if self.end and abs(loads[place]) > self.stable_to:
                 return
 
+    def _elsewhere(self, s):
+        """Whether the series about rest is by now of another path, which the beam would leave."""
+        network, displacements = self.problem.network, self.problem.rest.at(s)[1]
+        missing = s * self.problem.load - network.resistance(displacements)
+        near = np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm
+        return near and not network.is_stable(displacements)
+
     def _reach(self, load):
-        """Weighted displacement at a load beyond the series about rest; NaN where the stable path does not get there."""
+        """Weighted displacement at a load beyond the series; NaN where the stable path does not get there."""
         while self.stable_to < load and not self.end:
             self._advance(load)
         if load > self.stable_to:
@@ -609,7 +625,7 @@ class StablePath:
                 if factor is None:
                     self.end = "no stable equilibrium found"
                     return
-        series = Expansion(network, self.problem.load, s, displacements, factor, turning=True)
+        series = Expansion(network, self.problem.load, s, displacements, factor, WAY_ORDER, turning=True)
         farthest, turns = series.reach(self._sign)
         most = abs(series.at(farthest)[0])
         if turns and most - abs(s) <= LIMIT * most and load >= most:

@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.path import ORDER, Expansion, stable_until, trace
+from springtune.boundary import held, measured, weights
+from springtune.compare import best_stiffness
+from springtune.continuation import follow
+from springtune.geometry import Beam
+from springtune.materials import Material
+from springtune.mesh import MESH_TYPES
+from springtune.network import Network
+from springtune.path import ORDER, Expansion, StablePath, smallest_share, trace
+from springtune.reference.small_strain import solve_small_strain
+from springtune.springs.lattice import COEFFICIENT, uniform
+from springtune.statics import StaticProblem
 
 from problems import beam_problem
 
@@ -26,37 +36,142 @@ RATIOS = np.linspace(0.4, 1.6, 61)
 def test_curve_agrees_with_separate_solves(mesh_type, length, height, size, force):
     problem, weights = beam_problem(mesh_type, length, height, size)
     targets = force / (RATIOS * K)
-    values, errors = trace(problem, weights, targets)
+    values, stable = trace(problem, weights, targets)
+    assert np.isfinite(values).all() and stable.all()
     for place in range(0, 61, 12):
         found = problem.newton(targets[place], targets[place] * problem.slope)
         assert found.converged
-        assert values[place] == pytest.approx(np.tensordot(found.displacements, weights, axes=2), rel=1e-6)
-    assert (errors <= 1e-6).all()
+        assert values[place] == pytest.approx(np.tensordot(found.displacements, weights, axes=2), rel=1e-7)
+
+
+def on_the_path(problem, weights, s):
+    """Weighted displacement of the stable equilibrium on the path from rest, NaN where there is none.
+
+    A separate solve; where that finds an equilibrium that the beam leaves, by arc length.
+    """
+    found = problem.nonlinear(s)
+    if problem.judge(s, found)[0] == "solved":
+        return float(np.tensordot(found.displacements, weights, axes=2))
+    for length in (0.02, 0.2):  # short of the turn, long of the way beyond it
+        increment = length * abs(s) * np.linalg.norm(problem.slope)
+        path = follow(problem, 1.0001 * s, increment=increment, most_points=400)
+        carried = np.maximum.accumulate(np.abs(path.loads)) == np.abs(path.loads)
+        count = int(np.argmin(np.append(carried & (path.negative_pivots == 0), False)))  # stable, under growing loads
+        place = int(np.searchsorted(np.abs(path.loads[:count]), abs(s)))
+        if place < count:
+            before, load = path.loads[place - 1 : place + 1]
+            share = (s - before) / (load - before)
+            guess = path.displacements[place - 1] * (1 - share) + path.displacements[place] * share
+            found = problem.newton(s, guess)
+            good = found.converged and problem.network.factorize(found.displacements).negative_pivots == 0
+            return float(np.tensordot(found.displacements, weights, axes=2)) if good else np.nan
+    return np.nan
+
+
+def random_curve(seed):
+    """A problem of at most 400 particles and loads around buckling, or in tension up to large strains."""
+    random = np.random.default_rng(seed)
+    while True:
+        mesh_type = random.choice(["structured", "free", "right", "alternating", "braced"])
+        height = random.uniform(5e-3, 30e-3)
+        size, length = height / random.uniform(1.5, 8), height * random.uniform(1, 12)
+        if 15 < length * height / size**2 < 300:
+            mesh = MESH_TYPES[mesh_type](length, height, size)
+            if len(mesh.points) <= 400:
+                break
+    kind = random.choice(["axial", "axial", "axial", "bending", "shear", "face"])
+    problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
+    sign, s = random.choice([-1, 1]), height * 10 ** random.uniform(-2, 0.3)
+    if kind != "axial" or sign < 0:
+        small = 1e-6 * sign * height
+        critical = smallest_share(problem.network, None, small * problem.slope, problem.rest_factor) * abs(small)
+        s = critical * random.uniform(0.3, 1.8) if kind == "axial" else min(0.3 * s, critical)
+    return problem, measured(mesh, kind), sign * min(s, 2 * height) / RATIOS
+
+
+def check(seed):
+    """What a curve says is stable is, to 1e-6, and what it has not is not on the stable path."""
+    problem, weights, targets = random_curve(seed)
+    values, stable = trace(problem, weights, targets)
+    assert np.isfinite(values[stable]).all()
+    last = np.argmax(np.abs(targets * stable))  # the nearest to where stability ends
+    for place in {0, 10, 25, 40, 60, int(last)}:
+        if stable[place]:
+            assert values[place] == pytest.approx(on_the_path(problem, weights, targets[place]), rel=1e-6), place
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_curves_are_of_the_stable_path(seed):
+    check(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 500))
+def test_many_random_curves_are_of_the_stable_path(seed):
+    check(seed)
 
 
 def test_next_to_buckling_the_curve_has_a_hole_or_the_truth():
     """200x30 under 30 kN crosses its buckling load; what the curve gives there is an equilibrium, the rest is NaN."""
     problem, weights = beam_problem("free", 0.2, 0.03, 5e-3)
     targets = -30e3 / (RATIOS * K)
-    values, _ = trace(problem, weights, targets)
+    values, stable = trace(problem, weights, targets)
     assert np.isnan(values).sum() <= 6
     for place in range(0, 61, 4):
         if np.isnan(values[place]):
             continue
         found = problem.newton(targets[place], problem.start.predict(targets[place]))
-        if found.converged:
+        if found.converged and (problem.network.factorize(found.displacements).negative_pivots == 0) == stable[place]:
             assert values[place] == pytest.approx(np.tensordot(found.displacements, weights, axes=2), rel=1e-6)
 
 
 def test_stable_part_of_a_curve_ends_at_the_buckling_load():
-    problem, _ = beam_problem("structured", 0.2, 0.03, 5e-3)
+    problem, weights = beam_problem("alternating", 0.2, 0.03, 5e-3)
     targets = -30e3 / (RATIOS * K)
-    stable = stable_until(problem, targets)
+    values, stable = trace(problem, weights, targets)
     assert stable[-1] and not stable[0]
     assert (np.diff(stable.astype(int)) >= 0).all()  # stiffer is more stable
-    for place in (stable.argmax() - 2, stable.argmax() + 1):
-        pivots = problem.newton(targets[place], targets[place] * problem.slope).factor.negative_pivots
-        assert (pivots == 0) == stable[place]
+    for place in (stable.argmax() - 1, stable.argmax()):
+        assert np.isfinite(on_the_path(problem, weights, targets[place])) == stable[place]
+
+
+def test_curve_next_to_buckling_is_followed_where_the_beam_bends():
+    """60x20 of rows that are no mirror image bends before it buckles; the path turns at k = 798, a limit point."""
+    problem, weights = beam_problem("structured", 0.06, 0.02, 2.5e-3)
+    stiffness = RATIOS * COEFFICIENT * 1e3
+    values, stable = trace(problem, weights, -0.548311 / stiffness)
+    assert (stable == (stiffness > 798.3)).all()
+    for place in np.flatnonzero(stable)[:4]:
+        assert values[place] == pytest.approx(on_the_path(problem, weights, -0.548311 / stiffness[place]), rel=1e-6)
+
+
+@pytest.mark.parametrize(("mesh_type", "best"), [("structured", 848.40), ("alternating", None)])
+def test_best_stiffness_is_of_a_stable_equilibrium(mesh_type, best):
+    problem, weights = beam_problem(mesh_type, 0.06, 0.02, 2.5e-3)
+    force, stiffness = -0.548311, RATIOS * COEFFICIENT * 1e3
+    path = StablePath(problem, weights, force / stiffness)
+    reference = solve_small_strain(Beam("60x20", 0.06, 0.02, 1e-3), Material("rubber", 1e6, 0.5), force).displacement
+    solve = lambda stiffness: path.value(force / stiffness)  # noqa: E731
+    found = best_stiffness(stiffness, path.values, path.stable, reference, solve)
+    if best is None:
+        assert (found.status, path.end) == ("unstable", "unstable") and np.isnan(found.stiffness)
+        return
+    assert found.status == "solved" and found.stiffness == pytest.approx(best, abs=5e-3)
+    assert on_the_path(problem, weights, force / found.stiffness) == pytest.approx(reference, rel=1e-6)
+
+
+def test_a_sheet_in_tension_loses_its_stability():
+    """77x7 under 7 N: unstable from 3.3 to 3.95 of the least load; what is stable again beyond is another path."""
+    problem, weights = beam_problem("free", 0.077, 0.007, 3.1e-3)
+    targets = 7.0 / (RATIOS * COEFFICIENT * 1e3)
+    values, stable = trace(problem, weights, targets)
+    path = follow(problem, targets[0], increment=0.01 * targets[0] * np.linalg.norm(problem.slope), most_points=400)
+    lost = path.loads[np.argmax(path.negative_pivots > 0)]
+    assert path.negative_pivots[-1] == 0 and targets[-1] < lost < targets[0]
+    clear = np.abs(targets / lost - 1) > 0.03
+    assert (stable == (targets < lost))[clear].all()
+    for place in np.flatnonzero(stable)[::6]:
+        assert values[place] == pytest.approx(on_the_path(problem, weights, targets[place]), rel=1e-6)
 
 
 def test_series_error_falls_with_the_order():

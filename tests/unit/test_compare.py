@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from springtune.compare import best_stiffness, deformation_error
+from springtune.compare import best_stiffness, deformation_error, left_out
 from springtune.geometry import Beam
 from springtune.materials import Material
 from springtune.springs.calibrated import calibrate
@@ -16,37 +16,88 @@ def test_deformation_error_is_signed_by_direction():
     assert deformation_error([1.1, 0.9, -1.1, -0.9], [1.0, 1.0, -1.0, -1.0]) == pytest.approx([0.1, -0.1, -0.1, 0.1])
 
 
-@example(best=1.5, bend=0.03, sign=-1.0)  # the root falls on a sample, between two pieces of the spline
+STIFFNESS = np.linspace(0.4, 1.6, 61)
+
+
+def found(curve, reference, first_stable=0.0):
+    """Best stiffness of a curve given as a function, stable from a stiffness on."""
+    stable = STIFFNESS >= first_stable
+
+    def solve(stiffness):
+        return curve(stiffness) if stiffness >= first_stable else np.nan
+
+    return best_stiffness(STIFFNESS, curve(STIFFNESS), stable, reference, solve)
+
+
+@example(best=1.5, bend=0.03, sign=-1.0)  # the root falls on a sample
 @given(best=st.floats(0.5, 1.5), bend=st.floats(-0.3, 0.3), sign=st.sampled_from([-1.0, 1.0]))
 def test_best_stiffness_of_a_known_curve(best, bend, sign):
     """U = 1/k + bend/k^2 meets its own value at k = best."""
-    stiffness = np.linspace(0.4, 1.6, 61)
-    displacement = sign * (1 / stiffness + bend / stiffness**2)
-    reference = sign * (1 / best + bend / best**2)
     if bend < 0 and -2 * bend / best > 0.9:
         return  # the curve turns back and meets the value twice
-    assert best_stiffness(stiffness, displacement, reference) == pytest.approx(best, rel=1e-9)
+    met = found(lambda k: sign * (1 / k + bend / k**2), sign * (1 / best + bend / best**2))
+    assert (met.status, met.message) == ("solved", "")
+    assert met.stiffness == pytest.approx(best, rel=1e-9)
+
+
+@example(place=0.713, first_stable=0.7)  # between two samples of which one is stable
+@example(place=0.707, first_stable=0.711)
+@given(place=st.floats(0.45, 1.55), first_stable=st.floats(0.42, 1.5))
+def test_best_stiffness_is_of_a_stable_point(place, first_stable):
+    met = found(lambda k: 1 / k, 1 / place, first_stable)
+    if abs(place / first_stable - 1) < 1e-4:
+        return  # the search ends before the very end of the stable part
+    assert met.status == ("solved" if place > first_stable else "unstable")
+    assert met.stiffness == pytest.approx(place if place > first_stable else np.nan, rel=1e-9, nan_ok=True)
+
+
+def test_best_stiffness_in_a_gap_is_solved_for_or_missing_with_a_reason():
+    """The curve turns at .711 and is not known to .781; its own root there is not where its samples point."""
+
+    def solve(stiffness):
+        return 1 / stiffness + 1e-3 / (stiffness - 0.711) if stiffness > 0.711 else np.nan
+
+    displacement = np.array([solve(stiffness) for stiffness in STIFFNESS])
+    displacement[STIFFNESS < 0.781] = np.nan
+    displacement[STIFFNESS < 0.6] = 1 / STIFFNESS[STIFFNESS < 0.6]
+    stable = STIFFNESS >= 0.781
+    met = best_stiffness(STIFFNESS, displacement, stable, solve(0.777), solve)
+    assert met.status == "solved" and met.stiffness == pytest.approx(0.777, rel=1e-9)
+    nothing = best_stiffness(STIFFNESS, displacement, stable, solve(0.777), lambda stiffness: np.nan)
+    assert np.isnan(nothing.stiffness) and nothing.status == "not_converged" and "gap" in nothing.message
 
 
 def test_best_stiffness_is_nan_where_there_is_none():
-    stiffness = np.linspace(0.4, 1.6, 61)
-    assert np.isnan(best_stiffness(stiffness, 1 / stiffness, 100.0))
-    assert np.isnan(best_stiffness(stiffness, 1 / stiffness, np.nan))
-    assert np.isnan(best_stiffness(stiffness, np.full(61, np.nan), 1.0))
+    for reference in (100.0, np.nan):
+        met = found(lambda k: 1 / k, reference)
+        assert np.isnan(met.stiffness) and met.status == "failed" and met.message
+    empty = best_stiffness(STIFFNESS, np.full(61, np.nan), np.zeros(61, dtype=bool), 1.0, lambda k: np.nan)
+    assert np.isnan(empty.stiffness) and empty.status == "not_converged"
 
 
 def test_holes_of_a_curve_do_not_spoil_its_best_stiffness():
-    stiffness = np.linspace(0.4, 1.6, 61)
-    displacement = 1 / stiffness
+    displacement = 1 / STIFFNESS
     displacement[:20] = np.nan
-    assert best_stiffness(stiffness, displacement, 1.0) == pytest.approx(1.0, rel=1e-9)
+    met = best_stiffness(STIFFNESS, displacement, np.isfinite(displacement), 1.0, lambda k: 1 / k)
+    assert met.stiffness == pytest.approx(1.0, rel=1e-9)
+
+
+def test_left_out_is_nothing_for_polynomials_and_shows_an_outlier():
+    x = np.linspace(1.0, 2.0, 30) ** 2
+    y = 1 - x + 0.3 * x**5
+    assert np.abs(left_out(x, y)).max() <= 1e-10
+    y[12] += 1e-3
+    assert left_out(x, y)[12] == pytest.approx(1e-3, rel=1e-6)
+    assert np.abs(left_out(x, y)[20:]).max() <= 1e-10
+    assert not left_out(x[:6], y[:6]).any()
 
 
 def test_calibration_is_the_mean_and_refuses_a_missing_curve():
-    assert calibrate([1.0, 2.0, 6.0]) == 3.0
-    for bad in ([], [1.0, float("nan")]):
-        with pytest.raises(ValueError, match="sensitivity"):
-            calibrate(bad)
+    assert calibrate([("a", 1.0, ""), ("b", 2.0, ""), ("c", 6.0, "")]) == 3.0
+    with pytest.raises(ValueError, match="no sensitivity curve"):
+        calibrate([])
+    with pytest.raises(ValueError, match="curve of fine has no best stiffness: it is unstable there"):
+        calibrate([("coarse", 1.0, ""), ("fine", np.nan, "it is unstable there")])
 
 
 @pytest.mark.parametrize(("size", "expected"), [(1e-3, 176.8e6), (2e-3, 171.9e6), (5e-3, 158.9e6)])

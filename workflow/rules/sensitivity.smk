@@ -8,6 +8,7 @@ rule sensitivity:
     input:
         tasks=RESULTS / "tasks/sensitivity_{bundle}.json",
         meshes=RESULTS / "done/mesh_{bundle}.json",
+        references=REFERENCES,
         code=modules("sensitivity"),
     output:
         RESULTS / "done/sensitivity_{bundle}.json",
@@ -25,7 +26,6 @@ rule calibrate:
     input:
         tasks=RESULTS / "tasks/calibrate.json",
         curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
-        references=REFERENCES,
         code=modules("calibrate"),
     output:
         RESULTS / "done/calibrate.json",

@@ -50,7 +50,7 @@ def _draw(curves, root, selection, folder, stem):
             if np.isfinite(best):
                 # The curve's lowest point lies between two of its stiffnesses.
                 place = np.searchsorted(stiffness, best)
-                stable = np.insert(stable, place, stable[place])
+                stable = np.insert(stable, place, True)
                 stiffness, error = np.insert(stiffness, place, best), np.insert(error, place, 0.0)
             stiffness = stiffness / unit
             axes.plot(stiffness, np.where(stable, error, np.nan), label=f"{1e3 * size:g} mm", **look)

@@ -1,7 +1,7 @@
 """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
 
-On each curve of the calibration beam, one a mesh size, the best stiffness is where the deformation error is zero; the
-mean over the mesh sizes serves every beam, size and load of that mesh type and material.
+On each curve of the calibration beam, one a mesh size, the best stiffness is where the deformation error of a stable
+equilibrium is zero; the mean over the mesh sizes serves every beam, size and load of that mesh type and material.
 """
 
 import math
@@ -9,13 +9,13 @@ import math
 from . import paper
 
 
-def calibrate(best_stiffnesses):
+def calibrate(curves):
     """Calibrated stiffness from the best stiffness of each mesh size.
 
     Parameters
     ----------
-    best_stiffnesses : iterable of float
-        Best stiffness of each curve [N/m]; NaN where a curve does not cross zero error.
+    curves : iterable of (str, float, str)
+        Name of each curve, its best stiffness [N/m], NaN where there is none, and why there is none.
 
     Returns
     -------
@@ -27,10 +27,13 @@ def calibrate(best_stiffnesses):
     ValueError
         If a curve has no best stiffness: a mean over some sizes would not say so.
     """
-    values = list(best_stiffnesses)
-    if not values or any(math.isnan(value) for value in values):
-        raise ValueError("a sensitivity curve of the calibration beam has no best stiffness; widen `sensitivity`")
-    return sum(values) / len(values)
+    curves = list(curves)
+    if not curves:
+        raise ValueError("there is no sensitivity curve of the calibration beam")
+    for name, value, message in curves:
+        if math.isnan(value):
+            raise ValueError(f"the sensitivity curve of {name} has no best stiffness: {message}")
+    return sum(value for _, value, _ in curves) / len(curves)
 
 
 def springs(mesh, material, thickness, stiffness):

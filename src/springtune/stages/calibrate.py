@@ -1,13 +1,10 @@
-"""Stage `calibrate`: best stiffness of every sensitivity curve, and the calibrated stiffness of each mesh type."""
+"""Stage `calibrate`: the calibrated stiffness of each mesh type, from the best stiffness of its sensitivity curves."""
 
 import sys
 from pathlib import Path
 
-import numpy as np
-
-from ..compare import best_stiffness
 from ..springs.calibrated import calibrate
-from . import files, references, store
+from . import files, store
 
 
 def run(tasks, done):
@@ -16,8 +13,8 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``curves`` (folder), ``references`` (folder) and ``groups``, each with ``name`` and ``members``, and
-        each of these with ``mesh, key, reference, force, stiffnesses``.
+        JSON file: ``curves`` (folder) and ``groups``, each with ``name`` and ``members``, and each of these with
+        ``mesh, key``.
     done : str or Path
         JSON file to write: calibrated stiffness [N/m] by name of the group, and a message where there is none.
     """
@@ -32,11 +29,10 @@ def run(tasks, done):
 
 
 def _best(tasks, member):
+    """What a curve is called, its best stiffness [N/m], and why there is none."""
     name = member["key"]
-    curve = store.read(Path(tasks["curves"]) / f"{member['mesh']}.h5", [name], ["displacement"])[name]
-    reference = references.read(tasks["references"], member["reference"])
-    displacement = member["force"] * reference.get("displacement", np.nan)
-    return best_stiffness(np.array(member["stiffnesses"]), curve["displacement"], displacement)
+    curve = store.read(Path(tasks["curves"]) / f"{member['mesh']}.h5", [name])[name]
+    return member["mesh"], curve["best_stiffness"], curve["best_message"]
 
 
 if __name__ == "__main__":

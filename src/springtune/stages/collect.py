@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from .. import __version__, dataset
 from ..boundary import FACE_POSITIONS
-from ..compare import best_stiffness, deformation_error
+from ..compare import deformation_error
 from ..loads import LOADS
 from ..mesh import read_mesh
 from ..reference.field import outline
@@ -226,7 +226,10 @@ def _sensitivity(study, folder, displacements, axes):
                     "displacement": displacement,
                     "deformation_error": deformation_error(displacement, reference),
                     "status": status,
-                    "best_stiffness": best_stiffness(stiffness, displacement, reference),
+                    "message": result["message"],
+                    "best_stiffness": result["best_stiffness"],
+                    "best_stiffness_status": dataset.STATUS.index(result["best_status"]),
+                    "best_stiffness_message": result["best_message"],
                     "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
                     "curve_seconds": result["seconds"],
                 },

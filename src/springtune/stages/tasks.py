@@ -214,7 +214,7 @@ def _finite_references(study):
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
-    parameters.append(stiffnesses(study, curve))
+    parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
     return files.key(parameters, _stage_key("sensitivity", "numpy", "scipy", "cvxopt"))
 
 
@@ -397,6 +397,7 @@ def _curve(study, curve):
         "force": curve.force,
         "kinematics": curve.kinematics,
         "stiffnesses": stiffnesses(study, curve),
+        "reference": reference_of(curve.mesh.beam, curve.material, curve.load),
     }
 
 
@@ -406,7 +407,12 @@ def _sensitivity(study, folder, meshes, curves):
         for mesh in meshes
         if curves[mesh]
     ]
-    return {"folder": str(folder / "curves"), "meshes": str(folder / "meshes"), "families": families}
+    return {
+        "folder": str(folder / "curves"),
+        "meshes": str(folder / "meshes"),
+        "references": str(folder / "references"),
+        "families": families,
+    }
 
 
 def _solve(study, folder, meshes, scenes):
@@ -456,17 +462,13 @@ def _calibrate(study, folder):
     tasks = []
     for name, (mesh_type, material, kinematics) in sorted(groups.items()):
         members = [
-            {
-                "mesh": curve.mesh.name,
-                "reference": reference_of(curve.mesh.beam, material, curve.load),
-                **_curve(study, curve),
-            }
+            {"mesh": curve.mesh.name, "key": curve_key(study, curve)}
             for curve in study.curves
             if (curve.mesh.beam.name, curve.load) == study.calibration
             and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
         ]
         tasks.append({"name": name, "members": members})
-    return {"curves": str(folder / "curves"), "references": str(folder / "references"), "groups": tasks}
+    return {"curves": str(folder / "curves"), "groups": tasks}
 
 
 def _products(name, content):
