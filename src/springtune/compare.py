@@ -31,33 +31,6 @@ def deformation_error(displacement, reference):
     return (displacement - reference) / np.abs(reference)
 
 
-def left_out(x, y):
-    """What values differ by from the polynomials through three neighbours on either side.
-
-    Parameters
-    ----------
-    x, y : ndarray of float, shape (n,)
-        Places, ascending or descending, and values.
-
-    Returns
-    -------
-    ndarray of float, shape (n,)
-        0 where there are fewer neighbours.
-    """
-    result = np.zeros(len(x))
-    if len(x) < 7:
-        return result
-    offsets = np.array([-3, -2, -1, 1, 2, 3])
-    places = np.arange(3, len(x) - 3)
-    nodes, values = x[places[:, None] + offsets], y[places[:, None] + offsets]
-    apart, among = x[places][:, None] - nodes, nodes[:, :, None] - nodes[:, None, :]
-    diagonal = np.arange(6)
-    ratios = np.broadcast_to(apart[:, None, :], among.shape).copy()
-    ratios[:, diagonal, diagonal] = among[:, diagonal, diagonal] = 1.0
-    result[places] = y[places] - ((ratios / among).prod(axis=2) * values).sum(axis=1)
-    return result
-
-
 @dataclass(frozen=True)
 class Best:
     """Stiffness at which a sensitivity curve meets the reference.

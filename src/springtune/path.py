@@ -13,7 +13,6 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from .compare import left_out
 from .factors import SingularError
 
 ORDER = 14
@@ -364,10 +363,10 @@ class StablePath:
     def __init__(self, problem, weights, targets):
         self.problem, self.weights = problem, weights
         targets = np.asarray(targets, dtype=float)
-        by_load = np.argsort(np.abs(targets))
-        loads = targets[by_load]
-        self._sign, self._last_load = np.sign(loads[-1]), abs(loads[-1])
-        self._series, self._pieces = [], []
+        self._sign = np.sign(targets[0])
+        loads, places = np.unique(np.abs(targets), return_inverse=True)
+        self._last_load, loads = loads[-1], self._sign * loads
+        self._series, self._pieces, self._turns = [], [], False
         self.stable_to, self._unstable_from, self.end = 0.0, np.inf, ""
         values, good, count = self._by_series(loads)
         stable = np.zeros(len(loads), dtype=bool)
@@ -381,8 +380,7 @@ class StablePath:
             self.end = "unstable"
         self._check_others(loads, values, good, found)
         values[~found] = np.nan
-        self.values, self.stable = np.empty_like(values), np.empty_like(stable)
-        self.values[by_load], self.stable[by_load] = values, stable
+        self.values, self.stable = values[places], stable[places]
 
     def value(self, s):
         """Weighted displacement at a load on the stable path; NaN where it does not get there."""
@@ -424,7 +422,10 @@ class StablePath:
             self._series.append((series, abs(loads[count - 1])))
             self._far = point
             self._bracket(abs(loads[count - 1]), point, before)
-            if good[count:].any() or count == len(loads) or self._unstable_from < np.inf:
+            if count == len(loads) or self._unstable_from < np.inf:
+                break
+            if before is None and good[count:].any() and self._elsewhere(loads[np.flatnonzero(good)[-1]]):
+                self._turns = True
                 break
             displacements, factor = self._solve(loads[count - 1], point.displacements)
             if factor is None:
@@ -549,11 +550,10 @@ class StablePath:
 
     def _follow(self, loads, values, good, stable, found):
         """Values at the loads that the series about rest does not serve, as far as the path is stable."""
-        places = np.flatnonzero(~found)
-        if good[places].any() and self.problem.network.unknowns > MOST_UNKNOWNS:
+        if self._turns and self.problem.network.unknowns > MOST_UNKNOWNS:
             return
-        for place in places:
-            if good[place] and self._elsewhere(loads[place]):
+        for place in np.flatnonzero(~found):
+            if self._turns and good[place] and self._elsewhere(loads[place]):
                 return
             values[place] = self._reach(abs(loads[place]))
             found[place] = stable[place] = np.isfinite(values[place])
@@ -653,6 +653,48 @@ class StablePath:
             self.end = "no stable equilibrium found" if unstable == np.inf else "unstable"
         elif len(self._pieces) == MAX_STEPS:
             self.end = "too many steps"
+
+
+class LinearPath:
+    """As `StablePath`, of a network with linear kinematics, whose displacements are in proportion to the load."""
+
+    end = ""
+
+    def __init__(self, problem, weights, targets):
+        self._slope = float(np.tensordot(problem.slope, weights, axes=2))
+        self.values, self.stable = self._slope * targets, np.ones(len(targets), dtype=bool)
+        self.stable_to = np.inf
+
+    def value(self, s):
+        """Weighted displacement at a load."""
+        return self._slope * s
+
+
+def left_out(x, y):
+    """What values differ by from the polynomials through three neighbours on either side.
+
+    Parameters
+    ----------
+    x, y : ndarray of float, shape (n,)
+        Places, ascending or descending, and values.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+        0 where there are fewer neighbours.
+    """
+    result = np.zeros(len(x))
+    if len(x) < 7:
+        return result
+    offsets = np.array([-3, -2, -1, 1, 2, 3])
+    places = np.arange(3, len(x) - 3)
+    nodes, values = x[places[:, None] + offsets], y[places[:, None] + offsets]
+    apart, among = x[places][:, None] - nodes, nodes[:, :, None] - nodes[:, None, :]
+    diagonal = np.arange(6)
+    ratios = np.broadcast_to(apart[:, None, :], among.shape).copy()
+    ratios[:, diagonal, diagonal] = among[:, diagonal, diagonal] = 1.0
+    result[places] = y[places] - ((ratios / among).prod(axis=2) * values).sum(axis=1)
+    return result
 
 
 def smallest_share(network, first, second, factor=None):

@@ -12,7 +12,7 @@ from springtune.geometry import Beam
 from springtune.materials import Material
 from springtune.mesh import MESH_TYPES
 from springtune.network import Network
-from springtune.path import ORDER, Expansion, StablePath, smallest_share, trace
+from springtune.path import ORDER, Expansion, StablePath, left_out, smallest_share, trace
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import COEFFICIENT, uniform
 from springtune.statics import StaticProblem
@@ -202,3 +202,13 @@ def test_series_about_a_loaded_point_meets_that_about_rest(share):
     rest, _ = problem.rest.measure(weights, targets)
     assert near == pytest.approx(rest, rel=1e-9)
     assert local.order == ORDER
+
+
+def test_left_out_is_nothing_for_polynomials_and_shows_an_outlier():
+    x = np.linspace(1.0, 2.0, 30) ** 2
+    y = 1 - x + 0.3 * x**5
+    assert np.abs(left_out(x, y)).max() <= 1e-10
+    y[12] += 1e-3
+    assert left_out(x, y)[12] == pytest.approx(1e-3, rel=1e-6)
+    assert np.abs(left_out(x, y)[20:]).max() <= 1e-10
+    assert not left_out(x[:6], y[:6]).any()

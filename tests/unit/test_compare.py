@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from springtune.compare import best_stiffness, deformation_error, left_out
+from springtune.compare import best_stiffness, deformation_error
 from springtune.geometry import Beam
 from springtune.materials import Material
 from springtune.springs.calibrated import calibrate
@@ -80,16 +80,6 @@ def test_holes_of_a_curve_do_not_spoil_its_best_stiffness():
     displacement[:20] = np.nan
     met = best_stiffness(STIFFNESS, displacement, np.isfinite(displacement), 1.0, lambda k: 1 / k)
     assert met.stiffness == pytest.approx(1.0, rel=1e-9)
-
-
-def test_left_out_is_nothing_for_polynomials_and_shows_an_outlier():
-    x = np.linspace(1.0, 2.0, 30) ** 2
-    y = 1 - x + 0.3 * x**5
-    assert np.abs(left_out(x, y)).max() <= 1e-10
-    y[12] += 1e-3
-    assert left_out(x, y)[12] == pytest.approx(1e-3, rel=1e-6)
-    assert np.abs(left_out(x, y)[20:]).max() <= 1e-10
-    assert not left_out(x[:6], y[:6]).any()
 
 
 def test_calibration_is_the_mean_and_refuses_a_missing_curve():

@@ -13,7 +13,7 @@ from ..boundary import held, measured, weights
 from ..compare import best_stiffness
 from ..mesh import read_mesh
 from ..network import Network
-from ..path import StablePath
+from ..path import LinearPath, StablePath
 from ..springs.lattice import uniform
 from ..statics import StaticProblem
 from . import files, references, store
@@ -40,55 +40,49 @@ def run(tasks, done):
         if not missing:
             continue
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
-        problems = {}
+        results = {}
         for kind in {curve["kind"]: None for curve in missing}:
             problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
-            problems[kind] = problem, measured(mesh, kind)
-        results = {
-            curve["key"]: _trace(
-                *problems[curve["kind"]], curve, references.read(tasks["references"], curve["reference"])
-            )
-            for curve in missing
-        }
+            alike = [curve for curve in missing if curve["kind"] == kind]
+            results |= _trace(problem, measured(mesh, kind), alike, tasks["references"])
         store.add(path, results)
         for result in results.values():
             work.add("curve", len(mesh.points), result["seconds"])
     files.write_json(done, work.summary())
 
 
-def _trace(problem, weights, curve, reference):
-    begin = time.perf_counter()
+def _trace(problem, weights, curves, folder):
+    """Results of the curves of a network by key; those under loads of one sign lie on one path."""
+    results = {}
+    for kinematics, sign in {(curve["kinematics"], np.sign(curve["force"])): None for curve in curves}:
+        begin = time.perf_counter()
+        alike = [curve for curve in curves if (curve["kinematics"], np.sign(curve["force"])) == (kinematics, sign)]
+        loads = [curve["force"] / np.array(curve["stiffnesses"]) for curve in alike]
+        path = (LinearPath if kinematics == "linear" else StablePath)(problem, weights, np.concatenate(loads))
+        parts = np.cumsum([len(each) for each in loads])[:-1]
+        found = zip(alike, np.split(path.values, parts), np.split(path.stable, parts))
+        of_these = {curve["key"]: _result(path, curve, *values, folder) for curve, *values in found}
+        seconds = (time.perf_counter() - begin) / len(alike)
+        results |= {key: result | {"seconds": seconds} for key, result in of_these.items()}
+    return results
+
+
+def _result(path, curve, displacement, stable, folder):
     force, stiffnesses = curve["force"], np.array(curve["stiffnesses"])
-    if curve["kinematics"] == "linear":
-        slope = np.tensordot(problem.slope, weights, axes=2)
-        displacement, stable, message = force / stiffnesses * slope, np.ones(len(stiffnesses), dtype=bool), ""
-
-        def solve(stiffness):
-            return force / stiffness * slope
-
-    else:
-        path = StablePath(problem, weights, force / stiffnesses)
-        displacement, stable, message = path.values, path.stable, _ending(path, force)
-
-        def solve(stiffness):
-            return path.value(force / stiffness)
-
-    best = best_stiffness(stiffnesses, displacement, stable, force * reference.get("displacement", np.nan), solve)
+    reference = force * references.read(folder, curve["reference"]).get("displacement", np.nan)
+    best = best_stiffness(stiffnesses, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
     return {
         "displacement": displacement,
         "stable": stable,
-        "message": message,
+        "message": "" if stable.all() else _ending(path, force),
         "best_stiffness": best.stiffness,
         "best_status": best.status,
         "best_message": best.message,
-        "seconds": time.perf_counter() - begin,
     }
 
 
 def _ending(path, force):
     """Why a curve is not solved throughout."""
-    if path.stable.all():
-        return ""
     reason = path.end or "not followed through its turn"
     return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
 
