@@ -325,7 +325,9 @@ class _Point:
     displacements: np.ndarray
     factor: object
     stable: bool
+    value: float
     error: float
+    converged: bool
 
 
 class StablePath:
@@ -427,10 +429,11 @@ class StablePath:
             if before is None and good[count:].any() and self._elsewhere(loads[np.flatnonzero(good)[-1]]):
                 self._turns = True
                 break
-            displacements, factor = self._solve(loads[count - 1], point.displacements)
-            if factor is None:
+            try:
+                factor = self.problem.network.factorize(point.displacements)
+            except SingularError:
                 break
-            before = displacements
+            displacements = before = point.displacements
             series = Expansion(
                 self.problem.network, self.problem.load, loads[count - 1], displacements, factor, HIGH_ORDER
             )
@@ -470,7 +473,7 @@ class StablePath:
                 break
         better = float(np.tensordot(displacements, self.weights, axes=2))
         error = abs(better - value) / abs(better) if size <= CURVE_TOLERANCE else np.inf
-        return _Point(displacements, factor, stable, error)
+        return _Point(displacements, factor, stable, better, error, size <= 0.01 * CURVE_TOLERANCE)
 
     def _bracket(self, last, point, before):
         """Look at the stability between the point up to which the path is stable and the last of a series."""
@@ -527,8 +530,9 @@ class StablePath:
             s = loads[place]
             series = self._series_of(abs(s))
             guess = series.at(s - series.s)[1]
-            if not self._corrected(s, values[place], guess, self._far.factor, True).error <= CURVE_TOLERANCE:
-                values[place] = self._solved(s, guess)
+            point = self._corrected(s, values[place], guess, self._far.factor, True)
+            if not point.error <= CURVE_TOLERANCE:
+                values[place] = point.value if point.converged else self._solved(s, guess)
                 stable[place] = np.isfinite(values[place])
 
     def _check_others(self, loads, values, good, found):
