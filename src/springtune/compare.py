@@ -134,7 +134,6 @@ def _last_root(solve, reference, softness, unsolved, error):
     return None
 
 
-
 def assured(errors, second):
     """Largest error of each mesh size and all finer ones that were run, on both beams [1].
 

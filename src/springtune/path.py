@@ -606,10 +606,9 @@ class StablePath:
         if not found.converged or network.largest_change(found.displacements - guess) > NEAR:
             return None, None
         try:
-            factor = network.factorize(found.displacements)
+            return found.displacements, found.factor if found.factor.negative_pivots == 0 else None
         except SingularError:
             return found.displacements, None
-        return found.displacements, factor if factor.negative_pivots == 0 else None
 
     def _solved(self, s, guess):
         """Weighted displacement of the stable equilibrium next to a guess; NaN where there is none."""
