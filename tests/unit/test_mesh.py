@@ -6,10 +6,12 @@ import sys
 import meshio
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
+from springtune.cli import main
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
@@ -27,6 +29,7 @@ from springtune.mesh import (
     structured,
     write_mesh,
 )
+from springtune.stages.mesh import make
 
 boxes = {
     "length": st.floats(0.02, 0.3),
@@ -185,6 +188,226 @@ def test_a_mesh_that_does_not_fill_its_beam_is_refused(tmp_path):
     write_mesh(path, Mesh(mesh.points, np.vstack([mesh.triangles, mesh.triangles[:1]])))
     with pytest.raises(MeshError, match="overlap"):
         read_beam_mesh(path, 0.1, 0.02)
+
+
+def save(path, points, cells):
+    """Write cells, a dict of corner indices by number of corners."""
+    blocks = [({3: "triangle", 4: "quad"}[count], corners) for count, corners in cells.items()]
+    meshio.Mesh(np.column_stack([points, np.zeros(len(points))]), blocks).write(path, file_format="vtu")
+    return path
+
+
+def part(mesh, chosen, joint, gap=0.0):
+    """Points and cells of a mesh with points of a joint doubled, the cells of `chosen` on the new ones.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    chosen : callable
+        Whether cells with their middles at points, shape (n, 2), are on the far side of the joint.
+    joint : callable
+        Whether points of the joint are doubled, from their indices.
+    gap : float
+        How far the new ones are off along x [m].
+    """
+    far = {count: chosen(mesh.points[corners].mean(axis=1)) for count, corners in mesh.cells.items()}
+    sides = [np.unique(np.concatenate([corners[far[count] == side].ravel() for count, corners in mesh.cells.items()]))
+             for side in (False, True)]  # fmt: skip
+    shared = np.intersect1d(*sides)
+    shared = shared[joint(shared)]
+    number = np.arange(len(mesh.points))
+    number[shared] = len(mesh.points) + np.arange(len(shared))
+    cells = {count: np.where(far[count][:, None], number[corners], corners) for count, corners in mesh.cells.items()}
+    return np.vstack([mesh.points, mesh.points[shared] + [gap, 0.0]]), cells, shared
+
+
+class TestSlits:
+    """Meshes whose cells cover the box once, by their areas, but are not joined throughout."""
+
+    MESH = MESH_TYPES["right"](0.1, 0.02, 5e-3)
+
+    @pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-12])
+    @pytest.mark.parametrize(
+        ("doubled", "place"),
+        [
+            (lambda y: y < 0.011, "50, 0"),  # from the outline to the middle
+            (lambda y: y > 0.001, "50, 5"),  # all but one point
+            (lambda y: y == 0.01, "50, 10"),  # one point inside
+            (lambda y: y == 0.0, "50, 0"),
+            (lambda y: y >= 0.0, "50, 0"),  # cut in two
+        ],
+    )
+    def test_points_that_are_not_merged(self, tmp_path, gap, doubled, place):
+        mesh = self.MESH
+        points, cells, _ = part(mesh, lambda at: at[:, 0] > 0.05, lambda at: doubled(mesh.points[at, 1]), gap)
+        apart = f", {1e3 * gap:.3g} mm apart" if gap else ""
+        with pytest.raises(MeshError) as error:
+            read_beam_mesh(save(tmp_path / "slit.vtu", points, cells), 0.1, 0.02)
+        text = str(error.value)
+        assert text.startswith(f"{tmp_path / 'slit.vtu'}: two points at ({place}) mm{apart}, do not join their cells")
+        assert text.endswith("; merge duplicate points")
+
+    def test_every_way_in_is_closed(self, tmp_path):
+        points, cells, _ = part(self.MESH, lambda at: at[:, 0] > 0.05, lambda at: self.MESH.points[at, 1] < 0.011)
+        path = save(tmp_path / "slit.vtu", points, cells)
+        with pytest.raises(MeshError, match="merge duplicate points"):  # a study's mesh file
+            make({"length": 0.1, "height": 0.02, "file": str(path), "unit": 1.0})
+        asked = ["predict", "--beam", "100x20", "--mesh", str(path), "--material", "steel"]
+        result = CliRunner().invoke(main, asked)
+        assert result.exit_code == 1 and "merge duplicate points" in result.stderr and result.stdout == ""
+
+    def test_parts_of_different_edges(self, tmp_path):
+        left, right_ = MESH_TYPES["right"](0.05, 0.02, 5e-3), MESH_TYPES["right"](0.05, 0.02, 4e-3)
+        # Both parts have points in the joint's corners; those of the finer one between them hang on the coarser.
+        points = np.vstack([left.points, right_.points + [0.05, 0.0]])
+        number = np.arange(len(points))
+        for y in (0.0, 0.02):
+            ends = np.flatnonzero((points == [0.05, y]).all(axis=1))
+            number[ends] = ends[0]
+        cells = {3: number[np.vstack([left.triangles, right_.triangles + len(left.points)])]}
+        with pytest.raises(
+            MeshError, match=r"at \(50, 5\) mm hangs on the edge from \(50, 8\) mm to \(50, 4\) mm .*split"
+        ):
+            read_beam_mesh(save(tmp_path / "joint.vtu", points, cells), 0.1, 0.02)
+
+    @pytest.mark.parametrize("mesh_type", ["right", "braced"])
+    def test_hanging_point(self, tmp_path, mesh_type):
+        """A T-junction: one square of four has smaller cells."""
+        mesh = MESH_TYPES[mesh_type](0.02, 0.02, 0.01)
+        fine = MESH_TYPES[mesh_type](0.01, 0.01, 0.005)
+        coarse = {n: c[(mesh.points[c].mean(axis=1) > 0.01).any(axis=1)] for n, c in mesh.cells.items()}
+        points = np.vstack([mesh.points, fine.points])
+        _, kept, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+        cells = {n: number.ravel()[np.vstack([c, fine.cells[n] + len(mesh.points)])] for n, c in coarse.items()}
+        with pytest.raises(
+            MeshError, match=r"the point at \((10, 5|5, 10)\) mm hangs on the edge from .*; split the cell"
+        ):
+            read_beam_mesh(save(tmp_path / "hanging.vtu", points[kept], cells), 0.02, 0.02)
+
+    def test_cells_that_touch_in_a_point(self, tmp_path):
+        """A hole of two cells that meet the rest's outline in points."""
+        mesh = self.MESH
+        away = np.isin(mesh.triangles, np.flatnonzero((mesh.points == [0.05, 0.01]).all(axis=1))).any(axis=1)
+        order = np.argsort(mesh.points[mesh.triangles[away]].mean(axis=1).sum(axis=1))
+        opposite = np.flatnonzero(away)[order[[0, -1]]]
+        path = save(tmp_path / "holes.vtu", mesh.points, {3: np.delete(mesh.triangles, opposite, axis=0)})
+        with pytest.raises(
+            MeshError,
+            match="cover 98.75 % of the box .* inside the box with one cell only: 6, the first .*; close the hole",
+        ):
+            read_beam_mesh(path, 0.1, 0.02)
+
+    def test_sheets_on_top_of_each_other(self, tmp_path):
+        mesh, other = self.MESH, MESH_TYPES["alternating"](0.1, 0.02, 5e-3)
+        apart = np.vstack([mesh.triangles, other.triangles + len(mesh.points)])
+        path = save(tmp_path / "two.vtu", np.vstack([mesh.points, other.points]), {3: apart})
+        with pytest.raises(
+            MeshError, match="cover 200 % of the box or overlap: the outline runs .* more than once; give"
+        ):
+            read_beam_mesh(path, 0.1, 0.02)
+        path = save(tmp_path / "one.vtu", mesh.points, {3: np.vstack([mesh.triangles, other.triangles])})
+        with pytest.raises(MeshError, match="cover 200 % .* edges with two cells on the same side: .*; remove one"):
+            read_beam_mesh(path, 0.1, 0.02)
+
+    def test_an_overlap_that_makes_up_for_a_hole(self, tmp_path):
+        mesh = self.MESH
+        places = mesh.points[mesh.triangles].mean(axis=1)
+        lost, doubled = (np.argmin(np.linalg.norm(places - at, axis=1)) for at in ([0.03, 0.01], [0.07, 0.01]))
+        triangles = mesh.triangles.copy()
+        triangles[lost] = triangles[doubled]
+        with pytest.raises(MeshError, match=": edges with two cells on the same side: 3, the first"):
+            read_beam_mesh(save(tmp_path / "shifted.vtu", mesh.points, {3: triangles}), 0.1, 0.02)
+
+    def test_dented_quadrilateral(self, tmp_path):
+        mesh = MESH_TYPES["braced"](0.03, 0.03, 0.01)
+        points = mesh.points.copy()
+        points[(points == [0.01, 0.01]).all(axis=1)] = [0.017, 0.017]  # past the diagonal of the middle one
+        with pytest.raises(
+            MeshError, match="cells with a corner of 180 degrees or more: 1, the first one at .*; split"
+        ):
+            read_beam_mesh(save(tmp_path / "dent.vtu", points, {4: mesh.quads}), 0.03, 0.03)
+
+    def test_triangles_beside_quadrilaterals_and_slivers_are_legal(self, tmp_path):
+        mesh = MESH_TYPES["braced"](0.1, 0.02, 5e-3)
+        half = mesh.points[mesh.quads].mean(axis=1)[:, 0] < 0.05
+        triangles = np.vstack([mesh.quads[half][:, [0, 1, 2]], mesh.quads[half][:, [0, 2, 3]]])
+        points = mesh.points.copy()
+        # Two lines of points close together: triangles 1e-4 as high as long.
+        points[points[:, 0] == 0.02, 0] = 0.015 + 1e-4 * 5e-3
+        found = read_beam_mesh(save(tmp_path / "both.vtu", points, {3: triangles, 4: mesh.quads[~half]}), 0.1, 0.02)
+        assert (len(found.triangles), len(found.quads)) == (80, 40)
+
+    @settings(max_examples=60, deadline=None)
+    @given(
+        mesh_type=st.sampled_from(sorted(MESH_TYPES)),
+        angle=st.floats(0, np.pi),
+        seed=st.integers(0, 2**32 - 1),
+        gap=st.sampled_from([0.0, 1e-12, 1e-9]),
+        **boxes,
+    )
+    def test_any_slit_is_refused(self, tmp_path_factory, mesh_type, angle, seed, gap, length, height, size):
+        """A line through the box, random points of the joint along it doubled: refused; the mesh itself is not."""
+        mesh, path = MESH_TYPES[mesh_type](length, height, size), tmp_path_factory.mktemp("any") / "mesh.vtu"
+        found = read_beam_mesh(save(path, mesh.points, mesh.cells), length, height)
+        assert len(found.edges) == len(mesh.edges)
+        random = np.random.default_rng(seed)
+        normal = np.array([np.cos(angle), np.sin(angle)])
+        level = (random.choice(mesh.points) * [0.98, 0.98] + 0.01 * np.array([length, height])) @ normal
+        share = random.random()
+        points, cells, shared = part(
+            mesh, lambda at: at @ normal > level, lambda at: random.random(len(at)) < share, gap
+        )
+        save(path, points, cells)
+        if not len(shared):
+            read_beam_mesh(path, length, height)
+            return
+        with pytest.raises(MeshError, match=r"two points at .* do not join their cells .*; merge duplicate points"):
+            read_beam_mesh(path, length, height)
+
+    @settings(max_examples=40, deadline=None)
+    @given(mesh_type=st.sampled_from(sorted(set(MESH_TYPES) - {"braced"})), seed=st.integers(0, 2**32 - 1), **boxes)
+    def test_any_hanging_point_is_refused(self, tmp_path_factory, mesh_type, seed, length, height, size):
+        """A point on an edge inside that splits one of its two triangles."""
+        mesh, random = MESH_TYPES[mesh_type](length, height, size), np.random.default_rng(seed)
+        inner = np.flatnonzero(mesh.cells_per_edge == 2)
+        if not len(inner):
+            return
+        a, b = mesh.edges[random.choice(inner)]
+        cell = np.flatnonzero(np.isin(mesh.triangles, (a, b)).sum(axis=1) == 2)[random.integers(2)]
+        corners = mesh.triangles[cell]
+        new, share = len(mesh.points), random.uniform(0.2, 0.8)
+        points = np.vstack([mesh.points, (1 - share) * mesh.points[a] + share * mesh.points[b]])
+        halves = [np.where(corners == end, new, corners) for end in (a, b)]
+        path = tmp_path_factory.mktemp("hanging") / "mesh.vtu"
+        save(path, points, {3: np.vstack([np.delete(mesh.triangles, cell, axis=0), halves])})
+        with pytest.raises(MeshError, match="hangs on the edge from .* split the cell of that edge there"):
+            read_beam_mesh(path, length, height)
+
+
+@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+@pytest.mark.parametrize("box", [(0.2, 0.04, 5e-3), (0.1, 0.005, 5e-3), (0.005, 0.1, 5e-3), (1.0, 1e-3, 1e-3)])
+def test_every_made_mesh_may_come_back_from_a_file(tmp_path, mesh_type, box):
+    mesh = MESH_TYPES[mesh_type](*box)
+    write_mesh(tmp_path / "mesh.vtu", mesh)
+    found = read_beam_mesh(tmp_path / "mesh.vtu", *box[:2])
+    assert len(found.edges) == len(mesh.edges)
+
+
+@pytest.mark.parametrize(
+    ("point", "corner", "message"),
+    [
+        ([np.nan, 0.0, 0.0], 1, "points with coordinates that are no numbers: 1, the first one 1; mend"),
+        ([1.0, np.inf, 0.0], 1, "points with coordinates that are no numbers: 1, the first one 1; mend"),
+        ([1.0, 0.0, 0.0], 7, "a cell has point 7, and points are 0 to 3; renumber"),
+        ([1.0, 0.0, 0.0], -3, "a cell has point -3, and points are 0 to 3; renumber"),
+    ],
+)
+def test_points_that_are_nowhere_are_refused(tmp_path, point, corner, message):
+    points, triangles = SQUARE.copy(), HALVES[0][1].copy()
+    points[1], triangles[0, 1] = point, corner
+    meshio.Mesh(points, [("triangle", triangles)]).write(tmp_path / "mesh.vtu")
+    with pytest.raises(MeshError, match=message):
+        read_beam_mesh(tmp_path / "mesh.vtu", 1.0, 1.0)
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.5])

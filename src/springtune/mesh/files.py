@@ -12,6 +12,9 @@ CELLS = {"triangle": 3, "quad": 4}
 LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
+DIGITS = 1e-6
+"""What coordinates in a file may be off, over the extent of the mesh: formats in text have few digits."""
+
 
 class MeshError(ValueError):
     """A mesh that cannot be used; the message says why and what to do."""
@@ -53,8 +56,8 @@ def read_mesh(path, unit=1.0):
     Raises
     ------
     MeshError
-        If the file cannot be read, has cells other than linear triangles and quadrilaterals or none of these, is not
-        plane, or has cells without area.
+        If the file cannot be read, has cells other than linear triangles and quadrilaterals or none of these, cells of
+        points that it does not have, points that are nowhere or not in one plane, or cells without area.
     """
     import meshio
 
@@ -75,8 +78,17 @@ def read_mesh(path, unit=1.0):
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
     cells = {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
     used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
+    for number in used[[0, -1]]:
+        if not 0 <= number < len(points):
+            raise MeshError(f"{path}: a cell has point {number}, and points are 0 to {len(points) - 1}; renumber them")
     points = points[used]
-    if points.shape[1] > 2 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points[:, :2]):
+    nowhere = ~np.isfinite(points).all(axis=1)
+    if nowhere.any():
+        first = used[nowhere][0]
+        raise MeshError(
+            f"{path}: points with coordinates that are no numbers: {nowhere.sum()}, the first one {first}; mend them"
+        )
+    if points.shape[1] > 2 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points[:, :2], axis=0).max():
         raise MeshError(f"{path}: points leave the plane of x and y; give a plane mesh")
     points = points[:, :2].copy()
     start = 0
@@ -87,7 +99,8 @@ def read_mesh(path, unit=1.0):
         flat = np.abs(areas) <= 1e-12 * np.abs(areas).max()
         if flat.any():
             raise MeshError(
-                f"{path}: {flat.sum()} cells have no area, the first one at {_place(points, corners[flat][0])}"
+                f"{path}: cells with no area: {flat.sum()}, the first one at {_place(points[corners[flat][0]])}; "
+                "remove them"
             )
         clockwise = areas < 0
         corners[clockwise] = corners[clockwise][:, ::-1]
@@ -119,18 +132,91 @@ def read_beam_mesh(path, length, height, unit=1.0):
     box = np.array([length, height])
     points = mesh.points - mesh.points.min(axis=0)
     extent = points.max(axis=0)
-    if np.abs(extent / box - 1).max() > 1e-6:
+    if np.abs(extent / box - 1).max() > DIGITS:
         shown, asked = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
         raise MeshError(f"{path}: extends over {shown} mm, its beam over {asked} mm; correct the unit or the beam")
-    # Formats with few digits: sides shall be straight.
-    near = np.abs(points - extent) <= 1e-6 * extent
-    points = np.where(near, box, np.where(points <= 1e-6 * extent, 0.0, points))
+    # Sides shall be straight.
+    near = np.abs(points - extent) <= DIGITS * extent
+    points = np.where(near, box, np.where(points <= DIGITS * extent, 0.0, points))
     mesh = Mesh(points, mesh.triangles, mesh.quads)
-    if abs(mesh.area / (length * height) - 1) > 1e-6 or mesh.inverted(points) or mesh.cells_per_edge.max() > 2:
-        share = 100 * mesh.area / (length * height)
-        raise MeshError(f"{path}: its cells cover {share:.6g} % of the box or overlap; give a mesh that fills it once")
+    fault = _fault(mesh, box)
+    if fault:
+        raise MeshError(f"{path}: {fault}")
     return mesh
 
 
-def _place(points, corners):
-    return "({:.6g}, {:.6g}) mm".format(*(1e3 * points[corners].mean(axis=0)))
+def _fault(mesh, box):
+    """Why a mesh does not fill a box exactly once, and what to do about it; empty where it does.
+
+    All cells are convex and counter-clockwise, no two lie on the same side of an edge, and the edges that have one cell
+    only make one round of the box. As many cells lie over a point as that round winds about it: one. So there is no
+    slit, hole or overlap, however thin, and there are no parts that meet in a point alone.
+    """
+    points = mesh.points
+    for count, corners in mesh.cells.items():
+        turns = [signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) for i in range(count)]
+        bad = corners[np.min(turns, axis=0) <= 0]
+        if len(bad):
+            shape, remedy = "with a corner of 180 degrees or more", "split them into triangles"
+            if count == 3:
+                shape, remedy = "within rounding of a side of the box", "make them larger or remove them"
+            return f"cells {shape}: {len(bad)}, the first one at {_place(points[bad[0]])}; {remedy}"
+    share = mesh.area / box.prod()
+    lead = f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > DIGITS else ""
+    edges = np.concatenate(
+        [np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2) for corners in mesh.cells.values()]
+    )
+    codes = np.sort(edges @ [len(points), 1])  # one integer per edge and direction
+    again = codes[1:][codes[1:] == codes[:-1]]
+    if len(again):
+        first = _edge(points, np.divmod(again[0], len(points)))
+        return f"{lead}edges with two cells on the same side: {len(again)}, the first one {first}; remove one of them"
+    back = np.setdiff1d(edges @ [1, len(points)], codes, assume_unique=True)
+    outline = np.stack(np.divmod(back, len(points))[::-1], axis=1)
+    ends = points[outline]
+    on_side = [(ends[..., axis] == value).all(axis=1) for axis in range(2) for value in (0.0, box[axis])]
+    inside = ~np.any(on_side, axis=0)
+    if inside.any():
+        return lead + _opening(points, outline[inside])
+    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
+    if len(again) or lead:
+        where = _place(points[again[0] if len(again) else outline[0, 0]])
+        return f"{lead}the outline runs through {where} more than once; give a mesh that fills the box once"
+    return ""
+
+
+def _opening(points, edges):
+    """What is wrong where edges inside a box have one cell only, and what to do about it."""
+    from scipy.spatial import cKDTree  # here, since a good mesh needs none
+
+    count = f"edges inside the box with one cell only: {len(edges)}"
+    small = DIGITS * np.ptp(points, axis=0).max()
+    ends = np.unique(edges)
+    pairs = ends[cKDTree(points[ends]).query_pairs(small, output_type="ndarray")]
+    if len(pairs):
+        one, other = points[pairs[np.argmin(pairs.min(axis=1))]]
+        apart = np.linalg.norm(other - one)
+        apart = f", {1e3 * apart:.3g} mm apart" if apart else ""
+        return f"two points at {_place(one)}{apart}, do not join their cells ({count}); merge duplicate points"
+    start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
+    squares = (along**2).sum(axis=1)
+    for end in ends:
+        to = points[end] - start
+        share = (to * along).sum(axis=1) / squares
+        aside = np.linalg.norm(to - share[:, None] * along, axis=1)
+        hangs = np.flatnonzero((aside <= small) & (share > 0) & (share < 1) & (edges != end).all(axis=1))
+        if len(hangs):
+            edge = _edge(points, edges[hangs[0]])
+            hanging = f"the point at {_place(points[end])} hangs on the edge {edge}"
+            return f"{hanging} ({count}); split the cell of that edge there"
+    return f"{count}, the first one {_edge(points, edges[0])}; close the hole there"
+
+
+def _place(points):
+    """Middle of one or more points, in words."""
+    return "({:.6g}, {:.6g}) mm".format(*(1e3 * points.reshape(-1, 2).mean(axis=0)))
+
+
+def _edge(points, ends):
+    """Both ends of an edge, in words."""
+    return f"from {_place(points[ends[0]])} to {_place(points[ends[1]])}"
