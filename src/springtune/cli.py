@@ -58,21 +58,34 @@ MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 @click.option("--young", help="Young's modulus, such as '210 GPa'.")
 @click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
 def predict(beam, thickness, mesh_type, size, unit, material, young, poisson):
-    """Recommend a definition and its stiffness for one mesh, with the error to expect.
+    """Recommend a definition and its stiffness for one mesh, with its error under three loads.
 
-    Closed forms and one patch test of the mesh: no study, no reference.
+    Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
+    strain; a mesh too large for that has bands from coarser ones.
     """
+    from .predict import SOLVED, extrapolate, particles, references
     from .predict import predict as choices
     from .springs import DefinitionError
 
     try:
-        asked = _asked_beam(beam, thickness), _asked_material(material, young, poisson)
-        mesh, name = _asked_mesh(asked[0], mesh_type, size, unit)
-        found = choices(mesh, *asked)
+        beam, material = _asked_beam(beam, thickness), _asked_material(material, young, poisson)
+        made = _is_made(mesh_type)
+        edge = _asked_size(beam, mesh_type, size) if made else None
+        sizes = ()
+        if made and particles(mesh_type, beam, edge) > SOLVED:
+            about = f"about {particles(mesh_type, beam, edge):.2g} particles"
+            known = references(beam, material)
+            found, sizes = extrapolate(mesh_type, edge, beam, material, known)
+        else:
+            mesh = _asked_mesh(beam, mesh_type, edge, unit)
+            about = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
+            known = references(beam, material)
+            found = choices(mesh, beam, material, known)
     except (click.ClickException, DefinitionError, ValueError) as error:
         click.echo(str(getattr(error, "message", error)), err=True)
         raise SystemExit(1) from None
-    click.echo(_prediction(mesh, name, *asked, found))
+    name = f"{mesh_type} {size}" if made else Path(mesh_type).name
+    click.echo(_prediction(f"{beam.name} mm, {name}: {about}", beam, material, found, known, mesh_type, sizes))
 
 
 def _quantity(option, text, kind):
@@ -120,49 +133,109 @@ def _asked_material(name, young, poisson):
     return Material(name or "material", _quantity("--young", young, "stress"), ratio)
 
 
-def _asked_mesh(beam, mesh_type, size, unit):
-    from .mesh import MESH_TYPES, read_beam_mesh
+def _is_made(mesh_type):
+    """Whether a mesh is of a type, not from a file."""
+    from .mesh import MESH_TYPES
 
-    if mesh_type not in MESH_TYPES:
-        if not Path(mesh_type).is_file():
-            known = ", ".join(MESH_TYPES)
-            raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {known}")
-        scale = _quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
-        return read_beam_mesh(mesh_type, beam.length, beam.height, scale), Path(mesh_type).name
+    if mesh_type not in MESH_TYPES and not Path(mesh_type).is_file():
+        known = ", ".join(MESH_TYPES)
+        raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {known}")
+    return mesh_type in MESH_TYPES
+
+
+def _asked_size(beam, mesh_type, size):
+    """Length of an edge [m] of a mesh that is made; refused before anything is, where it would be too large."""
+    from .predict import MESHED, particles
+
     if size is None:
         raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
     edge = _quantity("--size", size, "length")
     if edge > min(beam.length, beam.height):
         raise ValueError(f"--size: '{size}' is larger than beam '{beam.name}'; give at most its smaller side")
-    return MESH_TYPES[mesh_type](beam.length, beam.height, edge), f"{mesh_type} {size}"
+    count = particles(mesh_type, beam, edge)
+    if count > MESHED:
+        least = 1e3 * edge * (count / MESHED) ** 0.5
+        raise ValueError(
+            f"--size: '{size}' makes some {count:.2g} particles of beam '{beam.name}', more than can be meshed "
+            f"({MESHED:.0e}); give at least {least:.2g} mm"
+        )
+    return edge
 
 
-def _prediction(mesh, name, beam, material, choices):
+def _asked_mesh(beam, mesh_type, edge, unit):
+    from .mesh import MESH_TYPES, read_beam_mesh
+    from .predict import SOLVED_FROM_FILE
+
+    if edge is not None:
+        return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
+    scale = _quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
+    mesh = read_beam_mesh(mesh_type, beam.length, beam.height, scale)
+    if len(mesh.points) > SOLVED_FROM_FILE:
+        raise ValueError(
+            f"--mesh: '{mesh_type}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are solved "
+            "here; give a coarser mesh, or make it a mesh file of a study"
+        )
+    return mesh
+
+
+def _prediction(title, beam, material, choices, known, mesh_type, sizes):
     """Text of a prediction."""
-    rows = [["definition", "springs inside", "on the outline", "traction", "bending", "shear", "nu", "besides springs"]]
+    from .predict import CASES
+
+    modulus = material.young_modulus
+    modulus = f"{modulus / 1e9:g} GPa" if modulus >= 1e9 else f"{modulus / 1e6:g} MPa"
+    rows = [["definition", "springs inside", "on the outline", *CASES, "E", "nu", "besides springs"]]
+    notes = [f"{load}: no reference; {found}" for load, found in known.items() if isinstance(found, str)]
     for choice in choices:
-        stiffness = [
-            f"{value:.5g} N/m" if value == value else "each its own" for value in (choice.inside, choice.outline)
-        ]
-        errors = [f"{100 * value + 0.0:+.1f} %" for value in (choice.traction, choice.bending, choice.shear)]
-        rows.append([choice.definition, *stiffness, *errors, f"{choice.poisson_ratio:.3f}", choice.extra])
-    first = choices[0].definition
-    modulus = (
-        f"E = {material.young_modulus / 1e9:g} GPa"
-        if material.young_modulus >= 1e9
-        else f"E = {material.young_modulus / 1e6:g} MPa"
-    )
+        rows.append([choice.definition])
+        rows[-1] += [_bounds(value, "{:.5g} N/m", "each its own") for value in (choice.inside, choice.outline)]
+        for load in (*CASES, "young_modulus_error"):
+            part = "patch test" if load == "young_modulus_error" else load
+            reasons = [choice.failures[key] for key in (part, "springs", "patch test") if key in choice.failures]
+            missing = "no reference" if not reasons else "unstable" if "unstable" in reasons[0] else "unsolved"
+            rows[-1].append(_bounds(getattr(choice, load), _percent, missing))
+        rows[-1] += [_bounds(choice.poisson_ratio, _three_decimals, "unstable"), choice.extra]
+        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
+    solved = [choice for choice in choices if choice.worst < float("inf")]
+    names = [one.definition for one in solved[:1]], [one.definition for one in solved if not one.energies][:1]
+    first, plain = (name[0] if name else "none" for name in names)
+    estimates = [found.error_estimate for found in known.values() if not isinstance(found, str)]
+    how = "solved on this mesh"
+    if sizes:
+        low, high = 1e3 * min(sizes), 1e3 * max(sizes)
+        how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
     lines = [
-        f"{beam.name} mm, {name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
-        f"{material.name}, {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm",
+        f"{title}; {material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm",
         "",
-        f"recommended: {first}; with springs alone: patch",
+        f"recommended: {first}; with springs alone: {plain}",
         "",
-        _table(rows, left=2, right=(3, 4, 5, 6)),
+        _table(rows, left=2, right=(3, 4, 5, 6, 7)),
         "",
-        "Errors are of the displacement of the loaded side, to expect under each load at small strain.",
+        f"Errors are of the displacement of the loaded side, above zero where too soft: {how},",
+        "with linear kinematics (small strain), against the converged reference of small strain (error estimate "
+        f"{100 * max(estimates, default=0):.1g} %).",
+        "The first row is the best one by its worst error. E, its error, and nu are of a patch test between rollers.",
+        *notes,
     ]
     return "\n".join(lines)
+
+
+def _bounds(value, form, missing):
+    """A number, or the two of a band."""
+    form = form if callable(form) else form.format
+    numbers = value if isinstance(value, tuple) else (value,)
+    texts = [missing if number != number else form(number) for number in numbers]
+    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
+
+
+def _three_decimals(value):
+    return f"{round(value, 3) + 0.0:.3f}"
+
+
+def _percent(value):
+    """An error with two decimals below 10 %, and three digits above."""
+    value = 100 * value
+    return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"
 
 
 @main.command()

@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .factors import SingularError
 from .network import Network
 
 
@@ -58,6 +59,8 @@ class PatchTest:
     def _network(self, name, held, springs):
         network = Network(self.mesh, held, springs.relative, springs.energies, self._first.get(name))
         self._first.setdefault(name, network)
+        if network.unknowns and network.rest_factor.negative_pivots:
+            raise SingularError("the network is unstable at rest")
         return network
 
     @cached_property
@@ -116,6 +119,11 @@ def axial_moduli(mesh, springs):
         E t over the reference stiffness [1].
     poisson_ratio : float
         Mean transverse over mean axial strain, sign changed [1].
+
+    Raises
+    ------
+    SingularError
+        If the network is singular or unstable at rest.
     """
     return PatchTest(mesh).axial(springs)
 
@@ -127,6 +135,11 @@ def shear_modulus(mesh, springs):
     -------
     float
         G t over the reference stiffness [1].
+
+    Raises
+    ------
+    SingularError
+        If the network is singular or unstable at rest.
     """
     return PatchTest(mesh).shear(springs)
 

@@ -189,11 +189,82 @@ class TestPredict:
         result = run("predict", *self.STEEL, "--size", "5 mm")
         assert result.exit_code == 0
         rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
-        assert list(rows) == ["definition", "delingette", "area", "patch", "uniform"]
-        assert "recommended: delingette; with springs alone: patch" in result.stdout
+        names = {"delingette", "area", "patch-area", "patch", "lattice", "van-gelder", "uniform"}
+        assert list(rows)[0] == "definition" and set(rows) == {"definition", *names}
+        assert "recommended: patch-area; with springs alone: patch" in result.stdout
         # sqrt(3)/2 E t / (1 + sqrt(3)/2 a/H), a / H = 1/4
         assert "1.495e+08 N/m" in rows["uniform"]
-        assert "+0.0 %" in rows["patch"]
+        assert "+0.00 %" in rows["patch"]
+        # Traction, bending and shear as in tests/physics/test_predict.py, in order of the worst of them.
+        assert rows["delingette"].split("each its own")[2].split()[:6] == ["-0.09", "%", "-7.77", "%", "-1.36", "%"]
+        worst = [max(abs(float(word)) for word in line.split(" %")[0:3] for word in word.split()[-1:]) for line in
+                 list(rows.values())[1:]]  # fmt: skip
+        assert worst == sorted(worst)
+        for said in (
+            "solved on this mesh",
+            "linear kinematics (small strain)",
+            "converged reference",
+            "error estimate",
+        ):
+            assert said in result.stdout
+
+    def test_what_has_no_reference_says_so(self, monkeypatch):
+        from springtune import predict
+        from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
+
+        def none_in_bending(*arguments, kind):
+            if kind == "bending":
+                raise ReferenceNotConvergedError("its error estimate is 1")
+            return solve_small_strain(*arguments, kind=kind)
+
+        monkeypatch.setattr(predict, "solve_small_strain", none_in_bending)
+        result = run("predict", *self.STEEL, "--size", "5 mm")
+        rows = [line for line in result.stdout.splitlines() if line.startswith("  ")]
+        assert result.exit_code == 0 and all("no reference" in row for row in rows[1:])
+        assert "bending: no reference; its error estimate is 1" in result.stdout.splitlines()
+
+    def test_unstable_networks_are_marked(self, monkeypatch):
+        from springtune.factors import SingularError
+        from springtune.springs import patch
+
+        def unstable(*_):
+            raise SingularError("the network is unstable at rest")
+
+        monkeypatch.setattr(patch, "axial_moduli", unstable)
+        result = run("predict", *self.STEEL, "--size", "5 mm")
+        assert result.exit_code == 0 and "with springs alone: van-gelder" in result.stdout
+        rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
+        assert rows["patch"].split()[-5:] == ["unstable"] * 5
+        assert "patch, patch test: unstable: the network is unstable at rest" in result.stdout
+
+    def test_large_meshes_have_bands(self):
+        result = run("predict", *self.STEEL, "--size", "0.25 mm")
+        assert result.exit_code == 0
+        assert "about 3.7e+04 particles" in result.stdout
+        assert "bands, extrapolated from solutions on 6 structured meshes of 0.4" in result.stdout
+        rows = [line for line in result.stdout.splitlines() if line.startswith("  ")]
+        assert all(row.count(" to ") >= 3 for row in rows[1:])
+
+    def test_large_files_are_refused(self, tmp_path, monkeypatch):
+        from springtune import predict
+        from springtune.mesh import MESH_TYPES, write_mesh
+
+        monkeypatch.setattr(predict, "SOLVED_FROM_FILE", 100)
+        write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
+        result = run("predict", *self.STEEL, "--mesh", tmp_path / "own.vtu")
+        assert result.exit_code == 1
+        assert "own.vtu' has 105 particles, more than the 100 that are solved here; give a coarser" in result.stderr
+
+    @pytest.mark.parametrize("mesh_type", ["structured", "free", "right"])
+    def test_absurd_sizes_are_refused_before_a_mesh_is_made(self, monkeypatch, mesh_type):
+        from springtune import mesh
+
+        monkeypatch.setattr(mesh, "MESH_TYPES", dict.fromkeys(mesh.MESH_TYPES))
+        for size in ("1e-9 mm", "0.005 mm"):
+            result = run("predict", *self.STEEL, "--mesh", mesh_type, "--size", size)
+            assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
+            assert f"--size: '{size}' makes some " in result.stderr
+            assert "of beam '100x20', more than can be meshed (1e+07); give at least 0.01" in result.stderr
 
     def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
         from springtune.mesh import MESH_TYPES, write_mesh
