@@ -154,10 +154,11 @@ def _asked_size(beam, mesh_type, size):
         raise ValueError(f"--size: '{size}' is larger than beam '{beam.name}'; give at most its smaller side")
     count = particles(mesh_type, beam, edge)
     if count > MESHED:
-        least = 1e3 * edge * (count / MESHED) ** 0.5
+        least = 1.1 * edge * (count / MESHED) ** 0.5
+        remedy = f"at least {1e3 * least:.2g} mm" if least < min(beam.length, beam.height) else "a shorter beam"
         raise ValueError(
             f"--size: '{size}' makes some {count:.2g} particles of beam '{beam.name}', more than can be meshed "
-            f"({MESHED:.0e}); give at least {least:.2g} mm"
+            f"({MESHED:.0e}); give {remedy}"
         )
     return edge
 
@@ -189,12 +190,10 @@ def _prediction(title, beam, material, choices, known, mesh_type, sizes):
     for choice in choices:
         rows.append([choice.definition])
         rows[-1] += [_bounds(value, "{:.5g} N/m", "each its own") for value in (choice.inside, choice.outline)]
-        for load in (*CASES, "young_modulus_error"):
-            part = "patch test" if load == "young_modulus_error" else load
-            reasons = [choice.failures[key] for key in (part, "springs", "patch test") if key in choice.failures]
-            missing = "no reference" if not reasons else "unstable" if "unstable" in reasons[0] else "unsolved"
-            rows[-1].append(_bounds(getattr(choice, load), _percent, missing))
-        rows[-1] += [_bounds(choice.poisson_ratio, _three_decimals, "unstable"), choice.extra]
+        rows[-1] += [_bounds(getattr(choice, load), _percent, _missing(choice, load)) for load in CASES]
+        missing = _missing(choice, "patch test")
+        rows[-1] += [_bounds(choice.young_modulus_error, _percent, missing)]
+        rows[-1] += [_bounds(choice.poisson_ratio, _three_decimals, missing), choice.extra]
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     solved = [choice for choice in choices if choice.worst < float("inf")]
     names = [one.definition for one in solved[:1]], [one.definition for one in solved if not one.energies][:1]
@@ -218,6 +217,14 @@ def _prediction(title, beam, material, choices, known, mesh_type, sizes):
         *notes,
     ]
     return "\n".join(lines)
+
+
+def _missing(choice, part):
+    """Word for a number that is not there."""
+    if "springs" in choice.failures:
+        return "refused"
+    reason = choice.failures.get(part) or choice.failures.get("patch test")
+    return "no reference" if reason is None else "unstable" if "unstable" in reason else "unsolved"
 
 
 def _bounds(value, form, missing):

@@ -39,7 +39,7 @@ ALIKE = 1e-5
 """Difference of stiffnesses, relative, below which they are one: they are shown with five digits."""
 
 SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
-"""Particles up to which a mesh is solved, in two seconds; up to which one from a file is, in twenty."""
+"""Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
 
 BANDS_FROM = 10_000
 """Particles of the finest mesh that a band is from."""

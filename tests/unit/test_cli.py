@@ -237,11 +237,24 @@ class TestPredict:
         assert rows["patch"].split()[-5:] == ["unstable"] * 5
         assert "patch, patch test: unstable: the network is unstable at rest" in result.stdout
 
+    def test_definitions_that_refuse_a_mesh_say_so(self, tmp_path):
+        """Rectangles three times as long as high: springs along them would be negative."""
+        from springtune.mesh import Mesh, braced, write_mesh
+
+        square = braced(0.1, 0.06, 5e-3)
+        write_mesh(tmp_path / "flat.vtu", Mesh(square.points * [1.0, 1 / 3], square.triangles, square.quads))
+        result = run("predict", *self.STEEL, "--mesh", tmp_path / "flat.vtu")
+        assert result.exit_code == 0 and "recommended: element-fit; with springs alone: element-fit" in result.stdout
+        rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
+        assert rows["patch"].split()[-5:] == ["refused"] * 5
+        reasons = [line for line in result.stdout.splitlines() if line.startswith("patch, springs: gives ")]
+        assert len(reasons) == 1 and "a negative stiffness; use a mesh with less slender" in reasons[0]
+
     def test_large_meshes_have_bands(self):
         result = run("predict", *self.STEEL, "--size", "0.25 mm")
         assert result.exit_code == 0
         assert "about 3.7e+04 particles" in result.stdout
-        assert "bands, extrapolated from solutions on 6 structured meshes of 0.4" in result.stdout
+        assert "bands, extrapolated from solutions on 6 structured meshes of 0." in result.stdout
         rows = [line for line in result.stdout.splitlines() if line.startswith("  ")]
         assert all(row.count(" to ") >= 3 for row in rows[1:])
 
@@ -260,11 +273,13 @@ class TestPredict:
         from springtune import mesh
 
         monkeypatch.setattr(mesh, "MESH_TYPES", dict.fromkeys(mesh.MESH_TYPES))
-        for size in ("1e-9 mm", "0.005 mm"):
+        for size in ("1e-9 mm", "0.005 mm"):  # 2,000 mm2 over 1e7 particles: .0141 mm, rows of triangles .0152
             result = run("predict", *self.STEEL, "--mesh", mesh_type, "--size", size)
             assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
             assert f"--size: '{size}' makes some " in result.stderr
             assert "of beam '100x20', more than can be meshed (1e+07); give at least 0.01" in result.stderr
+        slender = run("predict", "--beam", "1e9x1", "--material", "steel", "--mesh", mesh_type, "--size", "1 mm")
+        assert "of beam '1e9x1', more than can be meshed (1e+07); give a shorter beam" in slender.stderr
 
     def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
         from springtune.mesh import MESH_TYPES, write_mesh
