@@ -11,7 +11,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.network import Network
 from springtune.predict import CASES, extrapolate, particles, predict, references
 from springtune.reference.small_strain import solve_small_strain
-from springtune.springs import DEFINITIONS, Springs
+from springtune.springs import DEFINITIONS, DefinitionError, Springs
 from springtune.springs.lattice import uniform
 from springtune.stages.solve import Solver
 
@@ -58,6 +58,11 @@ def check(beam, material, mesh):
     choices = predict(mesh, beam, material, known)
     worst = []
     for choice in choices:
+        if "springs" in choice.failures:
+            with pytest.raises(DefinitionError):
+                springs_of(choice, mesh, beam, material)
+            worst.append(np.inf)
+            continue
         springs, errors = springs_of(choice, mesh, beam, material), []
         for load in CASES:
             moved = solved(mesh, beam, springs, load)
@@ -206,22 +211,21 @@ class TestRandomBeams:
 class TestBands:
     @pytest.mark.parametrize("mesh_type", MESH_TYPES)
     def test_hold_on_meshes_that_are_too_large(self, mesh_type):
-        """With a limit a tenth of the real one, three meshes beyond it."""
-        beam, material = Beam("b", 0.1, 0.03, 1e-3), Material("m", 1e9, 0.3)
+        """With a limit an eighth of the real one, two meshes beyond it; wide only where rows are few."""
+        beam, material = Beam("b", 0.08, 0.03, 1e-3), Material("m", 1e9, 0.3)
         known = references(beam, material)
-        for size in (0.83e-3, 0.71e-3, 0.5e-3):
-            assert particles(mesh_type, beam, size) > 3500
-            bands, sizes = extrapolate(mesh_type, size, beam, material, known, most=2500)
+        for size in (0.95e-3, 0.8e-3):
+            mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+            assert len(mesh.points) > 2500
+            bands, sizes = extrapolate(mesh_type, size, beam, material, known, most=1200)
             assert size < min(sizes) and max(sizes) <= 2.3 * min(sizes)
-            found = {
-                one.definition: one for one in predict(MESH_TYPES[mesh_type](0.1, 0.03, size), beam, material, known)
-            }
+            found = {one.definition: one for one in predict(mesh, beam, material, known)}
+            assert {band.definition for band in bands} == set(found)
             for band in bands:
                 for part in (*CASES, "young_modulus_error", "poisson_ratio"):
                     low, high = getattr(band, part)
-                    value = getattr(found[band.definition], part)
-                    assert low - 1e-5 <= value <= high + 1e-5, (band.definition, part)
-                    assert high - low < 0.2
+                    assert low <= getattr(found[band.definition], part) <= high, (band.definition, part)
+                    assert high - low < 0.5
 
     def test_a_slender_beam_has_none(self):
         with pytest.raises(ValueError, match="too large to be solved here, .* less than 4 cells across beam 'b'; make"):
