@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from springtune.boundary import held, weights
+from springtune.factors import SingularError
 from springtune.geometry import Beam
 from springtune.loads import LOADS
 from springtune.materials import Material
@@ -63,7 +64,12 @@ def check(beam, material, mesh):
                 springs_of(choice, mesh, beam, material)
             worst.append(np.inf)
             continue
-        springs, errors = springs_of(choice, mesh, beam, material), []
+        try:
+            springs, errors = springs_of(choice, mesh, beam, material), []
+        except SingularError:  # of the patch test that scales them
+            assert "unstable" in choice.failures["patch test"] and np.isnan(choice.traction)
+            worst.append(np.inf)
+            continue
         for load in CASES:
             moved = solved(mesh, beam, springs, load)
             if moved is None or load in choice.failures:
@@ -224,7 +230,8 @@ class TestBands:
             for band in bands:
                 for part in (*CASES, "young_modulus_error", "poisson_ratio"):
                     low, high = getattr(band, part)
-                    assert low <= getattr(found[band.definition], part) <= high, (band.definition, part)
+                    value = getattr(found[band.definition], part)
+                    assert low - 1e-9 <= value <= high + 1e-9, (band.definition, part)  # rounding
                     assert high - low < 0.5
 
     def test_a_slender_beam_has_none(self):
