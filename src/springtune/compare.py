@@ -165,3 +165,24 @@ def unbeaten(errors, seconds):
     for place in map(tuple, np.argwhere(np.isfinite(errors))):
         best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
     return best
+
+
+def band(values):
+    """Band in which a value is known that scatters from mesh to mesh: twice the largest difference of some meshes'.
+
+    The elongation of a laid strip does not converge in order: a corner of what it lies on catches between two of its
+    particles, and where it lets go depends on the mesh. So no extrapolation holds. Of a few values that scatter alike
+    the next one lies beyond their extremes as often as not, hence twice.
+
+    Parameters
+    ----------
+    values : sequence of float
+        NaN where a mesh has no value.
+
+    Returns
+    -------
+    float
+        Half the width of the band; NaN where fewer than two meshes have a value.
+    """
+    known = [value for value in values if np.isfinite(value)]
+    return 2 * (max(known) - min(known)) if len(known) > 1 else float("nan")

@@ -2,16 +2,17 @@ r"""Contact of bodies that must not penetrate each other, with Coulomb friction 
 
 Two polygons penetrate each other the most where a corner of one lies inside the other. So no corner of any outline may
 lie behind the edge of another body that it is nearest to, in both directions; what is left between the bodies is
-nothing but rounding. A field that a continuum would have, such as even pressure through a plane joint, stays exact
-whatever the two meshes are, since all functions that the meshes can form and that do not penetrate compete.
+nothing but rounding, whichever body is finer. A field that a continuum would have, such as even pressure through a
+plane joint, stays exact whatever the two meshes are, since all functions that the meshes can form and that do not
+penetrate compete.
 
 Each Newton step minimises the quadratic energy of all bodies under these conditions, linearised,
 
 .. math:: \min_d \tfrac{1}{2} d^T K d - r^T d \quad \text{with} \quad g + G d \ge 0,
 
-by its dual: the contact forces are the non-negative least-squares solution of a dense problem with as many unknowns as
-corners come near, each body entering with its own factorised tangent. A body that does not move far is factorised once;
-a rigid one has no unknowns at all, a floor neither.
+by its dual: the contact forces are the minimum over the positive quadrant of a dense problem with as many unknowns as
+corners close or nearly do, each body entering with its own factorised tangent. A body that does not move far is
+factorised once; a rigid one has no unknowns at all, a floor neither.
 """
 
 from contextlib import suppress
@@ -19,8 +20,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
-from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array
+from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array, vstack
 from scipy.sparse.linalg import splu
 
 from .factors import SingularError, factorised
@@ -28,10 +30,10 @@ from .factors import SingularError, factorised
 REACH = 2.0
 """Distance up to which corners and edges are watched, over the mesh size."""
 
-STRAIGHT = 5e-3
+STRAIGHT = 1e-6
 """Sine of the angle below which two edges are taken for one line."""
 
-JOINT = 1e-3
+JOINT = 1e-6
 """Distance from the joint of two edges within which a corner is at it, over the mesh size."""
 
 LONGEST_STEP = 0.5
@@ -48,6 +50,15 @@ SMALLEST_STEP = 1e-4
 SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
 """Resistance to any motion that is tried in turn to make a tangent definite, over its mean diagonal."""
 
+GAP = 1e-9
+"""Depth of a corner behind an edge that counts as none, over the mesh size."""
+
+COMPLIANCE = 1e-11
+"""Of a contact beside the bodies' own at it [1]."""
+
+EXCHANGES = 30
+"""How often a set of closed contacts is exchanged before non-negative least squares look for it."""
+
 CHANGES = 4
 """How often a Newton step may change which contacts it takes for closed."""
 
@@ -55,7 +66,8 @@ FRICTION_TOLERANCE = 1e-6
 """As `TOLERANCE`, where friction lags a step behind."""
 
 SLIP = 1e-3
-"""Way over which friction grows to its limit, over the mesh size."""
+"""Way over which friction grows to its limit, over the mesh size, from where the load step began: what sticks creeps by
+about as much in each."""
 
 
 class ContactError(RuntimeError):
@@ -196,8 +208,10 @@ class _Sides:
         Sine of the turn at the end of each edge, positive where the body has a corner that sticks out.
     corners : ndarray of int
         Particles of the outline.
+    meeting : ndarray of float, shape (n_corners, 2, 2)
+        Normals of the edges that meet at each corner.
     outward : ndarray of float, shape (n_corners, 2)
-        Mean unit normal at each corner.
+        Their mean, a unit vector.
     wraps : ndarray of bool, shape (n_corners,)
         Whether the body is bent around each corner.
     """
@@ -213,7 +227,8 @@ class _Sides:
         self.turn = along[:, 0] * along[after, 1] - along[:, 1] * along[after, 0]
         order = np.argsort(last)
         self.corners = last[order]
-        both = (self.normals + self.normals[after])[order]
+        self.meeting = np.stack([self.normals, self.normals[after]], axis=1)[order]
+        both = self.meeting.sum(axis=1)
         self.outward = both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)
         self.wraps = (self.turn < -STRAIGHT)[order]
 
@@ -265,18 +280,23 @@ class Contact:
         self.floor, self.size, self.friction = floor, size, friction
         self.all = self.bodies + self.obstacles
         self.iterations, self.share = 0, 0.0
-        self.contacts, self.forces = None, np.zeros(0)
+        self.contacts, self.forces, self.drag = None, np.zeros(0), 0.0
         self._anchor = [body.displacements.copy() for body in self.bodies]
 
     # -- geometry ------------------------------------------------------------------------------------------------------
 
     def find(self):
-        """Corners that are near an edge of another body: the nearest one of each other body.
+        """Corners that are near an edge of another body that faces them: the nearest one of each other body.
 
-        Where the edges of the other body turn towards the corner, it has to stay before both of them; where they turn
-        away and it is at their joint, that joint's own conditions hold it.
+        Where the edges of the other body turn towards the corner, it has to stay before the next ones as well; where
+        they turn away and it is at their joint, that joint's own conditions hold it.
+
+        Returns
+        -------
+        Contacts
         """
-        parts = []
+        none = np.zeros(0, dtype=int)
+        parts = [(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
         reach = REACH * self.size
         sides = [_Sides(body) for body in self.all]
         for owner, first in enumerate(self.all):
@@ -294,29 +314,42 @@ class Contact:
                 if target == owner or min(owner, target) >= len(self.bodies):
                     continue
                 met = sides[target]
-                start, along, length, normals, turn = met.start, met.along, met.length, met.normals, met.turn
+                near = _near(met.start, places, reach)
+                shown = np.flatnonzero(_near(places, met.start, reach + met.length))
+                if not near.any() or not len(shown):
+                    continue
                 after, before = second.neighbours
-                offset = places[:, None, :] - start[None, :, :]
+                turn = met.turn
+                start, along, length, normals = (
+                    part[shown] for part in (met.start, met.along, met.length, met.normals)
+                )
+                offset = places[near][:, None, :] - start[None, :, :]
                 gaps = np.einsum("nea,ea->ne", offset, normals)
                 shares = np.einsum("nea,ea->ne", offset, along) / length
-                slack = JOINT * self.size / length
-                low = np.where(turn[before] > STRAIGHT, slack, -1e-9)
-                high = np.where(turn > STRAIGHT, 1 - slack, 1 + 1e-9)
-                beside = (np.abs(gaps) > reach) | (shares < -1e-9) | (shares > 1 + 1e-9)
-                beside |= wraps[:, None] & ((shares < low) | (shares > high))
+                beyond = length * np.maximum(np.maximum(-shares, shares - 1), 0)
                 # Of two edges equally near it is the one that faces the corner.
-                facing = JOINT * self.size * (1 + outward @ normals.T)
-                distance = np.where(beside, np.inf, np.abs(gaps) + facing)
-                nearest = distance.argmin(axis=1)
-                rows = np.flatnonzero(np.isfinite(distance[np.arange(len(corners)), nearest]))
-                edge = nearest[rows]
-                ahead = shares[rows, edge] > 0.5
-                other = np.where(ahead, after[edge], before[edge])
-                inner = np.where(ahead, turn[edge], turn[before[edge]]) < -STRAIGHT
-                rows, edge = np.concatenate([rows, rows[inner]]), np.concatenate([edge, other[inner]])
+                facing = JOINT * self.size * (1 + outward[near] @ normals.T)
+                nearest = (np.hypot(gaps, beyond) + facing).argmin(axis=1)
+                rows, edge = np.flatnonzero(near), shown[nearest]
+                gaps, shares, beyond = (part[np.arange(len(rows)), nearest] for part in (gaps, shares, beyond))
+                at_end, at_start = turn[edge], turn[before[edge]]
+                slack = np.where(wraps[rows], JOINT * self.size / met.length[edge], -1e-9)
+                # Beyond the end of an edge is the next one's place, or nobody's, unless the two make a notch.
+                beside = (shares < np.where(at_start > STRAIGHT, slack, -1e-9)) & (at_start >= -STRAIGHT)
+                beside |= (1 - shares < np.where(at_end > STRAIGHT, slack, -1e-9)) & (at_end >= -STRAIGHT)
+                beside |= np.hypot(gaps, beyond) > reach
+                # The far face of a thin body is turned away from the corner.
+                opposed = np.einsum("na,nba->nb", met.normals[edge], sides[owner].meeting[rows]).min(axis=1) < 0
+                rows, edge = rows[opposed & ~beside], edge[opposed & ~beside]
+                ahead, behind = turn[edge] < -STRAIGHT, turn[before[edge]] < -STRAIGHT
+                rows = np.concatenate([rows, rows[ahead], rows[behind]])
+                edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
+                offset = places[rows] - met.start[edge]
+                shares = np.einsum("na,na->n", offset, met.along[edge]) / met.length[edge]
+                gaps = np.einsum("na,na->n", offset, met.normals[edge])
                 parts.append(
                     (np.full(len(rows), owner), corners[rows], np.full(len(rows), target), second.outline[edge],
-                     shares[rows, edge], normals[edge], gaps[rows, edge])
+                     shares, met.normals[edge], gaps)
                 )  # fmt: skip
         return Contacts(*(np.concatenate(column) for column in zip(*parts)))
 
@@ -325,20 +358,29 @@ class Contact:
         count = len(contacts.corners)
         columns = []
         for number, body in enumerate(self.bodies):
-            full = np.zeros((*body.network.held.shape, count))
-            own = np.flatnonzero(contacts.owners == number)
-            full[contacts.corners[own], :, own] += directions[own]
-            met = np.flatnonzero(contacts.targets == number)
-            for end, weight in ((0, 1 - contacts.shares[met]), (1, contacts.shares[met])):
-                full[contacts.edges[met, end], :, met] -= weight[:, None] * directions[met]
-            columns.append(full.reshape(body.network.held.size, count)[~body.network.held.ravel()])
+            own, met = np.flatnonzero(contacts.owners == number), np.flatnonzero(contacts.targets == number)
+            shares = contacts.shares[met, None]
+            particles = np.concatenate([contacts.corners[own], *contacts.edges[met].T])
+            of = np.concatenate([own, met, met])
+            values = np.concatenate([directions[own], -(1 - shares) * directions[met], -shares * directions[met]])
+            held = body.network.held
+            places = (2 * particles[:, None] + [0, 1], np.repeat(of[:, None], 2, axis=1))
+            full = csc_array((values.ravel(), [place.ravel() for place in places]), shape=(held.size, count))
+            columns.append(full.tocsr()[~held.ravel()].tocsc())
         return columns
 
     @property
     def penetration(self):
-        """Largest depth of a corner behind an edge [m]."""
-        gaps = self.find().gaps
-        return float(max(0.0, -gaps.min())) if len(gaps) else 0.0
+        """Largest depth of a corner inside another body or below the floor [m]."""
+        deepest = 0.0
+        for owner, first in enumerate(self.all):
+            places = first.points[np.unique(first.outline)]
+            if self.floor and owner < len(self.bodies):
+                deepest = max(deepest, -places[:, 1].min())
+            for target, second in enumerate(self.all):
+                if target != owner and min(owner, target) < len(self.bodies):
+                    deepest = max(deepest, _depth(places, *second.points[second.outline].transpose(1, 0, 2)))
+        return float(deepest)
 
     # -- mechanics -----------------------------------------------------------------------------------------------------
 
@@ -389,8 +431,9 @@ class Contact:
                 return None
             known = self._known(contacts)
             more = self._turning(contacts, known)
+            drag = 0.0
             if self.friction:
-                rubbing, stiffening = self._friction(contacts, known)
+                rubbing, stiffening, drag = self._friction(contacts, known)
                 missing = [part + force for part, force in zip(missing, rubbing)]
                 more = [_sum(*pair) for pair in zip(more, stiffening)]
             rows = self._rows(contacts, contacts.normals)
@@ -398,7 +441,7 @@ class Contact:
                 tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
                 found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
                 if found is None:
-                    found = self._opening(tangents, missing, rows, contacts.gaps)
+                    found = self._opening(tangents, missing, rows, contacts.gaps, known > 0)
             except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
                 return None
             steps, forces = found
@@ -408,22 +451,36 @@ class Contact:
             shorter = min(1.0, limit / longest) if longest > 0 else 1.0
             for body, part in zip(self.bodies, steps):
                 body.displacements = body.displacements + body.network.expand(shorter * part)
-            self.contacts, self.forces = contacts, forces
+            self.contacts, self.forces, self.drag = contacts, forces, drag
             near = longest <= limit
             if longest <= (FRICTION_TOLERANCE if self.friction else TOLERANCE) * self.size:
                 return None if any(body.network.inverted(body.displacements) for body in self.bodies) else count
         return None
 
-    def _opening(self, tangents, missing, rows, gaps):
-        """Steps and contact forces from the quadratic minimum under the conditions of all contacts."""
+    def _opening(self, tangents, missing, rows, gaps, likely):
+        """Steps and contact forces from the quadratic minimum under the conditions of all contacts.
+
+        Of many contacts few close: the minimum is found under the conditions of those that are likely to, and of
+        those that it breaks besides.
+        """
         solves = [body.factorise(tangent) for body, tangent in zip(self.bodies, tangents)]
-        free = [solve(part) for solve, part in zip(solves, missing)]
-        answers = [solve(np.ascontiguousarray(row)) if row.shape[1] else row for solve, row in zip(solves, rows)]
-        forces = np.zeros(len(gaps))
-        if len(forces):
-            schur = sum(row.T @ answer for row, answer in zip(rows, answers))
-            forces = _complementary(schur, gaps + sum(row.T @ part for row, part in zip(rows, free)))
-        return [part + answer @ forces for part, answer in zip(free, answers)], forces
+        steps = free = [solve(part) for solve, part in zip(solves, missing)]
+        opening = gaps + sum(row.T @ part for row, part in zip(rows, free))
+        forces, watched = np.zeros(len(gaps)), np.zeros(0, dtype=int)
+        answers = [np.zeros((len(part), 0)) for part in free]
+        more = np.flatnonzero(likely) if likely.any() else np.flatnonzero(opening < 0)[:1]
+        while len(more):
+            watched = np.concatenate([watched, more])
+            for number, (solve, row) in enumerate(zip(solves, rows)):
+                answers[number] = np.hstack([answers[number], solve(row[:, more].toarray())])
+            schur = sum(row[:, watched].T @ answer for row, answer in zip(rows, answers))
+            forces[watched] = _complementary(schur, opening[watched], likely[watched])
+            steps = [part + answer @ forces[watched] for part, answer in zip(free, answers)]
+            left = gaps + sum(row.T @ part for row, part in zip(rows, steps))
+            left[watched] = 0.0
+            # The worst first: most others are then kept, too.
+            more = np.flatnonzero(left < min(-GAP * self.size, 0.5 * left.min()))
+        return steps, forces
 
     def _closed(self, tangents, missing, rows, gaps, closed):
         """Newton step with the contacts that were closed; None where it is not clear which ones are.
@@ -433,10 +490,10 @@ class Contact:
         times over.
         """
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
-        stacked, stiffness = np.vstack(rows), block_diag(tangents)
+        stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)
         sizes = np.cumsum([len(part) for part in missing])
         for _ in range(CHANGES):
-            conditions = csc_array(stacked[:, closed])
+            conditions = stacked[:, np.flatnonzero(closed)]
             # Two corners may close one gap: a hair of compliance lets them share its force.
             corner = -1e-10 / scale * eye_array(conditions.shape[1], format="csc")
             matrix = block_array([[stiffness, -conditions], [-conditions.T, corner]], format="csc")
@@ -447,7 +504,7 @@ class Contact:
             forces[closed] = answer[sizes[-1] :]
             left = gaps + stacked.T @ answer[: sizes[-1]]
             pulls = closed & (forces < -1e-9 * np.abs(forces).max(initial=0.0))
-            closes = ~closed & (left < -1e-9 * self.size)
+            closes = ~closed & (left < -GAP * self.size)
             if not pulls.any() and not closes.any():
                 return np.split(answer[: sizes[-1]], sizes[:-1]), np.maximum(forces, 0.0)
             closed = (closed & ~pulls) | closes
@@ -491,7 +548,7 @@ class Contact:
         return parts
 
     def _friction(self, contacts, forces):
-        """Forces and stiffness of friction, its normal forces those of the step before."""
+        """Forces and stiffness of friction, its normal forces those of the step before; its force at each contact."""
         tangents = np.stack([contacts.normals[:, 1], -contacts.normals[:, 0]], axis=1)
         rows = self._rows(contacts, tangents)
         slip = np.zeros(len(forces))
@@ -503,17 +560,16 @@ class Contact:
         stiffness = self.friction * forces * width**2 / size**3 + 1e-3 * self.friction * forces / size
         parts = []
         for row in rows:
-            sparse = csc_array(row)
-            parts.append((sparse @ diags_array(stiffness) @ sparse.T).tocsc())
-        return [-(row @ pull) for row in rows], parts
+            parts.append((row @ diags_array(stiffness) @ row.T).tocsc())
+        return [-(row @ pull) for row in rows], parts, -pull[:, None] * tangents
 
     def contact_force(self):
-        """Sum of the contact forces on the bodies from obstacles and floor [N], shape (2,)."""
+        """Sum of the contact forces and friction on the bodies from obstacles and floor [N], shape (2,)."""
         bodies = len(self.bodies)
+        forces = self.forces[:, None] * self.contacts.normals + self.drag
         outer = (self.contacts.owners < bodies) & ((self.contacts.targets < 0) | (self.contacts.targets >= bodies))
-        total = (self.forces[outer, None] * self.contacts.normals[outer]).sum(axis=0)
         inner = (self.contacts.owners >= bodies) & (self.contacts.targets >= 0)
-        return total - (self.forces[inner, None] * self.contacts.normals[inner]).sum(axis=0)
+        return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
 
 
 def _sum(first, second):
@@ -521,18 +577,61 @@ def _sum(first, second):
     return second if first is None else first + second
 
 
-def _complementary(schur, opening):
+def _near(others, places, reach):
+    """Which places are within reach of the box around others, shape (n,)."""
+    reach = np.broadcast_to(reach, len(places))[:, None]
+    return ((places >= others.min(axis=0) - reach) & (places <= others.max(axis=0) + reach)).all(axis=1)
+
+
+def _depth(places, start, end):
+    """Largest depth of places inside a polygon of sides from start to end [m]."""
+    places = places[_near(start, places, 0.0)]
+    offset, side = places[:, None, :] - start, end - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Sides to the right of a place, at its height: an odd number of them where it is inside.
+        crossing = start[:, 0] + (places[:, 1:] - start[:, 1]) * side[:, 0] / side[:, 1] > places[:, :1]
+    passing = (start[:, 1] > places[:, 1:]) != (end[:, 1] > places[:, 1:])
+    inside = (passing & crossing).sum(axis=1) % 2 == 1
+    offset = offset[inside]
+    shares = np.clip(np.einsum("nea,ea->ne", offset, side) / np.einsum("ea,ea->e", side, side), 0, 1)
+    return np.linalg.norm(offset - shares[:, :, None] * side, axis=2).min(axis=1).max(initial=0.0)
+
+
+def _complementary(schur, opening, likely):
     """Forces, none negative, that open gaps ``opening + schur @ forces`` to zero or more, and act on closed ones alone.
 
-    The minimum of a quadratic over the positive quadrant, as non-negative least squares. Corners of either body along a
-    plane joint close the same gap twice, so the matrix may be singular: any of its minima will do.
+    The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and Kunisch,
+    SIAM J. Optim. 13:865, 2002), and by non-negative least squares where that cycles. Corners along a plane joint, or
+    several on one edge, are more conditions than there are ways to move: a hair of compliance lets them share a force.
+
+    Parameters
+    ----------
+    schur : ndarray of float, shape (n, n)
+    opening : ndarray of float, shape (n,)
+    likely : ndarray of bool, shape (n,)
+        Contacts that are closed, as a first guess.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
     """
-    if (opening >= 0).all():
-        return np.zeros(len(opening))
     # Corners of stiff and of soft bodies: each in units of its own compliance.
-    unit = 1 / np.sqrt(np.maximum(np.diagonal(schur), 1e-300))
-    values, vectors = np.linalg.eigh(unit[:, None] * (0.5 * (schur + schur.T)) * unit)
-    kept = values > 1e-14 * values[-1]
-    root = np.sqrt(values[kept])
-    basis = vectors[:, kept].T
-    return unit * nnls(root[:, None] * basis, -(basis @ (unit * opening)) / root, maxiter=30 * len(opening))[0]
+    own = np.diagonal(schur)
+    unit = np.where(own > COMPLIANCE * own.max(), 1 / np.sqrt(np.maximum(own, 1e-300)), 0.0)
+    matrix = unit[:, None] * (0.5 * (schur + schur.T)) * unit
+    matrix[np.diag_indices(len(unit))] += COMPLIANCE
+    right = -unit * opening
+    closed = likely | (right > 0)
+    for _ in range(EXCHANGES):
+        forces = np.zeros(len(unit))
+        at = np.flatnonzero(closed)
+        try:
+            forces[at] = cho_solve(cho_factor(matrix[np.ix_(at, at)], lower=True), right[at])
+        except LinAlgError:
+            break
+        new = np.where(closed, forces > 0, matrix @ forces < right)
+        if (new == closed).all():
+            return unit * forces
+        closed = new
+    root = cholesky(matrix, lower=True)
+    return unit * nnls(root.T, solve_triangular(root, right, lower=True), maxiter=30 * len(unit))[0]
