@@ -823,7 +823,10 @@ laying:
 
     def test_strips_and_their_references(self, load):
         study = load(SMALL.replace("grids:", f"{self.LAYING}grids:"))
-        assert len(study.laying) == 2 * 2 * 2 and len(study.laying_references) == 2
+        assert len(study.laying) == 2 * 2 * 2
+        # Each on three meshes, the finest first: their spread says how well the reference is known.
+        sizes = [one.mesh_size for one in study.laying_references if one.friction == 0.3]
+        assert sizes == pytest.approx([1e-3, 1.25e-3, 1.6e-3]) and len(study.laying_references) == 2 * 3
         first = study.laying[0]
         assert (first.definition, first.mesh_size, first.loading, first.friction) == ("uniform", 1e-3, "pressure", 0.0)
         assert first.strip.length == 0.1 and first.trapezoid.area == pytest.approx(585e-6)

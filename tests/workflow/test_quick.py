@@ -55,6 +55,9 @@ def test_block_and_laying_have_the_names_of_the_contract(tree):
     assert abs(strip.area_error.item()) <= 0.01 and strip.penetration.item() <= 1e-3
     assert abs(strip.elongation.item() - strip.reference_elongation.item()) <= 0.01
     assert "rigid" in strip.skipped.item()
+    # No reference without the band in which it is known.
+    assert 0 < strip.reference_elongation_error_estimate.item() < 0.1
+    assert 0 < strip.reference_area_error_estimate.item() < 50e-6
 
 
 def test_stability_has_the_names_of_the_contract(tree):

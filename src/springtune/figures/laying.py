@@ -42,7 +42,9 @@ def _panel(panel, laid, cell):
     reference = 1e3 * np.stack([laid.reference_x.values, laid.reference_y.values], axis=1)
     reference = reference[np.isfinite(reference[:, 0])]
     if len(reference):
-        text = f"finite elements: elongation {100 * float(laid.reference_elongation):.2f} %"
+        known = 100 * float(laid.reference_elongation_error_estimate)
+        known = f" ± {known:.2f}" if np.isfinite(known) else ", error unknown,"
+        text = f"finite elements: elongation {100 * float(laid.reference_elongation):.2f}{known} %"
         panel.fill(*reference.T, facecolor="0.75", edgecolor="none", label=text)
     for number, definition in enumerate(laid.definition.values):
         strips = laid.sel(definition=definition)

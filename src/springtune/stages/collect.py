@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from .. import __version__, dataset
 from ..boundary import FACE_POSITIONS
-from ..compare import deformation_error
+from ..compare import band, deformation_error
 from ..loads import LOADS
 from ..mesh import read_mesh
 from ..reference.field import outline
@@ -339,15 +339,23 @@ def _laying(study, folder, axes):
                 "area_under_strip": result["area"],
                 "area_error": result["area"] / one.trapezoid.area - 1,
                 "elongation": result["elongation"],
-                "contact_force_error": result["force_error"] if not one.friction else np.nan,
+                "contact_force_error": result["force_error"],
             }
         laid.put(values, **labels)
         if "outline" in result:
             laid.put_rows({"strip_x": result["outline"][:, 0], "strip_y": result["outline"][:, 1]}, **labels)
+    references = defaultdict(list)
     for one in study.laying_references:
-        result, labels = results[one], {"loading": one.loading, "friction": one.friction}
+        references[one.loading, one.friction].append(results[one])
+    for (loading, friction), meshes in references.items():
+        result, labels = meshes[0], {"loading": loading, "friction": friction}
         if result["status"] == "solved":
-            laid.put({"reference_area": result["area"], "reference_elongation": result["elongation"]}, **labels)
+            values = {}
+            for name in ("area", "elongation"):
+                values[f"reference_{name}"] = result[name]
+                others = [mesh[name] if mesh["status"] == "solved" else np.nan for mesh in meshes]
+                values[f"reference_{name}_error_estimate"] = band(others)
+            laid.put(values, **labels)
             laid.put_rows({"reference_x": result["outline"][:, 0], "reference_y": result["outline"][:, 1]}, **labels)
     corners = np.array(study.laying[0].trapezoid.corners)
     laid.put({"trapezoid_x": corners[:, 0], "trapezoid_y": corners[:, 1]})

@@ -178,7 +178,8 @@ class TrapezoidConfig(Section):
 class LayingConfig(Section):
     """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
 
-    The reference of a loading and friction is a strip of linear triangles on a mesh of its own.
+    The reference of a loading and friction is a strip of linear triangles on a mesh of its own, and two coarser ones
+    that tell the band in which it is known.
     """
 
     strip: BeamName = Field(description="Beam that is the strip.")
@@ -190,7 +191,7 @@ class LayingConfig(Section):
     )
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
     reference_size: Length = Field(
-        "1 mm", validate_default=True, description="Length of an edge of the reference's mesh."
+        "1 mm", validate_default=True, description="Length of an edge of the reference's finest mesh."
     )
     loading: Annotated[list[Loading], OneOrMore()] = Field(
         "pressure",

@@ -3,7 +3,7 @@
 from itertools import product
 
 from ..geometry import Beam, Strip, Trapezoid
-from ..loads import LOADINGS, LOADS
+from ..loads import LOADINGS, LOADS, REFERENCE_SIZES
 from ..materials import Material
 from ..mesh import MESH_TYPES
 from ..schemes import AXES, CURVE_COUNTS, EXPERIMENTS, ONCE, RIVALS, SOLVERS, method_names
@@ -176,8 +176,9 @@ def _laying(config, materials):
         for loading, friction in labels
     ]
     references = [
-        Laying(**parts, definition="delingette", mesh_size=asked.reference_size, loading=loading, friction=friction)
+        Laying(**parts, definition="delingette", mesh_size=size, loading=loading, friction=friction)
         for loading, friction in labels
+        for size in (ratio * asked.reference_size for ratio in REFERENCE_SIZES)
     ]
     return tuple(strips), tuple(references)
 
