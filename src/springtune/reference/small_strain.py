@@ -23,8 +23,8 @@ from functools import cached_property, lru_cache
 from math import ceil, log
 
 import numpy as np
-from scipy.sparse import block_array, coo_array, kron
-from skfem import Basis, BilinearForm, ElementLinePp, LinearForm, MeshLine
+from numpy.polynomial.legendre import legvander
+from scipy.sparse import block_array, coo_array, csr_array, diags_array, kron
 
 from ..factors import factorised
 from ..geometry import Beam
@@ -43,9 +43,21 @@ SHRINKAGE = 0.2
 #: Largest ratio of neighbouring elements away from the corners, where the solution is smooth.
 GROWTH = 3.0
 
-#: Round-off of a displacement, relative, is below this times (1 + aspect ratio squared), its fourth power in bending:
-#: measured with nu = 0, where every level contains the exact answer, and by levels far beyond convergence.
-ROUND_OFF = 5e-11
+#: Extended precision, in which elements and residuals are evaluated: 64 bits of mantissa on x86, 53 where a platform
+#: has no more; estimates of rounding follow.
+EXTENDED = np.longdouble
+
+#: Relative rounding of a displacement from which on a solution is not refined any more.
+REFINED = 1e-13
+
+#: Most corrections of a solution.
+CORRECTIONS = 40
+
+#: Error of a displacement from the twelve digits of a unit problem's aspect ratio, at most its third power, relative.
+SHARED = 2e-12
+
+#: What is added to the diagonal of a matrix before it is factorised, relative.
+SHIFT = 1e-15
 
 #: Number of points of the field that is handed out, about.
 FIELD_POINTS = 3000
@@ -196,28 +208,32 @@ def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-
 
 def _converge(aspect_ratio, nu, kind, tolerance):
     """First level whose error estimate meets the tolerance, and the estimate."""
-    length = 2 * aspect_ratio  # in half heights
-    round_off = ROUND_OFF * (1 + aspect_ratio ** (4 if kind == "bending" else 2))
     values, middle = [], 0.0
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
-        level = UnitLevel(length, nu, degree, kind)
+        level = UnitLevel(2 * aspect_ratio, nu, degree, kind)  # in half heights
+        where = f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative"
+        at = f"at level {degree} ({level.unknowns} unknowns)"
+        if not level.round_off <= tolerance:
+            raise ReferenceNotConvergedError(
+                f"{where} rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}; such slender "
+                "shapes are for beam theory"
+            )
         values.append(level.displacement)
         middle, middle_before = level.measured, middle
         if len(values) < 3:
             continue
         before, last = np.abs(np.diff(values[-3:])) / level.displacement
         # The middle of a face is no energy: its own step counts, too.
-        estimate = float(max(last, abs(middle - middle_before) / middle, round_off))
-        if estimate <= tolerance and (last <= before / 2 or before <= round_off):
+        estimate = float(max(last, abs(middle - middle_before) / middle) + level.round_off + SHARED)
+        if estimate <= tolerance and (last <= before / 2 or before <= level.round_off):
             return level, estimate
     raise ReferenceNotConvergedError(
-        f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative error estimate "
-        f"{estimate:.1e} at level {degree} ({level.unknowns} unknowns), the last one, the tolerance is {tolerance:.1e}"
+        f"{where} error estimate {estimate:.1e} {at}, the last one, the tolerance is {tolerance:.1e}"
     )
 
 
 class UnitLevel:
-    """Half of a beam of height 2 with E = 1 under traction 1, solved on one level.
+    r"""Half of a beam of height 2 with E = 1 under traction 1, solved on one level.
 
     Parameters
     ----------
@@ -236,6 +252,8 @@ class UnitLevel:
         Mean displacement of the loaded side along the force [1].
     measured : float
         The displacement of the load: as `displacement`, of a face that of its middle.
+    round_off : float
+        Bound on the relative rounding error of both [1].
     unknowns : int
         Number of unknowns.
 
@@ -244,17 +262,26 @@ class UnitLevel:
     On a grid of rectangles the basis is the products of one along x and one along y, and the matrices in the plane are
     Kronecker products of those on the two lines: milliseconds, for any degree. Each side is held as a whole, so the
     unknowns of a component are products of those on the lines, too.
+
+    In double precision a slender cantilever loses digits with the fourth power of its aspect ratio. The solution is
+    therefore refined (Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 12): with the residual
+    :math:`r = l - A u` in extended precision and :math:`d` the correction by the double-precision factor of
+    :math:`A`, the energy is
+
+    .. math:: l^T A^{-1} l = l^T u + u^T r + r^T A^{-1} r,
+
+    of which :math:`r^T A^{-1} r \approx r^T d` is left out. What remains is that matrix and residual are rounded
+    themselves: by no more than a count of operations times the unit round-off times :math:`|A| |u|` (Higham, section
+    3.1), hence in the displacement by :math:`|u|^T |A| |u|` times that. Both are computed and are `round_off`.
     """
 
     def __init__(self, length, nu, degree, kind="axial"):
         self._grid = grid = _grid(length, degree, kind)
-        solution = grid.solve(nu)
-        self.displacement = float(grid.load @ solution) / (length / 2 if kind in ("shear", "face") else 1.0)
+        solution, energy, measured, self.round_off = grid.solve(nu)
+        self.displacement = energy / (length / 2 if kind in ("shear", "face") else 1.0)
         self.unknowns = len(solution)
-        self._coefficients = grid.expand(solution)
-        self.measured = self.displacement
-        if kind == "face":
-            self.measured = float(self.displacements(np.array([length / 2]), np.array([1.0]))[0, 0, 1])
+        self._coefficients = grid.fields(solution)
+        self.measured = self.displacement if measured is None else measured
 
     def displacements(self, x, y):
         """Displacements on the grid of the coordinates x (0 to length) and y (-1 to 1), shape (n_x, n_y, 2)."""
@@ -314,8 +341,8 @@ class _Grid:
         self._shear = block_array([[shear[0], turning], [turning.T, shear[1]]], format="csc")
 
         (x_1, y_1), (x_2, y_2) = first, second
-        self.load = np.zeros(len(x_1) * len(y_1) + len(x_2) * len(y_2))
         self._split = split = len(x_1) * len(y_1)
+        self.load = np.zeros(split + len(x_2) * len(y_2), EXTENDED)
         if kind == "axial":
             self.load[:split] = np.kron(x_1 == x.last, y.integrals[y_1])
         elif kind == "bending":
@@ -324,20 +351,68 @@ class _Grid:
             self.load[:split] = np.kron(x.integrals[x_1], y_1 == y.last)
         else:
             self.load[split:] = np.kron(x.integrals[x_2], y_2 == y.last)
+            self.middle = np.zeros(len(self.load))
+            self.middle[split:] = np.kron(x_2 == x.last, y_2 == y.last)
 
     def solve(self, nu):
-        """Unknowns for a Poisson's ratio."""
-        direct, shear = 1 / (1 - nu**2), 1 / (2 * (1 + nu))
-        matrix = direct * (self._direct + nu * self._lateral) + shear * self._shear
-        return factorised(matrix).solve(self.load)
+        """Unknowns for a Poisson's ratio, energy, displacement of a face's middle or None, relative rounding error."""
+        one = EXTENDED(1)
+        direct, shear = one / (1 - one * nu * nu), one / (2 * (1 + one * nu))
+        matrix = float(direct) * (self._direct + nu * self._lateral) + float(shear) * self._shear
+        # Rounding must not make the factor of a slender beam an indefinite one.
+        factor, load = factorised(matrix + SHIFT * diags_array(matrix.diagonal())), self.load
+        solution = factor.solve(load.astype(float)).astype(EXTENDED)
+        # Roundings of a term: entries, products along x and y there and back, moduli, sums and the load.
+        unit = (8 * self._x.degree + 30) * float(np.finfo(EXTENDED).eps)
+        size, direction, before, norm, softest = load @ solution, 0.0, np.inf, 0.0, 1.0
+        for _ in range(CORRECTIONS):
+            forces, work = self._forces(solution, direct, nu, shear)
+            residual = load - forces
+            correction = factor.solve(residual.astype(float))
+            gain = residual @ correction
+            lacking = 2 * abs(float(gain / size / softest))
+            rounding = float(unit * work / size)
+            if not lacking > max(REFINED, rounding):
+                break
+            turn = gain / before
+            direction, norm, before = correction + turn * direction, gain + turn**2 * norm, gain
+            curvature = direction @ self._forces(direction, direct, nu, shear)[0]
+            solution, softest = solution + gain / curvature * direction, min(softest, curvature / norm)
+        round_off = rounding + lacking + 2 * np.finfo(float).eps
+        energy, refined = float(load @ solution + solution @ residual), (solution + correction).astype(float)
+        if self._kind != "face":
+            return refined, energy, None, round_off
+        # Not the energy: its error is the rounded forces' work on the displacements under a unit force there.
+        measured = float(self.middle @ refined)
+        _, work = self._forces(solution, direct, nu, shear, factor.solve(self.middle).astype(EXTENDED))
+        return refined, energy, measured, max(round_off, float(unit * work / measured))
 
-    def expand(self, solution):
+    def _forces(self, solution, direct, nu, shear, other=None):
+        """Inner forces in extended precision, and the work that stresses do on the terms of strains, without signs.
+
+        Strains come first, then stresses, then forces, none by the matrix: what cancels are the displacements of a
+        slender beam at large, not its forces. The work is that on the strains of other unknowns, if given.
+        """
+        u, v = self.fields(solution)
+        (x, x_slope), (y, y_slope) = self._x.series, self._y.series
+        weights = np.multiply.outer(self._x.weights, self._y.weights)
+        xx, yy, xy = x_slope @ u @ y.T, x @ v @ y_slope.T, x @ u @ y_slope.T + x_slope @ v @ y.T
+        stresses = direct * (xx + nu * yy), direct * (yy + nu * xx), shear * xy
+        of_x, of_y, turned = (weights * stress for stress in stresses)
+        forces = x_slope.T @ of_x @ y + x.T @ turned @ y_slope, x.T @ of_y @ y_slope + x_slope.T @ turned @ y
+        u, v = (np.abs(part) for part in (self.fields(other) if other is not None else (u, v)))
+        x, x_slope, y, y_slope = (abs(part) for part in (x, x_slope, y, y_slope))
+        terms = x_slope @ u @ y.T, x @ v @ y_slope.T, x @ u @ y_slope.T + x_slope @ v @ y.T
+        sizes = direct * (np.abs(xx) + nu * np.abs(yy)), direct * (np.abs(yy) + nu * np.abs(xx)), shear * np.abs(xy)
+        work = sum((weights * size * term).sum() for size, term in zip(sizes, terms))
+        return np.concatenate([part[np.ix_(*ends)].ravel() for part, ends in zip(forces, self._unknowns)]), work
+
+    def fields(self, solution):
         """Coefficients of all products of polynomials, shape (2, n along x, n along y)."""
-        coefficients = np.zeros((2, len(self._x.all), len(self._y.all)))
-        parts = solution[: self._split], solution[self._split :]
-        for full, (along, across), part in zip(coefficients, self._unknowns, parts):
-            full[np.ix_(along, across)] = part.reshape(len(along), -1)
-        return coefficients
+        fields = np.zeros((2, len(self._x.all), len(self._y.all)), solution.dtype)
+        for field, ends, part in zip(fields, self._unknowns, (solution[: self._split], solution[self._split :])):
+            field[np.ix_(*ends)] = part.reshape(len(ends[0]), -1)
+        return fields
 
     def values(self, x, y):
         """Signs of the two displacements on a grid of coordinates, and what takes coefficients there along x and y."""
@@ -363,49 +438,55 @@ class _Grid:
 
 
 class _Line:
-    """Polynomials of one degree on the elements of a line, and their matrices.
+    r"""Polynomials of one degree on the elements of a line, and their matrices, in extended precision.
 
-    `mass`, `slope` and `mixed` hold the integrals of v w, v' w' and v' w (v: row, w: column), `integrals` those of v.
+    Of each element those of its two ends and the integrals of Legendre polynomials (Szabo and Babuska, Finite Element
+    Analysis, 1991, section 3.1): :math:`\sqrt{(2k - 1)/2} \int_{-1}^{\xi} P_{k-1}`, k = 2 to the degree. `mass`,
+    `slope` and `mixed` hold the integrals of v w, v' w' and v' w (v: row, w: column), `integrals` those of v.
     """
 
     def __init__(self, points, degree):
         self.points, self.degree = points, degree
-        basis = self._basis()
-        self.mass, self.slope, self.mixed = (form.assemble(basis).toarray() for form in (_mass, _slope, _mixed))
-        self.integrals = _integral.assemble(basis)
-        self.all = np.arange(basis.N)
-        # MeshLine numbers vertices as they are given.
-        self.first, self.last = basis.nodal_dofs[0, [0, -1]]
-
-    def _basis(self):
-        return Basis(MeshLine(self.points), ElementLinePp(self.degree), intorder=2 * self.degree)
+        count, size = len(points) - 1, degree + 1
+        # Element after element: its first end, its inner polynomials; the last end is the next one's first.
+        self._numbers = degree * np.arange(count)[:, None] + np.array([0, degree, *range(1, degree)])
+        self.all = np.arange(count * degree + 1)
+        self.first, self.last = self.all[0], self.all[-1]
+        # Of values and slopes, on an element from -1 to 1, the coefficients of Legendre polynomials.
+        self._value, slope = np.zeros((2, size, size), EXTENDED)
+        self._value[:2, :2] = [[0.5, -0.5], [0.5, 0.5]]
+        slope[:2, 0] = [-0.5, 0.5]
+        for k in range(2, size):
+            norm = np.sqrt(EXTENDED(2 * k - 1) / 2)
+            self._value[k, [k, k - 2]] = norm / (2 * k - 1), -norm / (2 * k - 1)
+            slope[k, k - 1] = norm
+        half = np.diff(points.astype(EXTENDED)) / 2
+        # The same of the whole line, element after element, and the integrals of the polynomials' squares.
+        terms = np.repeat(np.arange(count * size).reshape(count, 1, size), size, axis=1).ravel()
+        numbers = np.repeat(self._numbers, size)
+        ones = np.ones_like(half)
+        self.series = value, slope = [
+            csr_array((np.multiply.outer(by, of).ravel(), (terms, numbers)), shape=(count * size, len(self.all)))
+            for by, of in ((ones, self._value), (1 / half, slope))
+        ]
+        self.weights = np.multiply.outer(half, 2 / (2 * np.arange(size, dtype=EXTENDED) + 1)).ravel()
+        weighted = [self.weights[:, None] * of.toarray() for of in (value, slope)]
+        self.mass, self.slope, self.mixed = (
+            np.asarray(of.T @ by, float)
+            for of, by in ((value, weighted[0]), (slope, weighted[1]), (slope, weighted[0]))
+        )
+        self.integrals = value.T @ (self.weights * (np.arange(count * size) % size == 0))
 
     def values(self, points):
         """Matrix that takes coefficients to values at points of the line."""
-        basis = self._basis()
-        # An ElementLinePp hands out its last values again when asked about as many other points: use a fresh one.
-        basis.elem = ElementLinePp(self.degree)
-        return basis.probes(points[None, :])
-
-
-@BilinearForm
-def _mass(u, v, _):
-    return u * v
-
-
-@BilinearForm
-def _slope(u, v, _):
-    return u.grad[0] * v.grad[0]
-
-
-@BilinearForm
-def _mixed(u, v, _):
-    return u * v.grad[0]
-
-
-@LinearForm
-def _integral(v, _):
-    return v
+        element = np.clip(np.searchsorted(self.points, points, side="right") - 1, 0, len(self.points) - 2)
+        start, end = self.points[element], self.points[element + 1]
+        local = ((points - start) - (end - points)) / (end - start)
+        found = np.zeros((len(points), len(self.all)))
+        found[np.arange(len(points))[:, None], self._numbers[element]] = legvander(
+            local, self.degree
+        ) @ self._value.T.astype(float)
+        return found
 
 
 def _graded(length, reach, layers):
