@@ -11,7 +11,7 @@ from .schemes import BEHAVIOURS
 STATUS = ("not_requested", "solved", "linear_only", "not_converged", "unstable", "failed")
 """Meanings of the flags of `status`; a flag's value is its place here."""
 
-FLAGS = {"status": STATUS, "behaviour": BEHAVIOURS}
+FLAGS = {"status": STATUS, "behaviour": BEHAVIOURS, "applies": ("no", "yes")}
 """Meanings of flags by the last word of a variable's name."""
 
 DIMENSIONS = {
@@ -69,7 +69,12 @@ ROOT_VARIABLES = {
     "field_error": (SCENE, "1", "difference of the whole displacement fields in L2, over the reference", np.nan),
     "stiffness": (SCENE, "N/m", "uniform spring stiffness", np.nan),
     "status": (SCENE, "1", "what became of the scene", 0),
-    "message": (SCENE, "1", "why the scene is not solved", ""),
+    "message": (
+        SCENE,
+        "1",
+        "why the scene is not solved, or what there is against its reference",
+        "",
+    ),
     "iterations": (SCENE, "1", "Newton steps", np.nan),
     "residual": (SCENE, "1", "out-of-balance force over the load", np.nan),
     "load_share": (SCENE, "1", "largest share of the load with a good equilibrium, nonlinear", np.nan),
@@ -97,6 +102,15 @@ ROOT_VARIABLES = {
         np.nan,
     ),
     "reference_error_estimate": (REFERENCE, "1", "estimated relative error of the reference", np.nan),
+    "reference_message": (REFERENCE, "1", "why there is no reference, or none for nonlinear kinematics", ""),
+    "reference_rotation": (REFERENCE, "rad", "rotation that 95 % of the reference does not exceed", np.nan),
+    "reference_strain": (REFERENCE, "1", "principal strain that 95 % of the reference does not exceed", np.nan),
+    "reference_applies": (
+        (*REFERENCE, "kinematics"),
+        "1",
+        "whether small strain applies to networks of these kinematics, by rotation and strain",
+        -1,
+    ),
     "reference_seconds": (REFERENCE, "s", "time to solve the reference, shared by all loads", np.nan),
     "particles": (MESH, "1", "number of particles", np.nan),
     "springs": (MESH, "1", "number of springs", np.nan),

@@ -31,6 +31,7 @@ from ..geometry import Beam
 from ..loads import KINDS
 from ..materials import Material
 from .field import interpolate
+from .limits import rotation_and_strain
 from .unit import unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
@@ -84,6 +85,8 @@ class ReferenceSolution:
         Coordinates of a grid on which the field is given [m]; closer to each other near the outline.
     displacements : ndarray of float, shape (n_x, n_y, 2)
         Displacement there [m].
+    rotation, strain : float
+        Rotation [rad] and strain [1] by which the solution is judged, see `springtune.reference.limits`.
     unknowns : int
         Number of unknowns of the finest level, of the half that is solved.
     """
@@ -94,11 +97,14 @@ class ReferenceSolution:
     x: np.ndarray
     y: np.ndarray
     displacements: np.ndarray
+    rotation: float
+    strain: float
     unknowns: int
 
     def scaled(self, factor: float, length: float = 1.0) -> "ReferenceSolution":
         """The solution with displacements times `factor` on a beam of sizes times `length`; small strain is linear."""
         names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
+        names |= {"rotation": abs(factor) / length, "strain": abs(factor) / length}
         return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -195,6 +201,7 @@ def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-
     """
     level, estimate = _converge(aspect_ratio, nu, kind, tolerance)
     x, y, field = level.field()
+    rotation, strain = rotation_and_strain(x, y, field)
     return ReferenceSolution(
         displacement=level.measured,
         mean_displacement=level.displacement,
@@ -202,6 +209,8 @@ def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-
         x=x,
         y=y + 1.0,
         displacements=field,
+        rotation=rotation,
+        strain=strain,
         unknowns=level.unknowns,
     )
 

@@ -18,6 +18,7 @@ from ..compare import band, deformation_error
 from ..loads import LOADS
 from ..mesh import read_mesh
 from ..reference.field import outline
+from ..reference.limits import objection
 from ..springs.lattice import predicted_stiffness
 from ..study import load_study
 from . import bundles, files, references, store, tasks
@@ -71,11 +72,11 @@ def run(config, folder, output):
     axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
     root = _Filler(dataset.empty(axes, dataset.ROOT_VARIABLES))
     _meshes(study, folder, root)
-    displacements = _references(study, folder, root)
+    displacements, objections = _references(study, folder, root)
     pressed = any(LOADS[scene.load].kind == "face" for scene in study.scenes)
     block = _block(study, folder, axes) if pressed else None
     fields = _fields(study, folder, axes) if "deformed" in study.outputs else None
-    _scenes(study, folder, root, block, fields)
+    _scenes(study, folder, root, block, fields, objections)
     for material in {scene.material for scene in study.scenes}:
         values = {
             "material_young_modulus": material.young_modulus,
@@ -92,7 +93,7 @@ def run(config, folder, output):
     )
     groups = {"/": data}
     if study.curves:
-        groups["/sensitivity"] = _sensitivity(study, folder, displacements, axes)
+        groups["/sensitivity"] = _sensitivity(study, folder, displacements, objections, axes)
     if study.moduli:
         groups["/moduli"] = _moduli(study, folder, axes)
     if pressed:
@@ -149,19 +150,30 @@ def _meshes(study, folder, root):
 
 
 def _references(study, folder, root):
-    """Displacement of each reference by (beam, material, load)."""
-    displacements = {}
+    """Displacement of each reference by (beam, material, load), and by these and kinematics objections to it."""
+    displacements, objections = {}, {}
     for asked in study.references:
         result = _reference(folder, asked)
         labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
-        root.put({"force": asked.force, "reference_seconds": result["seconds"]}, **labels)
-        if "displacement" not in result:
-            continue
-        displacements[tuple(labels.values())] = displacement = asked.force * result["displacement"]
-        root.put(
-            {"reference_displacement": displacement, "reference_error_estimate": result["error_estimate"]}, **labels
-        )
-    return displacements
+        place = tuple(labels.values())
+        for kinematics in study.axes["kinematics"]:
+            objections[*place, kinematics] = found = objection(result, asked.force, kinematics)
+            root.put({"reference_applies": not found}, kinematics=kinematics, **labels)
+        values = {
+            "force": asked.force,
+            "reference_seconds": result["seconds"],
+            "reference_message": objection(result, asked.force, "nonlinear"),
+        }
+        if "displacement" in result:
+            displacements[place] = asked.force * result["displacement"]
+            values |= {
+                "reference_displacement": displacements[place],
+                "reference_error_estimate": result["error_estimate"],
+                "reference_rotation": abs(asked.force) * result["rotation"],
+                "reference_strain": abs(asked.force) * result["strain"],
+            }
+        root.put(values, **labels)
+    return displacements, objections
 
 
 def _reference(folder, asked, fields=()):
@@ -169,7 +181,7 @@ def _reference(folder, asked, fields=()):
     return references.read(folder / "references", reference, fields)
 
 
-def _scenes(study, folder, root, block, fields):
+def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
     calibration = _calibration(folder)
     arrays = ["face_profile"] * (block is not None) + ["displacements"] * (fields is not None)
@@ -180,6 +192,9 @@ def _scenes(study, folder, root, block, fields):
             result = results[name]
             values = {"status": dataset.STATUS.index(result["status"]), "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
+            why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]
+            if why and result["status"] in ("solved", "unstable"):
+                values["message"] = "; ".join(filter(None, (values.get("message"), why)))
             labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
             labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
             root.put(values, **labels)
@@ -209,7 +224,7 @@ def _printed(study, root):
             continue  # a cell that this study does not ask for
 
 
-def _sensitivity(study, folder, displacements, axes):
+def _sensitivity(study, folder, displacements, objections, axes):
     curves = _Filler(dataset.empty(axes, dataset.SENSITIVITY_VARIABLES))
     for mesh, members in _by_mesh(study.curves).items():
         names = [tasks.curve_key(study, curve) for curve in members]
@@ -217,7 +232,10 @@ def _sensitivity(study, folder, displacements, axes):
         for curve, name in zip(members, names):
             result, stiffness = results[name], np.array(tasks.stiffnesses(study, curve))
             displacement = result["displacement"]
-            reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
+            labels = mesh.beam.name, curve.material.name, curve.load
+            reference = displacements.get(labels, np.nan)
+            # No stiffness makes up for a reference that does not apply.
+            fitted = np.nan if objections[*labels, curve.kinematics] else reference
             solved, unstable, missing = map(dataset.STATUS.index, ("solved", "unstable", "not_converged"))
             status = np.where(np.isnan(displacement), missing, np.where(result["stable"], solved, unstable))
             curves.put(

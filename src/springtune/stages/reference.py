@@ -43,7 +43,7 @@ def _unit(task):
         solution = solve_unit(*task["problem"])
     except RuntimeError as error:
         return {"message": str(error)}
-    names = ("displacement", "mean_displacement", "error_estimate", "x", "y", "displacements")
+    names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
 
 

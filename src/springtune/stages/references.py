@@ -23,10 +23,11 @@ def read(folder, reference, fields=()):
     Returns
     -------
     dict
-        What the stage `reference` stored [m], for 1 N; of a reference that did not converge ``message`` and
+        What the stage `reference` stored [m, rad, 1], for 1 N; of a reference that did not converge ``message`` and
         ``seconds`` alone.
     """
     key = reference["key"]
     found = store.read(Path(folder) / f"{key}.h5", [key], fields)[key]
     scales = dict.fromkeys(SCALED, reference["displacement"]) | dict.fromkeys("xy", reference["length"])
+    scales |= dict.fromkeys(("rotation", "strain"), reference["displacement"] / reference["length"])
     return {name: value * scales[name] if name in scales else value for name, value in found.items()}

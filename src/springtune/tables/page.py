@@ -82,8 +82,10 @@ def _row(values, labels, place):
         "printed_displacement_mm": 1e3 * float(value("paper_displacement")),
         "printed_error_percent": 100 * float(value("paper_deformation_error")),
         "reference_mm": 1e3 * float(value("reference_displacement")),
+        "reference_message": str(value("reference_message")),
     }
     for k, kinematics in enumerate(labels["kinematics"]):
+        row[f"reference_applies_{kinematics}"] = "yes" if value("reference_applies", kinematics=k) == 1 else "no"
         for d, definition in enumerate(labels["definition"]):
             one = {"kinematics": k, "definition": d}
             status = STATUS[int(value("status", **one))]

@@ -1,0 +1,146 @@
+r"""How far a reference of small strain applies to a network that deforms at large.
+
+A cantilever under a dead load at its end is the elastica :math:`\theta'' = -\alpha \cos\theta`,
+:math:`\alpha = F L^2 / (E I)`: its end deflects by :math:`4/35\,\alpha^2` less than in small strain, whose end turns by
+:math:`\alpha/2`, and by the closed form of `elastica` at any load.
+"""
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ellipeinc, ellipkinc
+
+MOST_EFFECT = 0.01
+"""Largest effect of finite rotation on a displacement, relative, with which a reference of small strain applies."""
+
+MOST_STRAIN = 0.15
+"""Largest strain with which it applies. Below, what a finite strain does is taken for a matter of the material's law:
+the paper's beams stretch by 5 %, its block by 11 %."""
+
+SHARE = 0.95
+"""Share of a body in which rotations and strains are at most those that it is judged by: corners are singular."""
+
+
+def rotation_and_strain(x, y, displacements):
+    """Rotation [rad] and principal strain [1] that 95 % of a body do not exceed, in small strain.
+
+    Parameters
+    ----------
+    x : ndarray of float, shape (n_x,)
+    y : ndarray of float, shape (n_y,)
+        Coordinates of a grid [m], ascending.
+    displacements : ndarray of float, shape (n_x, n_y, 2)
+        Displacements there [m].
+
+    Returns
+    -------
+    tuple of float
+    """
+    middle = [(displacements[:, 1:] + displacements[:, :-1]) / 2, (displacements[1:] + displacements[:-1]) / 2]
+    by_x = np.diff(middle[0], axis=0) / np.diff(x)[:, None, None]
+    by_y = np.diff(middle[1], axis=1) / np.diff(y)[None, :, None]
+    rotation = np.abs(by_x[..., 1] - by_y[..., 0]) / 2
+    mean, half = (by_x[..., 0] + by_y[..., 1]) / 2, (by_x[..., 0] - by_y[..., 1]) / 2
+    strain = np.abs(mean) + np.hypot(half, (by_x[..., 1] + by_y[..., 0]) / 2)
+    areas = np.multiply.outer(np.diff(x), np.diff(y)).ravel()
+    found = []
+    for values in (rotation.ravel(), strain.ravel()):
+        order = np.argsort(values)
+        reached = np.searchsorted(np.cumsum(areas[order]), SHARE * areas.sum())
+        found.append(float(values[order[min(reached, len(order) - 1)]]))
+    return tuple(found)
+
+
+def elastica(load):
+    r"""Deflection of a cantilever's end under a dead load across it, over its length [1].
+
+    Parameters
+    ----------
+    load : float
+        :math:`\alpha = F L^2 / (E I)` [1], at least 0.
+
+    Returns
+    -------
+    float
+
+    Notes
+    -----
+    With the turn :math:`\psi` of the end, :math:`p^2 = (1 + \sin\psi)/2` and :math:`\sin\varphi = 1/(\sqrt 2 p)`
+    (Bisshopp and Drucker, Quart. Appl. Math. 3:272, 1945)
+
+    .. math:: \sqrt\alpha = K(p) - F(p, \varphi), \qquad
+        w / L = 1 - \tfrac{2}{\sqrt\alpha} (E(p) - E(p, \varphi)).
+    """
+    if load < 1e-4:
+        return load / 3 * (1 - 4 / 35 * load**2)
+
+    def parts(turn, integral):
+        parameter = (1 + np.sin(turn)) / 2
+        return integral(np.pi / 2, parameter) - integral(np.arcsin(np.sqrt(0.5 / parameter)), parameter)
+
+    turn = brentq(lambda turn: parts(turn, ellipkinc) - np.sqrt(load), 0.0, np.pi / 2 * (1 - 1e-12), xtol=1e-15)
+    return float(1 - 2 / np.sqrt(load) * parts(turn, ellipeinc))
+
+
+def rotation_effect(rotation):
+    """Effect of finite rotation on the deflection of a slender cantilever whose end turns so far in small strain [1].
+
+    Parameters
+    ----------
+    rotation : float
+        [rad]
+
+    Returns
+    -------
+    float
+        Relative to the deflection in small strain, negative; about -16/35 times the rotation squared.
+    """
+    load = 2 * abs(rotation)
+    return 3 * elastica(load) / load - 1 if load else 0.0
+
+
+def beyond_linear(rotation, strain):
+    """Why a reference of small strain does not apply to a network of nonlinear kinematics.
+
+    Parameters
+    ----------
+    rotation, strain : float
+        Of the reference, see `rotation_and_strain` [rad, 1].
+
+    Returns
+    -------
+    str
+        Empty where it applies: where finite rotation would change the deflection of a cantilever by at most 1 %, and
+        strains are at most 15 %.
+    """
+    reasons = []
+    effect = rotation_effect(rotation)
+    if -effect > MOST_EFFECT:
+        reasons.append(f"it turns by {abs(rotation):.2g} rad, where finite rotation takes {-100 * effect:.2g} % off "
+                       "a cantilever's deflection")  # fmt: skip
+    if abs(strain) > MOST_STRAIN:
+        reasons.append(f"its strain is {100 * abs(strain):.2g} %")
+    return f"the linear reference does not apply: {', and '.join(reasons)}" if reasons else ""
+
+
+def objection(result, force, kinematics):
+    """Why a network is not compared with a reference, or not to be fitted to it.
+
+    Parameters
+    ----------
+    result : dict
+        A stored reference of small strain, for 1 N, see `springtune.stages.references.read`.
+    force : float
+        Force on the network [N].
+    kinematics : str
+        Of the network.
+
+    Returns
+    -------
+    str
+        Empty where there is no objection.
+    """
+    if "displacement" not in result:
+        return f"no reference: {result['message']}"
+    if kinematics == "linear":
+        return ""
+    return beyond_linear(force * result["rotation"], force * result["strain"])

@@ -1,0 +1,94 @@
+"""Scenes without a reference, or beyond it: solved, and never with an error that says nothing."""
+
+import csv
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from springtune.stages import collect, store
+from springtune.tables import page
+
+STUDY = """
+title: A beam that bends too far
+beams:
+  slender: {length: 200 mm, height: 10 mm}
+  other: {length: 100 mm, height: 10 mm}
+materials:
+  soft: {young_modulus: 1 MPa, poisson_ratio: 0.3}
+definitions:
+  calibrated: {beam: slender, load: bending}
+sensitivity: {from: 0.3, to: 3}
+outputs: tables
+grids:
+  # F L^2 / (E I) = 1: the end turns by .5 rad in small strain.
+  bent: &bent
+    beam: slender
+    mesh_type: structured
+    mesh_size: 5 mm
+    material: soft
+    load: bending
+    force: 2.0833 mN
+    definition: [lattice, calibrated]
+    kinematics: [nonlinear, linear]
+  other: {<<: *bent, beam: other, definition: lattice, sensitivity: false}
+"""
+
+
+@pytest.fixture(scope="module")
+def tree(run):
+    run.write("beyond.yaml", STUDY)
+    code, output = run.snakemake("beyond.yaml")
+    assert code == 0, output
+    with xr.open_datatree(run.folder / "results/beyond/dataset.nc", engine="h5netcdf") as opened:
+        yield opened.load()
+
+
+def test_a_scene_beyond_the_linear_reference_says_so(tree, run):
+    root = tree.to_dataset().sel(beam="slender", mesh_size=5e-3, mesh_type="structured", load="bending").squeeze()
+    assert root.reference_rotation.item() == pytest.approx(0.5, rel=0.01)
+    assert root.reference_applies.sel(kinematics="nonlinear") == 0
+    assert root.reference_applies.sel(kinematics="linear") == 1
+    assert root.reference_applies.attrs["flag_meanings"] == "no yes"
+    bent = root.sel(definition="lattice")
+    assert (bent.status == 1).all() and np.isfinite(bent.deformation_error).all()
+    message = bent.message.sel(kinematics="nonlinear").item()
+    assert "the linear reference does not apply: it turns by 0.5 rad" in message and "9.4 %" in message
+    assert bent.message.sel(kinematics="linear").item() == ""
+    assert "does not apply: it turns by 0.5 rad" in (run.folder / "results/beyond/tables/index.html").read_text()
+
+
+def test_nothing_is_calibrated_beyond_the_linear_reference(tree):
+    root, curves = tree.to_dataset(), tree["sensitivity"].to_dataset()
+    place = {"beam": "slender", "mesh_size": 5e-3, "mesh_type": "structured", "load": "bending", "material": "soft"}
+    best = curves.best_stiffness.sel(place)
+    assert np.isnan(best.sel(kinematics="nonlinear")) and np.isfinite(best.sel(kinematics="linear"))
+    cell = root.sel(place | {"definition": "calibrated"})
+    assert np.isnan(cell.displacement.sel(kinematics="nonlinear")) and cell.status.sel(kinematics="linear") == 1
+    message = cell.message.sel(kinematics="nonlinear").item()
+    assert "slender_structured_5mm in bending of 0.0020833 N" in message and "turns by 0.5 rad" in message
+
+
+def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
+    """References that did not converge are stored with their message alone."""
+    lost = "bending reference, 10 times as long as high, nu = 0.3: relative rounding error 2.0e-04"
+    # One file a unit problem; the shorter beam turns less.
+    found = {file: store.read(file, [file.stem])[file.stem] for file in run.folder.glob("results/beyond/references/*")}
+    file = min(found, key=lambda file: found[file]["rotation"])
+    kept = file.read_bytes()
+    try:
+        store.add(file, {file.stem: {"message": lost, "seconds": 0.1}})
+        collect.run(run.folder / "beyond.yaml", run.folder / "results/beyond", tmp_path / "dataset.nc")
+    finally:
+        file.write_bytes(kept)
+    with xr.open_datatree(tmp_path / "dataset.nc", engine="h5netcdf") as tree:
+        root = tree.to_dataset().sel(beam="other", definition="lattice").squeeze()
+        assert np.isnan(root.reference_displacement) and np.isnan(root.deformation_error).all()
+        assert root.reference_message.item() == f"no reference: {lost}"
+        assert (root.reference_applies == 0).all() and (root.status == 1).all()
+        assert (root.message == f"no reference: {lost}").all()
+        written = page.write(tree, tmp_path)
+    assert f"no reference: {lost}" in (tmp_path / "index.html").read_text()
+    rows = csv.DictReader((tmp_path / written[0]).read_text().splitlines())
+    applies = {row["beam"]: (row["reference_applies_nonlinear"], row["reference_applies_linear"]) for row in rows}
+    assert applies == {"slender": ("no", "yes"), "other": ("no", "no")}
