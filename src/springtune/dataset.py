@@ -163,6 +163,18 @@ MODULI_VARIABLES = {
 
 BLOCK_REFERENCE = (*REFERENCE, "reference")
 
+FINITE_STRAIN_VARIABLES = {
+    "reference_displacement": (BLOCK_REFERENCE, "m", "displacement of the load, reference at finite strain", np.nan),
+    "reference_error_estimate": (BLOCK_REFERENCE, "1", "estimated relative error of the reference", np.nan),
+    "deformation_error": (
+        (*SCENE, "reference"),
+        "1",
+        "signed deformation error against finite strain, (network - reference) / |reference|",
+        np.nan,
+    ),
+    "reference_message": (BLOCK_REFERENCE, "1", "why there is no reference", ""),
+}
+
 BLOCK_VARIABLES = {
     "face_displacement": (SCENE, "m", "displacement of the middle of the loaded face along the force, network", np.nan),
     "face_mean_displacement": (SCENE, "m", "mean displacement of the loaded face along the force, network", np.nan),

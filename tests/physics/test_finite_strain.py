@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 from springtune.geometry import Beam
 from springtune.materials import Material
 from springtune.reference.finite_strain import FiniteStrainError, NeoHooke, solve_neo_hooke
+from springtune.reference.limits import elastica
 from springtune.reference.small_strain import solve_small_strain
 
 BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
@@ -16,8 +17,20 @@ BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
 gradients = st.tuples(*[st.floats(-0.25, 0.25)] * 4).map(lambda values: np.eye(2) + np.reshape(values, (2, 2)))
 
 
-def at(f):
-    return np.reshape(f, (2, 2, 1, 1))
+def piola(material, f):
+    """First Piola-Kirchhoff stress at a deformation gradient."""
+    green = (f.T @ f - np.eye(2)) / 2
+    xx, yy, xy = material.response(np.array([green[0, 0], green[1, 1], 2 * green[0, 1]])).stress
+    return f @ np.array([[xx, xy], [xy, yy]])
+
+
+def piola_change(material, f, d):
+    """Its derivative along d, by the material's tangent."""
+    green, change = (f.T @ f - np.eye(2)) / 2, (f.T @ d + d.T @ f) / 2
+    found = material.response(np.array([green[0, 0], green[1, 1], 2 * green[0, 1]]))
+    xx, yy, xy = found.stress
+    d_xx, d_yy, d_xy = found.tangent @ np.array([change[0, 0], change[1, 1], 2 * change[0, 1]])
+    return d @ np.array([[xx, xy], [xy, yy]]) + f @ np.array([[d_xx, d_xy], [d_xy, d_yy]])
 
 
 def energy(f, nu, plane):
@@ -45,19 +58,19 @@ def energy(f, nu, plane):
 def test_stress_and_tangent_are_derivatives(nu, plane, f, d):
     d = np.reshape(d, (2, 2))
     material = NeoHooke(nu, plane)
-    stress = material.state(at(f)).stress[:, :, 0, 0]
+    stress = piola(material, f)
     step = 1e-5
     slope = (energy(f + step * d, nu, plane) - energy(f - step * d, nu, plane)) / (2 * step)
     # Differences leave step^2 and rounding over the step; moduli are up to 17 E at nu = .49.
     assert slope == pytest.approx((stress * d).sum(), abs=2e-7)
-    change = (material.state(at(f + step * d)).stress - material.state(at(f - step * d)).stress) / (2 * step)
-    assert change == pytest.approx(material.state(at(f)).increment(at(d)), abs=2e-6)
+    change = (piola(material, f + step * d) - piola(material, f - step * d)) / (2 * step)
+    assert change == pytest.approx(piola_change(material, f, d), abs=2e-6)
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
 def test_small_strain_is_the_limit(nu):
     material = Material("any", 1e6, nu)
-    for kind, force in (("face", -2e-3), ("axial", 4e-5)):
+    for kind, force in (("face", -2e-3), ("axial", 4e-5), ("axial", -4e-5), ("bending", 4e-6), ("shear", 2e-3)):
         finite = solve_neo_hooke(BLOCK, material, force, kind=kind)
         small = solve_small_strain(BLOCK, material, force, kind=kind)
         # Strains of 1e-5 and the coarse elements' error at the corners.
@@ -78,6 +91,58 @@ def test_incompressible_bar_stretches_as_by_hand():
     force = 1e6 / 3 * (stretch - stretch**-2) * bar.height * bar.thickness
     found = solve_neo_hooke(bar, Material("rubber", 1e6, 0.5), force, kind="axial")
     assert found.displacement == pytest.approx(0.5 * bar.length, rel=0.02)
+
+
+@pytest.mark.parametrize(("kind", "stress"), [("axial", 4e-6), ("bending", 1e-9), ("shear", 1e-6)])
+@pytest.mark.parametrize("aspect_ratio", [1, 30])
+def test_small_strain_is_the_limit_of_any_shape(kind, stress, aspect_ratio):
+    beam = Beam("any", aspect_ratio * 0.01, 0.01, 1e-3)
+    force = stress * 1e6 * beam.thickness * (beam.length if kind == "shear" else beam.height)
+    finite = solve_neo_hooke(beam, Material("any", 1e6, 0.3), force, kind=kind)
+    small = solve_small_strain(beam, Material("any", 1e6, 0.3), force, kind=kind)
+    assert finite.displacement == pytest.approx(small.displacement, rel=1e-4)
+    # It is an estimate of the elements' error; strains and turns of the order of 1e-6 come to 1e-6 besides.
+    assert abs(finite.displacement / small.displacement - 1) <= finite.error_estimate + 1e-5
+
+
+@pytest.mark.parametrize(("nu", "load"), [(0.0, 0.5), (0.3, 1.0), (0.5, 1.0), (0.0, 2.0), (0.5, 2.0), (0.0, 5.0)])
+def test_slender_cantilevers_are_elasticas(nu, load):
+    """The clamp shortens a beam by up to .014 of its height; as in small strain, which then takes shear along."""
+    apart = []
+    for slenderness in (25, 50):
+        beam, material = Beam("b", slenderness * 0.01, 0.01, 1e-3), Material("any", 1e9, nu)
+        force = load * material.young_modulus * beam.thickness * beam.height**3 / 12 / beam.length**2
+        finite = solve_neo_hooke(beam, material, force, kind="bending")
+        small = solve_small_strain(beam, material, force, kind="bending")
+        assert finite.error_estimate <= 5e-5
+        shortened = load * (3 * small.displacement / (load * beam.length)) ** (2 / 3)
+        apart.append(finite.displacement / small.displacement / (3 * elastica(shortened) / shortened) - 1)
+    # The fibres stretch by half the load over the slenderness, and what that does is of second order in it.
+    assert abs(apart[1]) <= 0.5 * load / 50**2 + 2e-5
+    assert abs(apart[1]) <= abs(apart[0]) / 3 + 2e-5
+
+
+def test_bending_is_odd_in_the_force():
+    up, down = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.45), force, kind="bending") for force in (0.02, -0.02))
+    assert up.displacement == pytest.approx(-down.displacement, rel=1e-8)
+    assert up.positions[[0, -1]].tolist() == [0, 1] and len(up.profile) == len(up.positions)
+
+
+def test_a_wide_block_is_in_simple_shear():
+    """Neo-Hooke's shear stress is linear in the shear: what is left of a tenth is its square, where the ends are."""
+    wide, material = Beam("wide", 0.1, 0.01, 1e-3), Material("any", 1e6, 0.3)
+    force = 0.1 * 1e6 / 2.6 * wide.length * wide.thickness
+    finite, small = (solve(wide, material, force, kind="shear") for solve in (solve_neo_hooke, solve_small_strain))
+    assert finite.displacement == pytest.approx(0.1 * wide.height, rel=0.06)
+    assert 1e-4 < abs(finite.displacement / small.displacement - 1) < 0.1**2
+
+
+def test_compression_shortens_more_than_it_stretches():
+    pulled, pushed = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.5), f, kind="axial") for f in (1.0, -1.0))
+    # P = E/3 (l - 1/l^2) = E (e - e^2 + ...): the even part of e(P) is + P^2 in tension, so -P is shorter by less.
+    stress = 1.0 / (1e6 * 0.04e-3)
+    even = (pulled.displacement + pushed.displacement) / 2 / BLOCK.length
+    assert even == pytest.approx(stress**2, rel=0.1)
 
 
 def test_profile_is_symmetric_and_holds_both_displacements():

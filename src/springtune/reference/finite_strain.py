@@ -6,15 +6,19 @@ The strain energy is that of CalculiX and Abaqus,
 
 with the shear modulus mu and the bulk modulus K of the material at small strain. In plane stress the stretch across
 the sheet is eliminated in every point; an incompressible material, nu = 0.5, has there
-:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane. Only half of the beam is solved, elements shrink
-towards the corners, and the load grows in steps where it must.
+:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane. Kinds of load are those of `springtune.loads`:
+under an axial load and one on a face half of the beam is solved, which does not buckle; in bending and shear, whose
+symmetry large rotations break, the whole. Elements shrink towards the corners, and the load grows in steps where it
+must.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, FacetBasis, LinearForm, MeshQuad
+from scipy.sparse import csc_array, csr_array
+from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
+
+from ..factors import Factor, SingularError
 
 COUNTS = (5, 8)
 """Elements over half the height of the two meshes that are solved; the second is the answer."""
@@ -22,13 +26,16 @@ COUNTS = (5, 8)
 GRADING = 3
 """Power law of the elements' coordinates towards the corners."""
 
-TOLERANCE = 1e-9
-"""Largest residual relative to the load."""
+TOLERANCE = 1e-6
+"""Last step of Newton's method over the displacements; the error that it leaves is about its square, or rounding."""
 
-ROUND_OFF = 1e-13
-"""Residual that rounding leaves, for E = 1 and half the height 1."""
+FARTHEST = 2.0
+"""Largest step of Newton's method over the size of the sheet."""
 
-MAX_ITERATIONS = 15
+MAX_ITERATIONS = 10
+
+MOST_LONG = 10
+"""Most elements along a bent beam over those of half the height: where it is slender, it bends evenly."""
 
 SMALLEST_STEP = 1 / 64
 
@@ -48,7 +55,8 @@ class FiniteStrainSolution:
     mean_displacement : float
         Mean displacement of the loaded side along the force [m].
     error_estimate : float
-        Difference to the coarser mesh, relative [1]: several times the error, since errors fall with the mesh.
+        Difference to the coarser mesh, relative [1]: several times the error, since errors fall with the mesh; and
+        what Newton's method and rounding leave.
     positions : ndarray of float, shape (n,)
         Places on the loaded side over its length [1], ascending.
     profile : ndarray of float, shape (n,)
@@ -72,7 +80,7 @@ def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower
     force : float
         Force [N], positive outwards.
     kind : str
-        ``"axial"`` or ``"face"``, see `springtune.loads`.
+        Kind of load, one of `springtune.loads.KINDS`.
     plane : str
         ``"stress"`` or ``"strain"``.
     follower : bool
@@ -92,7 +100,7 @@ def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower
     nu = material.poisson_ratio
     if plane == "strain" and nu >= 0.5:
         raise ValueError(f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999")
-    side = beam.length if kind == "face" else beam.height
+    side = beam.length if kind in ("face", "shear") else beam.height
     stress = force / (side * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, nu, count, kind, plane, follower) for count in COUNTS]
     coarse, fine = (sheet.solve(stress, f"{beam.name}, {material.name}") for sheet in sheets)
@@ -101,122 +109,206 @@ def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower
     return FiniteStrainSolution(
         displacement=scale * fine[0],
         mean_displacement=scale * fine[1],
-        error_estimate=float(abs(coarse[0] / fine[0] - 1)),
+        error_estimate=float(abs(coarse[0] / fine[0] - 1)) + fine[4],
         positions=fine[2],
         profile=scale * fine[3],
     )
 
 
 class _Sheet:
-    """Half of a sheet of height 2 with E = 1: the left one under a face load, the upper one under an axial one."""
+    """What is solved of a sheet of height 2 with E = 1: half of it where the load keeps it symmetric."""
 
     def __init__(self, aspect_ratio, nu, count, kind, plane, follower):
-        self.kind, self.follower = kind, follower
-        self.energy = NeoHooke(nu, plane)
+        self.kind = kind
+        self.law = NeoHooke(nu, plane)
         length = 2 * aspect_ratio
         near = np.linspace(0, 1, count + 1) ** GRADING
-        if kind == "face":
-            along = _spread(near, length / 2, count)
-            across = np.concatenate([near, 2 - near[-2::-1]])
+        both = np.concatenate([near, 2 - near[-2::-1]])
+        if kind == "face":  # the left half
+            along, across = _spread(near, length / 2, count), both
+        elif kind == "axial":  # the upper half
+            along, across = _spread(near, length, count), 1 - near[::-1]
+        elif kind == "bending":
+            along, across = _spread(near, length, count, MOST_LONG), both
         else:
-            along = _spread(near, length, count)
-            across = 1 - near[::-1]
+            half = _spread(near, length / 2, count)
+            along, across = np.concatenate([half, length - half[-2::-1]]), both
         mesh = MeshQuad.init_tensor(along, across)
-        element = ElementVector(ElementQuad2())
-        self.basis = Basis(mesh, element, intorder=4)
-        axis, place = (1, 2.0) if kind == "face" else (0, length)
+        basis = Basis(mesh, ElementQuad2(), intorder=4)
+        upper, component = kind in ("face", "shear"), 1 if kind in ("face", "bending") else 0
+        axis, place = (1, 2.0) if upper else (0, length)
         facets = mesh.facets_satisfying(lambda x: np.isclose(x[axis], place), boundaries_only=True)
-        self.side = FacetBasis(mesh, element, facets=facets, intorder=4)
-        clamp = self.basis.get_dofs(lambda x: np.isclose(x[1 if kind == "face" else 0], 0)).all()
+        side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
+        places = basis.doflocs.T
+        self.held = np.zeros(places.shape, dtype=bool)
+        self.held[np.isclose(places[:, axis], 0)] = True
         if kind == "face":
-            symmetry = self.basis.get_dofs(lambda x: np.isclose(x[0], length / 2)).all(["u^1"])
-        else:
-            symmetry = self.basis.get_dofs(lambda x: np.isclose(x[1], 0)).all(["u^2"])
-        self.free = np.setdiff1d(np.arange(self.basis.N), np.union1d(clamp, symmetry))
-        component = 1 if kind == "face" else 0
-        self.load = LinearForm(lambda v, w: v[component]).assemble(self.side)
-        nodes = self.basis.get_dofs(facets).all([f"u^{component + 1}"])
-        place = self.basis.doflocs[1 - component][nodes]
-        order = np.argsort(place)
-        self.nodes, self.places = nodes[order], place[order]
+            self.held[np.isclose(places[:, 0], length / 2), 0] = True
+        elif kind == "axial":
+            self.held[np.isclose(places[:, 1], 0), 1] = True
+        elif kind == "shear":
+            self.held[np.isclose(places[:, 1], 2), 1] = True
+        self.extent = max(length, 2.0)
+
+        # Of each element and its points of integration: gradients of shape functions, (elements, points, 2, shapes).
+        self.nodes_of = basis.element_dofs.T
+        self.gradients = np.stack([one[0].grad for one in basis.basis], axis=-1).transpose(1, 2, 0, 3)
+        self.weights = basis.dx
+        self.load = np.zeros(places.shape)
+        shapes = np.stack([np.asarray(one[0]) * side.dx for one in side.basis])
+        np.add.at(self.load[:, component], side.element_dofs, shapes.sum(axis=2))
+        unknowns = (2 * self.nodes_of[:, :, None] + np.arange(2)).reshape(len(self.nodes_of), -1)
+        self.rows, self.columns = np.repeat(unknowns, 18, axis=1).ravel(), np.tile(unknowns, 18).ravel()
+        self.turning = _turning(side, shapes) if follower else csr_array((places.size, places.size))
+
+        nodes = side.get_dofs(facets).all()
+        order = np.argsort(places[nodes, 1 - axis])
+        self.component, self.nodes = component, nodes[order]
+        self.places = places[self.nodes, 1 - axis]
 
     def solve(self, stress, name):
-        """Displacement of the load, mean, positions and profile, over half the height."""
-        moved, done, step = np.zeros(self.basis.N), 0.0, 1.0
-        while done < 1:
+        """Displacement of the load, mean, positions and profile, over half the height; and its relative rounding."""
+        path, step = [(0.0, np.zeros(self.load.shape))], 1.0
+        while path[-1][0] < 1:
+            done = path[-1][0]
             step = min(step, 1 - done)
-            found = self._newton(moved, stress * (done + step))
+            found = self._newton(_extrapolated(path, done + step), stress * (done + step))
             if found is not None:
-                moved, done, step = found, done + step, 1.5 * step
+                moved, uncertain = found
+                path, step = [*path[-2:], (done + step, moved)], 1.5 * step
             elif step <= SMALLEST_STEP:
                 raise FiniteStrainError(f"reference of {name}: no equilibrium beyond {100 * done:.3g} % of the load")
             else:
                 step /= 2
-        profile = moved[self.nodes]
-        mean = float(self.load @ moved / self.load.sum())
+        profile = moved[self.nodes, self.component]
+        mean = float((self.load * moved).sum() / self.load.sum())
         if self.kind == "axial":
-            return mean, mean, 0.5 + 0.5 * self.places, profile
+            return mean, mean, 0.5 + 0.5 * self.places, profile, uncertain
+        if self.kind != "face":
+            return mean, mean, self.places / self.places[-1], profile, uncertain
         whole = 2 * self.places[-1]
         positions = np.concatenate([self.places, whole - self.places[-2::-1]]) / whole
-        return float(profile[-1]), mean, positions, np.concatenate([profile, profile[-2::-1]])
+        return float(profile[-1]), mean, positions, np.concatenate([profile, profile[-2::-1]]), uncertain
 
     def _newton(self, moved, stress):
-        size = np.linalg.norm(stress * self.load)
+        """Displacements in equilibrium and what rounding leaves open of the load's, relative; None without any.
+
+        Strains in the points of integration are unknowns of their own, which Newton's method meets with those of the
+        displacements in the end (Magisano, Leonetti and Garcea, Int. J. Numer. Meth. Engng 109:1237, 2017): else the
+        turns of a slender beam stretch it on the way, and its steps must be small.
+        """
+        free, strain = ~self.held.ravel(), None
         for _ in range(MAX_ITERATIONS):
-            residual, tangent = self._balance(moved, stress)
+            gradient = self._gradient(moved)
+            found = _strain(gradient)
+            strain = found if strain is None else strain
+            turning = stress * self.turning
+            external = stress * self.load + (turning @ moved.ravel()).reshape(-1, 2)
+            with np.errstate(all="ignore"):
+                state = self.law.response(strain)
+                pull = state.stress + (state.tangent @ (found - strain)[..., None])[..., 0]
+            residual = (external - self._forces(gradient, pull)).ravel()[free]
             if not np.isfinite(residual).all():
                 return None
-            if np.linalg.norm(residual[self.free]) <= max(TOLERANCE * size, ROUND_OFF):
-                return moved
+            step = np.zeros(len(free))
             try:
-                step = splu(tangent[self.free][:, self.free].tocsc()).solve(residual[self.free])
-            except RuntimeError:
+                factor = Factor(csc_array((self._tangent(gradient, state) - turning)[free][:, free]))
+            except SingularError:
                 return None
-            if np.abs(step).max() > 1.0:
+            step[free] = factor.solve(residual)
+            step = step.reshape(-1, 2)
+            if not np.abs(step).max() <= FARTHEST * self.extent:
                 return None
-            moved = moved.copy()
-            moved[self.free] += step
+            strain = found + _strain_change(gradient, self._gradient(step))
+            moved = moved + step
+            if np.abs(step).max() <= TOLERANCE * np.abs(moved).max():
+                return moved, float(abs((self.load * step).sum() / (self.load * moved).sum()))
         return None
 
-    def _balance(self, moved, stress):
-        """Out-of-balance forces and tangent."""
-        gradient = self.basis.interpolate(moved).grad
-        with np.errstate(all="ignore"):
-            state = self.energy.state(np.eye(2)[:, :, None, None] + gradient)
-        inner = _inner.assemble(self.basis, P=state.stress)
-        tangent = BilinearForm(lambda u, v, w: _dot(state.increment(u.grad), v.grad)).assemble(self.basis)
-        if not self.follower:
-            return stress * self.load - inner, tangent
-        # A pressure acts along the cofactor of the deformation gradient times the normal.
-        turned = np.eye(2)[:, :, None, None] + self.side.interpolate(moved).grad
-        pull = LinearForm(lambda v, w: _along_normal(turned, v))
-        stiffness = BilinearForm(lambda u, v, w: _along_normal(u.grad, v))
-        return stress * pull.assemble(self.side) - inner, tangent - stress * stiffness.assemble(self.side)
+    def _gradient(self, moved):
+        """Derivatives of displacements (component, axis) in the points of integration, (elements, points, 2, 2)."""
+        return np.swapaxes(self.gradients @ moved[self.nodes_of][:, None], 2, 3)
+
+    def _forces(self, gradient, stress):
+        """Inner forces of second Piola-Kirchhoff stresses xx, yy, xy."""
+        first = (gradient + np.eye(2)) @ _matrix(stress) * self.weights[..., None, None]
+        count, points = self.weights.shape
+        forces = np.swapaxes(self.gradients, 2, 3).transpose(0, 2, 1, 3).reshape(count, -1, 2 * points)
+        forces = forces @ np.swapaxes(first, 2, 3).reshape(count, 2 * points, 2)
+        total = np.zeros(self.load.shape)
+        np.add.at(total, self.nodes_of, forces)
+        return total
+
+    def _tangent(self, gradient, state):
+        """Derivative of the inner forces."""
+        count, points, _, shapes = self.gradients.shape
+        deformation, by_x, by_y = gradient + np.eye(2), self.gradients[:, :, 0], self.gradients[:, :, 1]
+        # Changes of strains xx, yy and 2 xy with each unknown.
+        changes = np.empty((count, points, 3, shapes, 2))
+        for axis in range(2):
+            f_x, f_y = deformation[:, :, axis, 0, None], deformation[:, :, axis, 1, None]
+            changes[:, :, 0, :, axis] = f_x * by_x
+            changes[:, :, 1, :, axis] = f_y * by_y
+            changes[:, :, 2, :, axis] = f_x * by_y + f_y * by_x
+        changes = changes.reshape(count, points, 3, 2 * shapes)
+        stresses = state.tangent * self.weights[..., None, None] @ changes
+        blocks = np.swapaxes(changes.reshape(count, 3 * points, -1), 1, 2) @ stresses.reshape(count, 3 * points, -1)
+        held = self.gradients.reshape(count, 2 * points, shapes)
+        turned = _matrix(state.stress) * self.weights[..., None, None] @ self.gradients
+        stretched = np.swapaxes(held, 1, 2) @ turned.reshape(count, 2 * points, shapes)
+        for axis in range(2):
+            blocks[:, axis::2, axis::2] += stretched
+        return csr_array((blocks.ravel(), (self.rows, self.columns)), shape=(self.load.size, self.load.size))
 
 
-def _along_normal(gradient, v):
-    """Cofactor times the normal (0, 1), along v."""
-    return -gradient[1, 0] * v[0] + gradient[0, 0] * v[1]
+def _turning(side, shapes):
+    """What a pressure changes with displacements: it acts along the cofactor of the deformation times (0, 1)."""
+    slopes = np.stack([one[0].grad[0] for one in side.basis])
+    blocks = np.einsum("iep,jep->ije", shapes, slopes)
+    rows, columns = np.broadcast_arrays(side.element_dofs[:, None], side.element_dofs[None])
+    parts = [(-blocks, 0, 1), (blocks, 1, 0)]
+    entries = [(part.ravel(), (2 * rows.ravel() + a, 2 * columns.ravel() + b)) for part, a, b in parts]
+    return sum(csr_array(entry, shape=(2 * side.N, 2 * side.N)) for entry in entries)
 
 
-@LinearForm
-def _inner(v, w):
-    return _dot(w["P"], v.grad)
+def _strain(gradient):
+    """Green's strains xx, yy and 2 xy."""
+    x, y = gradient[..., 0], gradient[..., 1]  # derivatives by x and by y
+    parts = [x[..., 0] + (x * x).sum(-1) / 2, y[..., 1] + (y * y).sum(-1) / 2, x[..., 1] + y[..., 0] + (x * y).sum(-1)]
+    return np.stack(parts, axis=-1)
 
 
-def _dot(a, b):
-    return a[0, 0] * b[0, 0] + a[0, 1] * b[0, 1] + a[1, 0] * b[1, 0] + a[1, 1] * b[1, 1]
+def _strain_change(gradient, change):
+    """Derivative of `_strain` along a change of the gradient."""
+    x, y, by_x, by_y = gradient[..., 0], gradient[..., 1], change[..., 0], change[..., 1]
+    parts = [
+        by_x[..., 0] + (x * by_x).sum(-1),
+        by_y[..., 1] + (y * by_y).sum(-1),
+        by_x[..., 1] + by_y[..., 0] + (x * by_y).sum(-1) + (y * by_x).sum(-1),
+    ]
+    return np.stack(parts, axis=-1)
 
 
-def _cofactor(a):
-    return np.array([[a[1, 1], -a[1, 0]], [-a[0, 1], a[0, 0]]])
+def _matrix(stress):
+    """Symmetric matrices of xx, yy, xy."""
+    return stress[..., [[0, 2], [2, 1]]]
 
 
-def _spread(near, length, count):
-    """Coordinates from 0 to length, graded within 1 of 0 and even beyond."""
+def _spread(near, length, count, most=np.inf):
+    """Coordinates from 0 to length, graded within 1 of 0 and even beyond, there of so many elements at most."""
     if length <= 1:
         return near * length
-    return np.concatenate([near, np.linspace(1, length, 1 + max(1, round(count * (length - 1) / 2)))[1:]])
+    columns = min(max(1, round(count * (length - 1) / 2)), most * count)
+    return np.concatenate([near, np.linspace(1, length, 1 + columns)[1:]])
+
+
+def _extrapolated(path, share):
+    """Displacements at a share of the load, by the polynomial through those before."""
+    total = 0.0
+    for i, (at, moved) in enumerate(path):
+        factors = [(share - other) / (at - other) for j, (other, _) in enumerate(path) if j != i]
+        total = total + np.prod(factors) * moved
+    return total
 
 
 class NeoHooke:
@@ -235,67 +327,76 @@ class NeoHooke:
         self.bulk = np.inf if nu >= 0.5 else 1 / (3 * (1 - 2 * nu))
         self.plane = plane
 
-    def state(self, gradient):
-        """Stress and tangent at deformation gradients, shape (2, 2, ...)."""
-        return (_Incompressible if np.isinf(self.bulk) else _Compressible)(self, gradient)
+    def response(self, strain):
+        """Stress and tangent at Green's strains xx, yy, 2 xy, shape (..., 3).
 
+        The energy is one of the trace t and the determinant d of C = 1 + 2 E in the plane. With the cofactor a of C,
+        S = 2 (W_t 1 + W_d a).
+        """
+        c = np.stack([1 + 2 * strain[..., 0], 1 + 2 * strain[..., 1], strain[..., 2]], axis=-1)
+        determinant, turned = (
+            c[..., 0] * c[..., 1] - c[..., 2] ** 2,
+            np.stack([c[..., 1], c[..., 0], -c[..., 2]], axis=-1),
+        )
+        of = self._incompressible if np.isinf(self.bulk) else self._compressible
+        first, second = of(c[..., 0] + c[..., 1], determinant)
+        unit = np.array([1.0, 1.0, 0.0])
+        stress = 2 * (first[0][..., None] * unit + first[1][..., None] * turned)
+        mixed = unit[:, None] * turned[..., None, :]
+        # The derivative of a by xx, yy and xy of C, where xy stands for both of its places.
+        bend = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -0.5]])
+        tangent = 4 * (
+            second[0][..., None, None] * np.multiply.outer(unit, unit)
+            + second[1][..., None, None] * (mixed + np.swapaxes(mixed, -1, -2))
+            + second[2][..., None, None] * turned[..., :, None] * turned[..., None, :]
+            + first[1][..., None, None] * bend
+        )
+        return Response(stress, tangent)
 
-class _Incompressible:
-    """W = mu/2 (F:F + J^-2 - 3)."""
+    def _incompressible(self, trace, d):
+        """First derivatives by t and d, and second ones by tt, td, dd, of W = mu/2 (t + 1/d - 3)."""
+        none = np.zeros_like(trace)
+        return (none + self.shear / 2, -self.shear / 2 / d**2), (none, none, self.shear / d**3)
 
-    def __init__(self, material, f):
-        self.shear, self.area, self.turned = material.shear, f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0], _cofactor(f)
-        self.stress = self.shear * (f - self.area**-3 * self.turned)
-
-    def increment(self, d):
-        """Derivative of the first Piola-Kirchhoff stress along d."""
-        growth = _dot(self.turned, d)
-        return self.shear * (d - self.area**-3 * _cofactor(d) + 3 * self.area**-4 * growth * self.turned)
-
-
-class _Compressible:
-    """W of the module's docstring, the stretch across eliminated in plane stress."""
-
-    def __init__(self, material, f):
-        mu, bulk = material.shear, material.bulk
-        self.mu, self.bulk, self.f = mu, bulk, f
-        self.area, self.turned = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0], _cofactor(f)
-        self.condensed = material.plane == "stress"
-        self.across = np.ones(self.area.shape)
-        if self.condensed:
-            self.across = 1 / self.area
+    def _compressible(self, trace, d):
+        """The same of the module's docstring's energy, the stretch z across eliminated in plane stress."""
+        z = np.ones_like(d)
+        if self.plane == "stress":
+            z = 1 / np.sqrt(d)
             for _ in range(30):
-                self._parts()
-                step = self.slope / self.bend
-                self.across = np.maximum(self.across - step, 0.2 * self.across)
+                parts = self._parts(trace, d, z)
+                step = parts["z"] / parts["zz"]
+                z = np.maximum(z - step, 0.2 * z)
                 if np.nanmax(np.abs(step)) < 1e-14:
                     break
-        self._parts()
-        self.stress = mu * self.iso * f + self.pressure / self.area * self.turned
+        parts = self._parts(trace, d, z)
+        second = [parts["tt"], parts["td"], parts["dd"]]
+        if self.plane == "stress":
+            pairs = ("tz", "tz"), ("tz", "dz"), ("dz", "dz")
+            second = [of - parts[one] * parts[other] / parts["zz"] for of, (one, other) in zip(second, pairs)]
+        return (parts["t"], parts["d"]), second
 
-    def _parts(self):
-        """Parts of the derivatives; `slope` and `bend` are those by the stretch across."""
-        mu, across = self.mu, self.across
-        self.volume = self.area * across
-        self.iso = self.volume ** (-2 / 3)
-        self.trace = _dot(self.f, self.f) + across**2
-        self.pressure = -mu / 3 * self.iso * self.trace + self.bulk * (self.volume - 1) * self.volume
-        self.iso_across = -2 / 3 * self.iso / across
-        self.pressure_across = -mu / 3 * (self.iso_across * self.trace + 2 * self.iso * across)
-        self.pressure_across = self.pressure_across + self.bulk * (2 * self.volume - 1) * self.area
-        self.slope = mu * self.iso * across + self.pressure / across
-        self.bend = mu * (self.iso + self.iso_across * across)
-        self.bend = self.bend + self.pressure_across / across - self.pressure / across**2
+    def _parts(self, t, d, z):
+        """Derivatives of mu/2 (p (t + z^2) - 3) + K/2 (J - 1)^2 with J = z sqrt(d), p = J^(-2/3)."""
+        half, bulk = self.shear / 2, self.bulk
+        volume = z * np.sqrt(d)
+        p, trace, growth = volume ** (-2 / 3), t + z**2, volume - 1
+        return {
+            "t": half * p,
+            "d": -half * p / (3 * d) * trace + bulk * growth * volume / (2 * d),
+            "z": half * p * (2 * z - 2 / (3 * z) * trace) + bulk * growth * volume / z,
+            "tt": np.zeros_like(p),
+            "td": -half * p / (3 * d),
+            "tz": -half * p * 2 / (3 * z),
+            "dd": half * p * 4 / (9 * d**2) * trace + bulk * (volume - growth) * volume / (4 * d**2),
+            "dz": half * p / (3 * d) * (2 / (3 * z) * trace - 2 * z) + bulk * (volume + growth) * volume / (2 * d * z),
+            "zz": half * p * (10 / (9 * z**2) * trace - 8 / 3 + 2) + bulk * (volume / z) ** 2,
+        }
 
-    def increment(self, d):
-        """Derivative of the first Piola-Kirchhoff stress along d."""
-        mu, growth = self.mu, _dot(self.turned, d)
-        iso = -2 / 3 * self.iso * growth / self.area
-        pressure = -mu / 3 * (iso * self.trace + 2 * self.iso * _dot(self.f, d))
-        pressure = pressure + self.bulk * (2 * self.volume - 1) * self.across * growth
-        change = mu * (iso * self.f + self.iso * d) + pressure / self.area * self.turned
-        change = change + self.pressure * (_cofactor(d) / self.area - self.turned * growth / self.area**2)
-        if self.condensed:
-            mixed = mu * self.iso_across * self.f + self.pressure_across / self.area * self.turned
-            change = change - mixed * _dot(mixed, d) / self.bend
-        return change
+
+@dataclass(frozen=True)
+class Response:
+    """Second Piola-Kirchhoff stresses xx, yy, xy, shape (..., 3), and derivatives by Green's, shape (..., 3, 3)."""
+
+    stress: np.ndarray
+    tangent: np.ndarray

@@ -96,6 +96,8 @@ def run(config, folder, output):
         groups["/sensitivity"] = _sensitivity(study, folder, displacements, objections, axes)
     if study.moduli:
         groups["/moduli"] = _moduli(study, folder, axes)
+    if study.further_references:
+        groups["/finite_strain"] = _finite_strain(study, folder, axes, data.displacement)
     if pressed:
         groups["/block"] = _with_face_error(block.data)
     if study.laying:
@@ -290,6 +292,29 @@ def _block(study, folder, axes):
     return block
 
 
+def _finite_strain(study, folder, axes, displacement):
+    """Group of references at finite strain, and the networks' errors against them."""
+    finite = _Filler(dataset.empty(axes | {"reference": study.further_references}, dataset.FINITE_STRAIN_VARIABLES))
+    for asked in study.references:
+        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        for kind in study.further_references:
+            result = _finite_reference(folder, asked, kind)
+            values = {"reference_message": result["message"]}
+            if "displacement" in result:
+                values["reference_displacement"] = result["displacement"]
+                values["reference_error_estimate"] = result["error_estimate"]
+            finite.put(values, reference=kind, **labels)
+    pairs = xr.broadcast(displacement, finite.data.reference_displacement)
+    error = finite.data["deformation_error"]
+    error.values = deformation_error(*(array.transpose(*error.dims) for array in pairs))
+    return finite.data
+
+
+def _finite_reference(folder, asked, kind, fields=()):
+    name = tasks.finite_key(asked, kind)
+    return store.read(folder / "references" / f"{name}.h5", [name], fields)[name]
+
+
 def _with_face_error(data):
     pairs = xr.broadcast(data.face_displacement, data.reference_face_displacement)
     data["face_error"].values = deformation_error(*(array.transpose(*data.face_error.dims) for array in pairs))
@@ -315,9 +340,7 @@ def _face_reference(folder, asked, kind):
         if "x" in result:
             result |= {"positions": result["x"] / asked.beam.length, "profile": result["displacements"][:, -1, 1]}
     else:
-        name = tasks.finite_key(asked, kind)
-        file = folder / "references" / f"{name}.h5"
-        result, scale = store.read(file, [name], ["positions", "profile"])[name], 1.0
+        result, scale = _finite_reference(folder, asked, kind, ["positions", "profile"]), 1.0
     values = {"reference_message": result["message"]}
     if "displacement" in result:
         values |= {

@@ -18,8 +18,8 @@ def run(tasks, done):
     ----------
     tasks : str or Path
         JSON file: ``folder``, ``references``, each with ``key`` and ``problem``, what
-        `springtune.reference.unit.unit_problem` gives, and ``finite``, each with ``key, beam, material, force, plane,
-        follower``.
+        `springtune.reference.unit.unit_problem` gives, and ``finite``, each with ``key, beam, material, force, load,
+        plane, follower``.
     done : str or Path
         JSON file to write: what the work was.
     """
@@ -53,7 +53,7 @@ def _finite(task):
 
     try:
         beam, material = Beam(**task["beam"]), Material(**task["material"])
-        solution = solve_neo_hooke(beam, material, task["force"], plane=task["plane"], follower=task["follower"])
+        solution = solve_neo_hooke(beam, material, task["force"], task["load"], task["plane"], task["follower"])
     except (RuntimeError, ValueError) as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")

@@ -188,7 +188,7 @@ def _problem(reference):
 
 
 def _finite_problem(reference):
-    parameters = [_beam(reference.beam), _material(reference.material), reference.force]
+    parameters = [_beam(reference.beam), _material(reference.material), LOADS[reference.load].kind, reference.force]
     return [*parameters, LOADS[reference.load].follower]
 
 
@@ -206,7 +206,6 @@ def _finite_references(study):
     return {
         files.key(kind, _finite_problem(reference)): [(reference, kind)]
         for reference in study.references
-        if LOADS[reference.load].kind == "face"
         for kind in study.further_references
     }
 
@@ -332,6 +331,7 @@ def _reference(folder, references):
                 "beam": _beam(one.beam),
                 "material": _material(one.material),
                 "force": one.force,
+                "load": LOADS[one.load].kind,
                 "plane": kind.rpartition("-")[2],
                 "follower": LOADS[one.load].follower,
             }

@@ -15,7 +15,7 @@ paper's; figures and tables that compare definitions; the figure of a pressed bl
 and the pages of the experiments on stability and of the benchmark."""
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
-"""Kinds of reference besides the small-strain one, for scenes under pressure."""
+"""Kinds of reference besides the small-strain one."""
 
 
 @dataclass(frozen=True)

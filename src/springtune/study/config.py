@@ -357,8 +357,9 @@ class StudyConfig(Section):
     )
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
-        description="References at finite strain besides the small-strain one, for scenes under pressure, in the group "
-        "`/block`. An incompressible material has none in plane strain.",
+        description="References at finite strain besides the small-strain one, for every beam, material and load: in "
+        "the group `/finite_strain` with the networks' errors, and under pressure in `/block`, too. They take seconds "
+        "each. An incompressible material has none in plane strain.",
     )
     laying: LayingConfig | None = Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`.")
     stability: StabilityConfig | None = Field(

@@ -35,6 +35,7 @@ def of_study(study):
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
     stems = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
+    stems += ["finite_strain"] if study.further_references else []
     stems += ["block"] if any(LOADS[scene.load].kind == "face" for scene in study.scenes) else []
     stems += ["laying"] if study.laying else []
     files = {"tables": [*(f"{name}.csv" for name in stems), "index.html"]}
