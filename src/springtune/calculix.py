@@ -57,8 +57,8 @@ def side_weights(points, along, across, value, quadratic):
     return weights / weights.sum()
 
 
-def solve(points, elements, kind, material, thickness, load, held):
-    """Displacements by small-strain plane stress.
+def solve(points, elements, kind, material, thickness, load, held, finite=False):
+    """Displacements by plane stress at small strain, or neo-Hookean ones at finite strain.
 
     Parameters
     ----------
@@ -72,6 +72,8 @@ def solve(points, elements, kind, material, thickness, load, held):
     load : ndarray of float, shape (n_points, 2)
         Forces [N].
     held : ndarray of bool, shape (n_points, 2)
+    finite : bool
+        Whether strains are finite.
 
     Returns
     -------
@@ -87,21 +89,25 @@ def solve(points, elements, kind, material, thickness, load, held):
         return "\n".join(", ".join(map(str, row)) for row in rows)
 
     forces = [(n + 1, axis + 1, repr(float(load[n, axis]))) for n, axis in np.argwhere(load != 0)]
+    modulus, nu = material.young_modulus, material.poisson_ratio
+    law = f"*ELASTIC\n{modulus!r}, {nu!r}"
+    if finite:  # half the shear modulus, and 2 over the bulk modulus, in the 20 columns that a number may have
+        law = f"*HYPERELASTIC, NEO HOOKE\n{modulus / (4 * (1 + nu)):.12e}, {6 * (1 - 2 * nu) / modulus:.12e}"
+    increments = "0.1, 1.\n" if finite else ""
     clamps = [(n + 1, axis + 1, axis + 1) for n, axis in np.argwhere(held)]
     deck = f"""*NODE, NSET=ALL
 {lines((n + 1, repr(float(x)), repr(float(y)), 0.0) for n, (x, y) in enumerate(points))}
 *ELEMENT, TYPE={kind}, ELSET=SHEET
 {lines((e + 1, *(nodes + 1).tolist()) for e, nodes in enumerate(elements))}
 *MATERIAL, NAME=M
-*ELASTIC
-{material.young_modulus!r}, {material.poisson_ratio!r}
+{law}
 *SOLID SECTION, ELSET=SHEET, MATERIAL=M
 {thickness!r}
 *BOUNDARY
 {lines(clamps)}
-*STEP
+*STEP{", NLGEOM, INC=1000" if finite else ""}
 *STATIC
-*CLOAD
+{increments}*CLOAD
 {lines(forces)}
 *NODE PRINT, NSET=ALL
 U

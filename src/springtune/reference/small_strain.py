@@ -273,15 +273,17 @@ class UnitLevel:
     unknowns of a component are products of those on the lines, too.
 
     In double precision a slender cantilever loses digits with the fourth power of its aspect ratio. The solution is
-    therefore refined (Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 12): with the residual
-    :math:`r = l - A u` in extended precision and :math:`d` the correction by the double-precision factor of
-    :math:`A`, the energy is
+    therefore refined, by conjugate gradients whose preconditioner is the double-precision factor and whose residuals
+    :math:`r = l - A u` come in extended precision (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
+    chapter 12), not by the matrix :math:`A = B^T C B` but by strains, stresses and forces: large displacements cancel
+    in the strains, once. The energy is
 
     .. math:: l^T A^{-1} l = l^T u + u^T r + r^T A^{-1} r,
 
-    of which :math:`r^T A^{-1} r \approx r^T d` is left out. What remains is that matrix and residual are rounded
-    themselves: by no more than a count of operations times the unit round-off times :math:`|A| |u|` (Higham, section
-    3.1), hence in the displacement by :math:`|u|^T |A| |u|` times that. Both are computed and are `round_off`.
+    of which the last term is left out; the factor gives its size, over the least part of :math:`A` in it that the
+    iteration has met. A count of operations times the unit round-off bounds each rounding (section 3.1), and so the
+    displacement's by that times the work :math:`|\sigma|^T |B| |u|` of the stresses on the terms of the strains. Both
+    are computed, and their sum is `round_off`.
     """
 
     def __init__(self, length, nu, degree, kind="axial"):
