@@ -22,4 +22,4 @@ rule collect:
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.stages.collect {input.config} {params.folder} {output} > {log} 2>&1"
+        "python -m springtune.stages.collect {input.config} {params.folder} {output} > {log} 2>&1 && cat {log}"

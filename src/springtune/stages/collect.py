@@ -109,7 +109,19 @@ def run(config, folder, output):
     if fields:
         groups["/fields"] = fields.data
     dataset.write(output, groups, _attributes(study, config))
+    print(*_objected(data), sep="", end="")
     bundles.remember(folder.parent / tasks.COSTS, bundles.work_of(folder))
+
+
+def _objected(root):
+    """Lines on scenes whose errors are missing or not the networks' own."""
+    asked, there = root.status != 0, root.reference_displacement.notnull()
+    for scenes, what in (
+        (asked & ~there, "have no reference and no error"),
+        (asked & there & (root.reference_applies == 0), "are beyond the reference of small strain"),
+    ):
+        if scenes.any():
+            yield f"{int(scenes.sum())} of {int(asked.sum())} scenes {what}: `message` says why\n"
 
 
 class _Filler:
