@@ -14,7 +14,7 @@ def run(tasks, done):
     ----------
     tasks : str or Path
         JSON file: ``curves`` (folder) and ``groups``, each with ``name`` and ``members``, and each of these with
-        ``mesh, key``.
+        ``mesh, key, load, force``.
     done : str or Path
         JSON file to write: calibrated stiffness [N/m] by name of the group, and a message where there is none.
     """
@@ -32,7 +32,8 @@ def _best(tasks, member):
     """What a curve is called, its best stiffness [N/m], and why there is none."""
     name = member["key"]
     curve = store.read(Path(tasks["curves"]) / f"{member['mesh']}.h5", [name])[name]
-    return member["mesh"], curve["best_stiffness"], curve["best_message"]
+    called = f"{member['mesh']} in {member['load']} of {member['force']:g} N"
+    return called, curve["best_stiffness"], curve["best_message"]
 
 
 if __name__ == "__main__":

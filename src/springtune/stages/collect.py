@@ -93,7 +93,7 @@ def run(config, folder, output):
     )
     groups = {"/": data}
     if study.curves:
-        groups["/sensitivity"] = _sensitivity(study, folder, displacements, objections, axes)
+        groups["/sensitivity"] = _sensitivity(study, folder, displacements, axes)
     if study.moduli:
         groups["/moduli"] = _moduli(study, folder, axes)
     if study.further_references:
@@ -238,7 +238,7 @@ def _printed(study, root):
             continue  # a cell that this study does not ask for
 
 
-def _sensitivity(study, folder, displacements, objections, axes):
+def _sensitivity(study, folder, displacements, axes):
     curves = _Filler(dataset.empty(axes, dataset.SENSITIVITY_VARIABLES))
     for mesh, members in _by_mesh(study.curves).items():
         names = [tasks.curve_key(study, curve) for curve in members]
@@ -246,10 +246,7 @@ def _sensitivity(study, folder, displacements, objections, axes):
         for curve, name in zip(members, names):
             result, stiffness = results[name], np.array(tasks.stiffnesses(study, curve))
             displacement = result["displacement"]
-            labels = mesh.beam.name, curve.material.name, curve.load
-            reference = displacements.get(labels, np.nan)
-            # No stiffness makes up for a reference that does not apply.
-            fitted = np.nan if objections[*labels, curve.kinematics] else reference
+            reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
             solved, unstable, missing = map(dataset.STATUS.index, ("solved", "unstable", "not_converged"))
             status = np.where(np.isnan(displacement), missing, np.where(result["stable"], solved, unstable))
             curves.put(

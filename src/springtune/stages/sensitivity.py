@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from ..boundary import held, measured, weights
-from ..compare import best_stiffness
+from ..compare import Best, best_stiffness
 from ..mesh import read_mesh
 from ..network import Network
 from ..path import LinearPath, StablePath
+from ..reference.limits import objection
 from ..springs.lattice import uniform
 from ..statics import StaticProblem
 from . import files, references, store
@@ -69,8 +70,13 @@ def _trace(problem, weights, curves, folder):
 
 def _result(path, curve, displacement, stable, folder):
     force, stiffnesses = curve["force"], np.array(curve["stiffnesses"])
-    reference = force * references.read(folder, curve["reference"]).get("displacement", np.nan)
-    best = best_stiffness(stiffnesses, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
+    reference = references.read(folder, curve["reference"])
+    why = objection(reference, force, curve["kinematics"])
+    if why:
+        best = Best(np.nan, "failed", f"{why}; take a smaller force or linear kinematics")
+    else:
+        asked = force * reference["displacement"]
+        best = best_stiffness(stiffnesses, displacement, stable, asked, lambda stiffness: path.value(force / stiffness))
     return {
         "displacement": displacement,
         "stable": stable,

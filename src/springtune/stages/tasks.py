@@ -462,7 +462,7 @@ def _calibrate(study, folder):
     tasks = []
     for name, (mesh_type, material, kinematics) in sorted(groups.items()):
         members = [
-            {"mesh": curve.mesh.name, "key": curve_key(study, curve)}
+            {"mesh": curve.mesh.name, "key": curve_key(study, curve), "load": curve.load, "force": curve.force}
             for curve in study.curves
             if (curve.mesh.beam.name, curve.load) == study.calibration
             and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
