@@ -50,7 +50,7 @@ AXES = {
     "cg_iterations": (5, 25, 100, 0),
     "implicit_steps": (10, 50, 200),
     "sliver_angle": (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5),
-    "stiffness_contrast": tuple(10.0**power for power in range(0, 13, 2)),
+    "stiffness_contrast": tuple(10.0**power for power in range(0, 17, 2)),
     "stressed_poisson_ratio": (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5),
     "scale": (1e-5, 1e-4, 1e-3, 1e-2),
     "precision": ("float64", "float32"),
