@@ -50,7 +50,7 @@ SMALLEST_STEP = 1 / 64
 SHORTEST = 1 / 2048
 """Load step down to which springs that turn fast are told from springs that snap."""
 
-MODES = 12
+MODES = 24
 """Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
 
 MERGED = 1e-6
@@ -378,8 +378,9 @@ class StaticProblem:
         return self._in_steps(s, iterations)
 
     def _unstable(self, s, found):
+        """Whether a path leaves an equilibrium; flutter on the way is no matter of where it leads."""
         try:
-            return any(self.stability(s, found.displacements, found.factor))
+            return self.stability(s, found.displacements, found.factor)[0] > 0
         except SingularError:
             return True
 

@@ -7,7 +7,8 @@ prints how many scenes ended in which status, and every one whose answer is wron
 - its displacements are further than `PROMISED` from the equilibrium next to them, or none is next to them;
 - that equilibrium has a negative eigenvalue, or under a following pressure two of its lowest modes have merged
   (flutter);
-- it is not on the path that leads from rest, step by step, through stable equilibria.
+- it is not on the path that leads from rest, step by step, through equilibria without a negative eigenvalue. (Flutter
+  on the way is no matter of where the path leads.)
 
 Higher modes that have merged, which are the mesh's rather than the sheet's and which little damping holds, are counted
 beside with the damping ratio that they need, and so is what is refused though the path reaches its load stably. Scenes
@@ -51,7 +52,7 @@ them gives some 1e-3."""
 ROUNDING = 1e-12
 """Imaginary part over the largest eigenvalue that rounding may give."""
 
-LOW = 12
+LOW = 24
 """Modes below this number, from the lowest, are those that tell of flutter: `springtune.statics.MODES`."""
 
 WAYS = ("moderate", "critical", "large")
@@ -302,6 +303,10 @@ def audit(scene, path=True):
             return body.stable(unknowns, force)
         return not merged_modes(body, unknowns, force, masses)[0]
 
+    def upright(unknowns, force):
+        values = body.modes(unknowns, force, masses)
+        return not ((values.real < 0) & (np.abs(values.imag) <= MERGED * np.abs(values) + ROUNDING)).any()
+
     force = unit_force(scene) * scene.level
     if scene.way == "critical":
         guess = 1.6 * column(scene) if scene.load in ("compression", "pressure", "follower-pressure") else None
@@ -317,7 +322,7 @@ def audit(scene, path=True):
     if scene.kinematics == "linear":
         _check_linear(verdict, body, force, result)
     else:
-        _check_nonlinear(verdict, body, force, result, mesh, masses, sound, path)
+        _check_nonlinear(verdict, body, force, result, mesh, masses, upright if body.follower else None, path)
     return verdict
 
 
@@ -343,14 +348,15 @@ def _check_linear(verdict, body, force, result):
         verdict.wrong.append(f"eigenvalue {verdict.lowest:.1e}")
 
 
-def _check_nonlinear(verdict, body, force, result, mesh, masses, sound, path):
+def _check_nonlinear(verdict, body, force, result, mesh, masses, judge, path):
     if verdict.status != "solved":
         if verdict.status == "failed":
             return
-        end, share, why = body.follow(force, judge=sound if body.follower else None)
+        end, share, why = body.follow(force, judge=judge)
         if not why and not body.inside_out(end, mesh.cells.values()):
             verdict.lowest = float(body.lowest(end, force)[0]) if body.follower is None else math.nan
-            if not verdict.lowest <= 0:  # by less than what ends a path
+            flutters = body.follower is not None and merged_modes(body, end, force, masses)[0]
+            if not flutters and not verdict.lowest <= 0:  # by less than what ends a path
                 verdict.refused = "though the path from rest is stable up to the load"
         return
     found = result["displacements"].ravel()[body.free].astype(LONG)
@@ -373,7 +379,7 @@ def _check_nonlinear(verdict, body, force, result, mesh, masses, sound, path):
             modes = ", ".join(f"{mode} ({ratio:.1e})" for mode, ratio in fluttering.items())
             verdict.wrong.append(f"flutter: modes (damping that holds each) {modes} of {body.size}")
     if path and not verdict.wrong:
-        end, share, why = body.follow(force, judge=sound if body.follower else None)
+        end, share, why = body.follow(force, judge=judge)
         if why:
             verdict.wrong.append(f"path from rest: {why} beyond {100 * share:.4g} % of the load")
         elif _distance(end, exact) > 1e-5:
