@@ -166,8 +166,11 @@ def _strains(data, folder, stem):
             panel.pcolormesh(found, cmap=ListedColormap(STATUS_COLOURS), vmin=-0.5, vmax=5.5, edgecolor="white")
             pivots = data.negative_pivots.sel(strain_load=load, definition=names).values
             share = data.strain_load_share.sel(strain_load=load, definition=names).values
+            messages = data.strain_message.sel(strain_load=load, definition=names).values
             for i, j in np.ndindex(found.shape):
                 text = f"{pivots[i, j]:.0f}" if pivots[i, j] > 0 else f"{share[i, j]:.2f}" if share[i, j] < 1 else ""
+                if found[i, j] == 4 and not text:
+                    text = "f" if "flutters" in messages[i, j] else "path"
                 colour = "white" if found[i, j] in (3, 5) else "black"
                 panel.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=7, color=colour)
             strains = data.strain.values
@@ -176,7 +179,8 @@ def _strains(data, folder, stem):
             panel.grid(False)
             panel.set_title(STRAIN_LOADS[load])
         axes[-1, 0].set_xlabel("strain of a linear sheet under the load [%]")
-        kinds = ((1, "solved"), (4, "unstable: negative pivots"), (3, "no equilibrium: share of the load reached"))
+        unstable = "unstable: negative pivots, f: flutter, or the path to it"
+        kinds = ((1, "solved"), (4, unstable), (3, "no equilibrium: share of the load reached"))
         keys = [Patch(color=STATUS_COLOURS[flag], label=text) for flag, text in kinds]
         drawn.legend(handles=keys, loc="outside lower center", ncols=3)
 
