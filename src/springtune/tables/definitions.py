@@ -109,7 +109,8 @@ def _advice(root):
         ", ".join(f"{root.beam.values[i]} at {1e3 * root.mesh_size.values[j]:g} mm" for i, j in np.argwhere(group))
         for group in seen if group.any()
     )  # fmt: skip
-    return [*lines, "", f"Each line is the range over all meshes of the study up to its a/H and beyond that of the line before: {meshes}."]
+    said = "Each line is the range over all meshes of the study up to its a/H and beyond that of the line before"
+    return [*lines, "", f"{said}: {meshes}."]
 
 
 def _range(errors, flags):
