@@ -159,21 +159,15 @@ class StaticProblem:
     @cached_property
     def _slope(self):
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
-        factor, network = self.rest_factor, self.network
-        slope = network.expand(factor.solve(self.load))
 
-        def step(slope):
-            missing = self.load - network.linear_resistance(slope)
-            return missing, self._correction(factor, missing, slope, linear=True)
+        def balance(slope):
+            missing = self.load - self.network.linear_resistance(slope)
+            return missing, _norm(missing) / self.load_norm
 
-        missing, correction = step(slope)
-        while correction > REFINED:
-            better = slope + network.expand(factor.solve(missing))
-            missing_better, correction_better = step(better)
-            if not correction_better <= 0.5 * correction:
-                break
-            slope, missing, correction = better, missing_better, correction_better
-        return slope, _norm(missing) / self.load_norm, correction
+        first = self.network.expand(self.rest_factor.solve(self.load))
+        here, correction = self._refine((first, *balance(first)), self.rest_factor, balance, linear=True)
+        slope, _, residual = here
+        return slope, residual, correction
 
     @property
     def slope(self):
@@ -452,7 +446,7 @@ class StaticProblem:
         factor = None
         try:
             factor = self._factorize(s, here[0])
-            refined, correction = self._refine(s, here, factor)
+            refined, correction = self._refine(here, factor, lambda displacements: self._balance(s, displacements))
             if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
                 factor = None
                 factor = self._factorize(s, refined[0])
@@ -462,14 +456,14 @@ class StaticProblem:
         reason = "" if correction <= CORRECTION else _uncertain(correction)
         return Equilibrium(displacements, not reason, steps, residual, factor, reason, correction)
 
-    def _refine(self, s, here, factor):
+    def _refine(self, here, factor, balance, linear=False):
         """Steps with one tangent for as long as each of them halves the estimated error; where they end, and that."""
-        correction = self._correction(factor, here[1], here[0])
+        correction = self._correction(factor, here[1], here[0], linear)
         while correction > REFINED:
             displacements = here[0] + self.network.expand(factor.solve(here[1]))
-            there = displacements, *self._balance(s, displacements)
-            better = self._correction(factor, there[1], displacements)
-            if not better <= 0.5 * correction or self.network.inverted(displacements):
+            there = displacements, *balance(displacements)
+            better = self._correction(factor, there[1], displacements, linear)
+            if not better <= 0.5 * correction or not linear and self.network.inverted(displacements):
                 break
             here, correction = there, better
         return here, correction

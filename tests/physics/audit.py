@@ -224,7 +224,7 @@ def body_of(scene, mesh, springs):
             opposite = b - a
             parts.append(Part(corners, squares_forces, stiffness, (opposite**2).sum(axis=2)))
         elif springs.energies:
-            raise NotImplementedError(f"the audit does not know the energies of '{scene.definition}'")
+            raise ValueError(f"the energies of '{scene.definition}' are not in the audit; write them in mechanics.py")
     return Body(x, held, pattern, parts, follower)
 
 

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from springtune.boundary import held, weights
 from springtune.continuation import buckling_load, follow
 from springtune.materials import Material
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.network import Network
+from springtune.reference.limits import elastica
 from springtune.springs import DEFINITIONS
 from springtune.statics import StaticProblem
 
@@ -227,19 +226,3 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     deflection = float(np.tensordot(found.displacements, pattern, axes=2)) / length
     # Shear and stretch are of the order of (H / L)^2, strains of up to ratio H / 2 L of their square.
     assert deflection == pytest.approx(elastica(ratio), rel=(5 + ratio**2) / slenderness**2)
-
-
-def elastica(ratio):
-    """Deflection over length of a cantilever under a dead end load, F L^2 / EI = ratio.
-
-    With k^2 = (1 + sin(end slope)) / 2 and sin(phi) = 1 / (k sqrt 2): sqrt(ratio) = K(k) - F(phi, k) and deflection =
-    1 - 2 (E(k) - E(phi, k)) / sqrt(ratio) (Bisshopp and Drucker, Quart. Appl. Math. 3:272, 1945).
-    """
-
-    def missing(square):
-        phi = np.arcsin(1 / np.sqrt(2 * square))
-        return ellipk(square) - ellipkinc(phi, square) - np.sqrt(ratio)
-
-    square = brentq(missing, 0.5 + 1e-12, 1 - 1e-12, xtol=1e-15)
-    phi = np.arcsin(1 / np.sqrt(2 * square))
-    return 1 - 2 * (ellipe(square) - ellipeinc(phi, square)) / np.sqrt(ratio)
