@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from . import __version__
-from .loads import LOADS
-from .reference.unit import unit_problem
-from .whole import write_text
+from .jobs.atomic import write_text
+from .problem.loads import LOADS
+from .reference.similarity import unit_problem
 
 SCHEMA = "study.schema.json"
 MANUAL = "README.md"
@@ -63,8 +63,8 @@ def predict(beam, thickness, mesh_type, size, unit, material, young, poisson):
     Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
     strain; a mesh too large for that has bands from coarser ones.
     """
-    from .predict import SOLVED, extrapolate, particles, references
-    from .predict import predict as choices
+    from .prediction import SOLVED, extrapolate, particles, references
+    from .prediction import predict as choices
     from .springs import DefinitionError
 
     try:
@@ -101,7 +101,7 @@ def _quantity(option, text, kind):
 
 
 def _asked_beam(text, thickness):
-    from .geometry import Beam
+    from .problem.geometry import Beam
 
     sides = text.lower().split("x")
     try:
@@ -114,7 +114,7 @@ def _asked_beam(text, thickness):
 
 
 def _asked_material(name, young, poisson):
-    from .materials import Material
+    from .problem.materials import Material
 
     if name is not None and name not in MATERIALS:
         raise ValueError(
@@ -145,7 +145,7 @@ def _is_made(mesh_type):
 
 def _asked_size(beam, mesh_type, size):
     """Length of an edge [m] of a mesh that is made; refused before anything is, where it would be too large."""
-    from .predict import MESHED, particles
+    from .prediction import MESHED, particles
 
     if size is None:
         raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
@@ -165,7 +165,7 @@ def _asked_size(beam, mesh_type, size):
 
 def _asked_mesh(beam, mesh_type, edge, unit):
     from .mesh import MESH_TYPES, read_beam_mesh
-    from .predict import SOLVED_FROM_FILE
+    from .prediction import SOLVED_FROM_FILE
 
     if edge is not None:
         return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
@@ -181,7 +181,7 @@ def _asked_mesh(beam, mesh_type, edge, unit):
 
 def _prediction(title, beam, material, choices, known, mesh_type, sizes):
     """Text of a prediction."""
-    from .predict import CASES
+    from .prediction import CASES
 
     modulus = material.young_modulus
     modulus = f"{modulus / 1e9:g} GPa" if modulus >= 1e9 else f"{modulus / 1e6:g} MPa"
@@ -269,7 +269,7 @@ def schema(write, folder):
 @click.option("--page", default="docs/which-definition.md", show_default=True, type=click.Path(path_type=Path))
 def which(dataset, write, page):
     """Compare definitions from a dataset: which one to use, what each attains."""
-    from .tables.definitions import decision
+    from .kinds.moduli.tables import decision
 
     _tables("which", decision, "moduli", dataset, page if write else None)
 
@@ -280,7 +280,7 @@ def which(dataset, write, page):
 @click.option("--page", default="docs/stability.md", show_default=True, type=click.Path(path_type=Path))
 def stability(dataset, write, page):
     """Show the experiments on stability of a dataset: steps, damping, and what is not to be trusted."""
-    from .tables.stability import page as tables
+    from .kinds.stability.tables import page as tables
 
     _tables("stability", tables, "stability", dataset, page if write else None)
 
@@ -292,8 +292,8 @@ def stability(dataset, write, page):
 @click.option("--page", default="docs/speed.md", show_default=True, type=click.Path(path_type=Path))
 def bench(dataset, compare, write, page):
     """Show the benchmark of a dataset, or how its seconds compare with an earlier one's."""
-    from .tables.benchmark import comparison
-    from .tables.benchmark import page as tables
+    from .kinds.benchmark.tables import comparison
+    from .kinds.benchmark.tables import page as tables
 
     if compare is None:
         _tables("bench", tables, "benchmark", dataset, page if write else None)

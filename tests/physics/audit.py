@@ -36,14 +36,14 @@ from mechanics import (
     spring_forces,
     squares_forces,
 )
-from springtune.loads import LOADS
-from springtune.materials import Material
+from springtune.kinds.scenes.solve import Solver
 from springtune.mesh import MESH_TYPES
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.stages.solve import Solver
 
 PROMISED = 1e-6
-"""Largest error of the displacements of a solved scene, relative: `springtune.statics.CORRECTION`."""
+"""Largest error of the displacements of a solved scene, relative: `springtune.mechanics.statics.CORRECTION`."""
 
 MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size from which two modes have merged; a load 1e-6 above the one that merges
@@ -53,7 +53,7 @@ ROUNDING = 1e-12
 """Imaginary part over the largest eigenvalue that rounding may give."""
 
 LOW = 24
-"""Modes below this number, from the lowest, are those that tell of flutter: `springtune.statics.MODES`."""
+"""Modes below this number, from the lowest, are those that tell of flutter: `springtune.mechanics.statics.MODES`."""
 
 WAYS = ("moderate", "critical", "large")
 """How far a scene is loaded: within the linear range, next to the loss of stability, or far beyond the linear range."""

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from springtune.boundary import held, weights
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, lattice
-from springtune.network import Network
+from springtune.problem.boundary import held, weights
 from springtune.springs.lattice import uniform
-from springtune.statics import StaticProblem
 
 
 def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind="axial"):

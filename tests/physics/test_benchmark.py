@@ -6,22 +6,24 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune import benchmark, calculix, factors
-from springtune import network as network_module
-from springtune.benchmark import Scene
-from springtune.boundary import held, weights
-from springtune.dataset import BENCHMARK_VARIABLES
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.kinds.benchmark import measure as benchmark
+from springtune.kinds.benchmark.approaches import METHODS
+from springtune.kinds.benchmark.measure import Scene
+from springtune.kinds.benchmark.names import RIVALS, method_names
+from springtune.kinds.benchmark.tables import comparison
+from springtune.linalg import factors
+from springtune.linalg.ordering import nested_dissection
+from springtune.mechanics import network as network_module
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.network import Network
-from springtune.ordering import nested_dissection
+from springtune.output.dataset import BENCHMARK_VARIABLES
+from springtune.problem.boundary import held, weights
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
+from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
-from springtune.rivals import METHODS
-from springtune.schemes import RIVALS, method_names
 from springtune.springs.lattice import half_weight
-from springtune.statics import StaticProblem
-from springtune.tables.benchmark import comparison
 
 BEAM = Beam("100x20", 0.1, 0.02, 1e-3)
 SCENES = {

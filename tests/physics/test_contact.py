@@ -7,14 +7,14 @@ import pytest
 from netgen.geom2d import SplineGeometry
 from netgen.meshing import MeshingParameters
 
-from springtune.compare import band
-from springtune.contact import Body, Contact, ContactError, Obstacle, oriented_outline
-from springtune.geometry import Strip, Trapezoid
-from springtune.laying import lay
-from springtune.loads import REFERENCE_SIZES
-from springtune.materials import Material
+from springtune.kinds.laying.lay import lay
+from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, oriented_outline
+from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, signed_areas
-from springtune.network import Network
+from springtune.problem.compare import band
+from springtune.problem.geometry import Strip, Trapezoid
+from springtune.problem.loads import REFERENCE_SIZES
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
 RUBBER, STEEL = Material("rubber", 1e6, 0.49), Material("steel", 210e9, 0.3)

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.boundary import held, weights
-from springtune.continuation import buckling_load, follow
-from springtune.materials import Material
+from springtune.mechanics.arc_length import buckling_load, follow
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
-from springtune.network import Network
+from springtune.problem.boundary import held, weights
+from springtune.problem.materials import Material
 from springtune.reference.limits import elastica
 from springtune.springs import DEFINITIONS
-from springtune.statics import StaticProblem
 
 HEIGHT = 0.02
 

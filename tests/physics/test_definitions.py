@@ -5,14 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.materials import Material
+from springtune.jobs import atomic, store
+from springtune.kinds.moduli import stage as moduli
+from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
+from springtune.mechanics.network import Network
 from springtune.mesh import ISOSCELES, MESH_TYPES, ROW_HEIGHT, Mesh, lattice, row_height
-from springtune.moduli import axial_moduli, ends, mean_gradient, shear_modulus
-from springtune.network import Network
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.adjoint import springs as adjoint
 from springtune.springs.identification import Misfit, patch_cases
-from springtune.stages import files, moduli, store
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
@@ -300,7 +301,7 @@ def test_stage_measures_the_mesh_that_is_made(tmp_path, mesh_type):
     box = {"length": 0.1, "height": HEIGHT}
     asked = [{"key": "one", "definition": "lattice", "poisson_ratio": 0.3}]
     task = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "asked": asked}
-    files.write_json(tmp_path / "tasks.json", {"folder": str(tmp_path), "patches": [task]})
+    atomic.write_json(tmp_path / "tasks.json", {"folder": str(tmp_path), "patches": [task]})
     moduli.run(tmp_path / "tasks.json", tmp_path / "done.json")
     found = store.read(tmp_path / "one.h5", ["one"])["one"]
     young, ratio, shear = errors("lattice", MESH_TYPES[mesh_type](**box, size=SIZE), 0.3)

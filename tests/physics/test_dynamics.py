@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune import factors
-from springtune.boundary import held, weights
-from springtune.continuation import buckling_load
-from springtune.dynamics import EXPLICIT, INTEGRATORS, Motion, centre, masses, rayleigh, relax
-from springtune.materials import Material
+from springtune.linalg import factors
+from springtune.mechanics.arc_length import buckling_load
+from springtune.mechanics.dynamics import EXPLICIT, INTEGRATORS, Motion, centre, masses, rayleigh, relax
+from springtune.mechanics.moduli import ends
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh, lattice
-from springtune.moduli import ends
-from springtune.network import Network
+from springtune.problem.boundary import held, weights
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import uniform
-from springtune.statics import StaticProblem
 
 STEEL = Material("steel", 210e9, 0.3)
 DENSITY = 7850.0

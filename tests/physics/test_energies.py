@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy
-from springtune.materials import Material
+from springtune.mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy
+from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, corner_angles, signed_areas
-from springtune.network import Network
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, delingette
 
 KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled")

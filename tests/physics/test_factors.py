@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from springtune import factors
-from springtune.boundary import held, measured, weights
-from springtune.factors import SingularError, factorised
+from springtune.linalg import factors
+from springtune.linalg.factors import SingularError, factorised
+from springtune.mechanics.network import Network
+from springtune.mechanics.series import trace
+from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.network import Network
-from springtune.path import trace
+from springtune.problem.boundary import held, measured, weights
 from springtune.springs.lattice import half_weight
-from springtune.statics import StaticProblem
 
 FORCE_OVER_STIFFNESS = 2e-4
 

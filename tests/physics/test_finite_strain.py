@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.reference.finite_strain import FiniteStrainError, NeoHooke, solve_neo_hooke
 from springtune.reference.limits import elastica
 from springtune.reference.small_strain import solve_small_strain

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csc_array
 
-from springtune.factors import Factor, SingularError
-from springtune.materials import Material
+from springtune.linalg.factors import Factor, SingularError
+from springtune.problem.materials import Material
 from springtune.springs import lattice as lattice_springs
 from springtune.springs.lattice import COEFFICIENT, uniform
 

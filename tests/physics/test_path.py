@@ -5,17 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.boundary import held, measured, weights
-from springtune.compare import best_stiffness
-from springtune.continuation import follow
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.mechanics.arc_length import follow
+from springtune.mechanics.network import Network
+from springtune.mechanics.series import ORDER, Expansion, StablePath, left_out, smallest_share, trace
+from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.network import Network
-from springtune.path import ORDER, Expansion, StablePath, left_out, smallest_share, trace
+from springtune.problem.boundary import held, measured, weights
+from springtune.problem.compare import best_stiffness
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import COEFFICIENT, uniform
-from springtune.statics import StaticProblem
 
 from problems import beam_problem
 

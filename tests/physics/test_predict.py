@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from springtune.boundary import held, weights
-from springtune.factors import SingularError
-from springtune.geometry import Beam
-from springtune.loads import LOADS
-from springtune.materials import Material
+from springtune.kinds.scenes.solve import Solver
+from springtune.linalg.factors import SingularError
+from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
-from springtune.network import Network
-from springtune.predict import CASES, extrapolate, particles, predict, references
+from springtune.prediction import CASES, extrapolate, particles, predict, references
+from springtune.problem.boundary import held, weights
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs import DEFINITIONS, DefinitionError, Springs
 from springtune.springs.lattice import uniform
-from springtune.stages.solve import Solver
 
 
 def springs_of(choice, mesh, beam, material):

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.boundary import held, loaded_edges, measured, weights
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import MODES, FollowerPressure, StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.network import Network
+from springtune.problem.boundary import held, loaded_edges, measured, weights
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs import DEFINITIONS
-from springtune.statics import MODES, FollowerPressure, StaticProblem
 
 BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
 FORCE = -20.0  # .1 MPa on 200 x 1 mm

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, MeshQuad, condense, solve
 from skfem.models.elasticity import linear_elasticity
 
-from springtune.geometry import Beam
-from springtune.loads import KINDS
-from springtune.materials import Material
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import KINDS
+from springtune.problem.materials import Material
 from springtune.reference.field import outline
 from springtune.reference.small_strain import FIRST_LEVEL, ReferenceNotConvergedError, UnitLevel, solve_small_strain
 

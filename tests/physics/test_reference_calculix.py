@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from springtune import calculix
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
+from springtune.reference import calculix
 from springtune.reference.finite_strain import solve_neo_hooke
 from springtune.reference.small_strain import solve_small_strain
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.reference.limits import beyond_linear, elastica, rotation_and_strain, rotation_effect
 from springtune.reference.small_strain import solve_small_strain
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from springtune import statics
-from springtune.statics import TOLERANCE
+from springtune.mechanics import statics
+from springtune.mechanics.statics import TOLERANCE
 
 from problems import beam_problem
 

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.schemes import EXPERIMENTS
+from springtune.jobs import atomic, bundles
+from springtune.jobs.costs import Work
+from springtune.kinds.stability.names import EXPERIMENTS
 from springtune.springs import DEFINITIONS
-from springtune.stages import bundles, files
-from springtune.stages.work import Work
 
 COSTS = st.dictionaries(st.integers(0, 60).map("task {}".format), st.floats(1e-3, 30.0), min_size=1, max_size=40)
 
@@ -55,7 +55,7 @@ def test_costs_follow_what_the_machine_measures(tmp_path):
     for _ in range(10):
         work.add("reference", 0, 3 * bundles.COSTS["reference"][0])
         work.add("a kind of no cost", 0, 1.0)
-    files.write_json(done, work.summary())
+    atomic.write_json(done, work.summary())
     bundles.remember(path, [done])
     assert bundles.Costs(path).of("reference") == pytest.approx(3 * bundles.COSTS["reference"][0])
     assert bundles.Costs(path).start_up == work.start_up + bundles.SPAWNED

@@ -209,7 +209,7 @@ class TestPredict:
             assert said in result.stdout
 
     def test_what_has_no_reference_says_so(self, monkeypatch):
-        from springtune import predict
+        from springtune import prediction as predict
         from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 
         def none_in_bending(*arguments, kind):
@@ -224,7 +224,7 @@ class TestPredict:
         assert "bending: no reference; its error estimate is 1" in result.stdout.splitlines()
 
     def test_unstable_networks_are_marked(self, monkeypatch):
-        from springtune.factors import SingularError
+        from springtune.linalg.factors import SingularError
         from springtune.springs import patch
 
         def unstable(*_):
@@ -259,7 +259,7 @@ class TestPredict:
         assert all(row.count(" to ") >= 3 for row in rows[1:])
 
     def test_large_files_are_refused(self, tmp_path, monkeypatch):
-        from springtune import predict
+        from springtune import prediction as predict
         from springtune.mesh import MESH_TYPES, write_mesh
 
         monkeypatch.setattr(predict, "SOLVED_FROM_FILE", 100)

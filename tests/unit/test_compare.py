@@ -5,9 +5,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from springtune.compare import best_stiffness, deformation_error
-from springtune.geometry import Beam
-from springtune.materials import Material
+from springtune.problem.compare import best_stiffness, deformation_error
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.springs.calibrated import calibrate
 from springtune.springs.lattice import predicted_stiffness
 

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from springtune import dataset
+from springtune.output import dataset
 
 AXES = {
     "beam": ("a", "b"),

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from springtune.cli import main
+from springtune.kinds.scenes.mesh import make
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
@@ -29,7 +30,6 @@ from springtune.mesh import (
     structured,
     write_mesh,
 )
-from springtune.stages.mesh import make
 
 boxes = {
     "length": st.floats(0.02, 0.3),

@@ -5,10 +5,10 @@ from dataclasses import asdict
 
 import pytest
 
-from springtune.materials import Material
+from springtune.kinds.scenes import solve
 from springtune.mesh import MESH_TYPES
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
-from springtune.stages import solve
 
 STEEL = asdict(Material("steel", 210e9, 0.3))
 

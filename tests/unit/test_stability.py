@@ -5,14 +5,16 @@ import re
 import numpy as np
 import pytest
 
-from springtune import stability
-from springtune.dataset import DIMENSIONS, FLAGS, STABILITY_VARIABLES, STATUS
-from springtune.geometry import Beam
-from springtune.materials import Material
-from springtune.schemes import AXES, BEHAVIOURS, EXPERIMENTS, ONCE
-from springtune.stages import code, store
-from springtune.stages.files import write_json
-from springtune.stages.stability import run
+from springtune.jobs import dependencies as code
+from springtune.jobs import store
+from springtune.jobs.atomic import write_json
+from springtune.kinds.stability import experiments as stability
+from springtune.kinds.stability.names import AXES, EXPERIMENTS, ONCE
+from springtune.kinds.stability.stage import run
+from springtune.mechanics.integrators import BEHAVIOURS
+from springtune.output.dataset import DIMENSIONS, FLAGS, STABILITY_VARIABLES, STATUS
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.study import StudyError, load_study
 
 STUDY = """
@@ -100,6 +102,6 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
 
 def test_static_stages_know_no_dynamics():
     """A static scene assembles no masses: its stage does not even import them, and density is in none of its keys."""
-    for stage in ("solve", "sensitivity", "moduli", "laying"):
+    for stage in ("kinds.scenes.solve", "kinds.scenes.sensitivity", "kinds.moduli.stage", "kinds.laying.stage"):
         assert not any(file.endswith(("dynamics.py", "kernels.py")) for file in code.modules(stage))
-    assert any(file.endswith("dynamics.py") for file in code.modules("stability"))
+    assert any(file.endswith("dynamics.py") for file in code.modules("kinds.stability.stage"))

@@ -4,7 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
-from springtune.stages import code, files, store
+from springtune.jobs import dependencies as code
+from springtune.jobs import store
 
 
 def test_results_come_back_as_they_went(tmp_path):
@@ -42,27 +43,32 @@ def test_broken_file_holds_nothing_and_is_replaced(tmp_path):
 
 
 def test_keys_depend_on_values_not_on_their_order():
-    assert files.key({"a": 1.0, "b": [2]}) == files.key({"b": [2], "a": 1.0})
-    assert files.key({"a": 1.0}) != files.key({"a": 1.0000000000000002})
+    assert store.key({"a": 1.0, "b": [2]}) == store.key({"b": [2], "a": 1.0})
+    assert store.key({"a": 1.0}) != store.key({"a": 1.0000000000000002})
 
 
 def test_stages_depend_on_what_they_import_and_on_nothing_else():
-    names = {stage: {path.rpartition("springtune/")[2] for path in code.modules(stage)} for stage in ("solve", "mesh")}
-    assert {"network.py", "statics.py", "springs/lattice.py", "mesh/free.py", "stages/store.py"} <= names["solve"]
-    for outside in ("figures/style.py", "dataset.py", "study/__init__.py", "reference/small_strain.py", "compare.py"):
-        assert outside not in names["solve"]
-    assert "statics.py" not in names["mesh"]
+    solve, mesh = (
+        {path.rpartition("springtune/")[2] for path in code.modules(f"kinds.scenes.{stage}")}
+        for stage in ("solve", "mesh")
+    )
+    assert {"mechanics/network.py", "mechanics/statics.py", "springs/lattice.py", "mesh/free.py"} <= solve
+    assert "jobs/store.py" in solve
+    for outside in ("output/style.py", "output/dataset.py", "study/__init__.py", "reference/small_strain.py"):
+        assert outside not in solve
+    assert "problem/compare.py" not in solve
+    assert "mechanics/statics.py" not in mesh
 
 
 def test_definitions_belong_to_the_stages_that_choose_them_and_to_their_own_keys():
-    solve, sensitivity = set(code.modules("solve")), set(code.modules("sensitivity"))
+    solve, sensitivity = set(code.modules("kinds.scenes.solve")), set(code.modules("kinds.scenes.sensitivity"))
     for name in ("angular", "delingette", "patch"):
         path = str(code.PACKAGE / f"springs/{name}.py")
         assert path in solve and path not in sensitivity
     # An edit of one definition is to solve that definition's scenes again and no others.
     digests = {name: code.definition_digest(name) for name in ("angular", "delingette", "patch", "lattice")}
     assert len(set(digests.values())) == len(digests)
-    assert not any(path.endswith("springs/angular.py") for path in code._closure("stages/solve.py"))
+    assert not any(path.endswith("springs/angular.py") for path in code._closure("kinds/scenes/solve.py"))
 
 
 @pytest.mark.parametrize("stage", ["mesh", "sensitivity", "solve", "reference"])
@@ -71,6 +77,6 @@ def test_physics_imports_no_workflow_dataset_or_plots(stage):
     import subprocess
     import sys
 
-    program = f"import sys, springtune.stages.{stage}; print(*sys.modules)"
+    program = f"import sys, springtune.kinds.scenes.{stage}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert not {"snakemake", "xarray", "matplotlib", "pandas", "pydantic", "pint"} & set(loaded)

@@ -11,9 +11,9 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from springtune.geometry import Beam
-from springtune.loads import LOADS
-from springtune.materials import Material
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
 from springtune.study import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, StudyError, load_study
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune import dataset
-from springtune.compare import assured
-from springtune.tables import benchmark, definitions, stability
+from springtune.kinds.benchmark import tables as benchmark
+from springtune.kinds.moduli import tables as definitions
+from springtune.kinds.stability import tables as stability
+from springtune.output import dataset
+from springtune.problem.compare import assured
 
 
 def cells(line):

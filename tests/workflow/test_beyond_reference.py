@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.stages import collect, store
-from springtune.tables import page
+from springtune.campaign import collect
+from springtune.jobs import store
+from springtune.kinds.scenes import tables as page
 
 STUDY = """
 title: A beam that bends too far

@@ -4,7 +4,7 @@ rule benchmark:
         "Racing scene {wildcards.race}"
     input:
         tasks=RESULTS / "tasks/benchmark_{race}.json",
-        code=modules("benchmark"),
+        code=modules("kinds.benchmark.stage"),
     output:
         RESULTS / "done/benchmark_{race}.json",
     threads: workflow.cores
@@ -13,4 +13,4 @@ rule benchmark:
     benchmark:
         RESULTS / "benchmarks/benchmark_{race}.tsv"
     shell:
-        "python -m springtune.stages.benchmark {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.benchmark.stage {input.tasks} {output} > {log} 2>&1"

@@ -12,7 +12,7 @@ rule collect:
         benchmark=expand(RESULTS / "done/benchmark_{race}.json", race=BUNDLES["benchmark"]),
         moduli=expand(RESULTS / "done/moduli_{bundle}.json", bundle=BUNDLES["moduli"]),
         printed=STUDY.printed_path or [],
-        code=modules("collect"),
+        code=modules("campaign.collect"),
     output:
         RESULTS / "dataset.nc",
     params:
@@ -22,4 +22,4 @@ rule collect:
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.stages.collect {input.config} {params.folder} {output} > {log} 2>&1 && cat {log}"
+        "python -m springtune.campaign.collect {input.config} {params.folder} {output} > {log} 2>&1 && cat {log}"

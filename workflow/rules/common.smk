@@ -6,8 +6,8 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from springtune.stages import tasks
-from springtune.stages.code import PACKAGE, modules
+from springtune.campaign import plan as tasks
+from springtune.jobs.dependencies import PACKAGE, modules
 from springtune.study import StudyError, load_study
 
 # One thread a process: the solvers are sequential, and cores are Snakemake's to share out.

@@ -1,4 +1,4 @@
-from springtune.figures.names import FORMATS, of_study
+from springtune.output.names import FORMATS, of_study
 
 FIGURES = {
     kind: [RESULTS / "figures" / f"{stem}.{ending}" for stem in stems for ending in FORMATS]
@@ -11,7 +11,7 @@ rule figures_sensitivity:
         "Drawing the sensitivity curves"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_sensitivity"),
+        code=modules("campaign.figures_sensitivity"),
     output:
         FIGURES["sensitivity"],
     params:
@@ -21,7 +21,7 @@ rule figures_sensitivity:
     benchmark:
         RESULTS / "benchmarks/figures_sensitivity.tsv"
     shell:
-        "python -m springtune.stages.figures_sensitivity {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.figures_sensitivity {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_scenes:
@@ -29,7 +29,7 @@ rule figures_scenes:
         "Drawing errors against mesh size and deformed networks"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_scenes"),
+        code=modules("campaign.figures_scenes"),
     output:
         FIGURES["size"],
         FIGURES["deformed"],
@@ -41,7 +41,7 @@ rule figures_scenes:
     benchmark:
         RESULTS / "benchmarks/figures_scenes.tsv"
     shell:
-        "python -m springtune.stages.figures_scenes {input.dataset} {params.folder} {params.kinds} > {log} 2>&1"
+        "python -m springtune.campaign.figures_scenes {input.dataset} {params.folder} {params.kinds} > {log} 2>&1"
 
 
 rule figures_definitions:
@@ -49,7 +49,7 @@ rule figures_definitions:
         "Drawing the comparison of definitions"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_definitions"),
+        code=modules("campaign.figures_definitions"),
     output:
         FIGURES["definitions"],
     params:
@@ -59,7 +59,7 @@ rule figures_definitions:
     benchmark:
         RESULTS / "benchmarks/figures_definitions.tsv"
     shell:
-        "python -m springtune.stages.figures_definitions {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.figures_definitions {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_block:
@@ -67,7 +67,7 @@ rule figures_block:
         "Drawing the pressed block"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_block"),
+        code=modules("campaign.figures_block"),
     output:
         FIGURES["block"],
     params:
@@ -77,7 +77,7 @@ rule figures_block:
     benchmark:
         RESULTS / "benchmarks/figures_block.tsv"
     shell:
-        "python -m springtune.stages.figures_block {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.figures_block {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_laying:
@@ -85,7 +85,7 @@ rule figures_laying:
         "Drawing the laid strips"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_laying"),
+        code=modules("campaign.figures_laying"),
     output:
         FIGURES["laying"],
     params:
@@ -95,7 +95,7 @@ rule figures_laying:
     benchmark:
         RESULTS / "benchmarks/figures_laying.tsv"
     shell:
-        "python -m springtune.stages.figures_laying {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.figures_laying {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_stability:
@@ -103,7 +103,7 @@ rule figures_stability:
         "Drawing the experiments on stability"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_stability"),
+        code=modules("campaign.figures_stability"),
     output:
         FIGURES["stability"],
     params:
@@ -113,7 +113,7 @@ rule figures_stability:
     benchmark:
         RESULTS / "benchmarks/figures_stability.tsv"
     shell:
-        "python -m springtune.stages.figures_stability {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.figures_stability {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_benchmark:
@@ -121,7 +121,7 @@ rule figures_benchmark:
         "Drawing the benchmark"
     input:
         dataset=rules.collect.output,
-        code=modules("figures_benchmark"),
+        code=modules("campaign.figures_benchmark"),
     output:
         FIGURES["benchmark"],
     params:
@@ -131,7 +131,7 @@ rule figures_benchmark:
     benchmark:
         RESULTS / "benchmarks/figures_benchmark.tsv"
     shell:
-        "python -m springtune.stages.figures_benchmark {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.figures_benchmark {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule figures_all:

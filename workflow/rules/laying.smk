@@ -3,7 +3,7 @@ rule laying:
         "Laying the strips of bundle {wildcards.bundle}"
     input:
         tasks=RESULTS / "tasks/laying_{bundle}.json",
-        code=modules("laying"),
+        code=modules("kinds.laying.stage"),
     output:
         RESULTS / "done/laying_{bundle}.json",
     log:
@@ -11,4 +11,4 @@ rule laying:
     benchmark:
         RESULTS / "benchmarks/laying_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.laying {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.laying.stage {input.tasks} {output} > {log} 2>&1"

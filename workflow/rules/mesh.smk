@@ -3,7 +3,7 @@ rule mesh:
         "Meshing bundle {wildcards.bundle}"
     input:
         tasks=RESULTS / "tasks/mesh_{bundle}.json",
-        code=modules("mesh"),
+        code=modules("kinds.scenes.mesh"),
     output:
         RESULTS / "done/mesh_{bundle}.json",
     log:
@@ -11,4 +11,4 @@ rule mesh:
     benchmark:
         RESULTS / "benchmarks/mesh_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.mesh {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.scenes.mesh {input.tasks} {output} > {log} 2>&1"

@@ -3,7 +3,7 @@ rule moduli:
         "Measuring effective moduli of bundle {wildcards.bundle}"
     input:
         tasks=RESULTS / "tasks/moduli_{bundle}.json",
-        code=modules("moduli"),
+        code=modules("kinds.moduli.stage"),
     output:
         RESULTS / "done/moduli_{bundle}.json",
     log:
@@ -11,4 +11,4 @@ rule moduli:
     benchmark:
         RESULTS / "benchmarks/moduli_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.moduli {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.moduli.stage {input.tasks} {output} > {log} 2>&1"

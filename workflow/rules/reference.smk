@@ -6,7 +6,7 @@ rule reference:
         "Solving the finite-element references of bundle {wildcards.bundle}"
     input:
         tasks=RESULTS / "tasks/reference_{bundle}.json",
-        code=modules("reference"),
+        code=modules("kinds.scenes.reference"),
     output:
         RESULTS / "done/reference_{bundle}.json",
     log:
@@ -14,4 +14,4 @@ rule reference:
     benchmark:
         RESULTS / "benchmarks/reference_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.reference {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.scenes.reference {input.tasks} {output} > {log} 2>&1"

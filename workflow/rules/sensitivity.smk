@@ -9,7 +9,7 @@ rule sensitivity:
         tasks=RESULTS / "tasks/sensitivity_{bundle}.json",
         meshes=RESULTS / "done/mesh_{bundle}.json",
         references=REFERENCES,
-        code=modules("sensitivity"),
+        code=modules("kinds.scenes.sensitivity"),
     output:
         RESULTS / "done/sensitivity_{bundle}.json",
     log:
@@ -17,7 +17,7 @@ rule sensitivity:
     benchmark:
         RESULTS / "benchmarks/sensitivity_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.sensitivity {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.scenes.sensitivity {input.tasks} {output} > {log} 2>&1"
 
 
 rule calibrate:
@@ -26,7 +26,7 @@ rule calibrate:
     input:
         tasks=RESULTS / "tasks/calibrate.json",
         curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
-        code=modules("calibrate"),
+        code=modules("kinds.scenes.calibrate"),
     output:
         RESULTS / "done/calibrate.json",
     log:
@@ -34,4 +34,4 @@ rule calibrate:
     benchmark:
         RESULTS / "benchmarks/calibrate.tsv"
     shell:
-        "python -m springtune.stages.calibrate {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.scenes.calibrate {input.tasks} {output} > {log} 2>&1"

@@ -6,7 +6,7 @@ rule solve:
         meshes=RESULTS / "done/mesh_{bundle}.json",
         references=REFERENCES,
         calibration=CALIBRATION,
-        code=modules("solve"),
+        code=modules("kinds.scenes.solve"),
     output:
         RESULTS / "done/solve_{bundle}.json",
     log:
@@ -14,4 +14,4 @@ rule solve:
     benchmark:
         RESULTS / "benchmarks/solve_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.solve {input.tasks} {output} {input.calibration} > {log} 2>&1"
+        "python -m springtune.kinds.scenes.solve {input.tasks} {output} {input.calibration} > {log} 2>&1"

@@ -3,7 +3,7 @@ rule stability:
         "Experiments on stability, bundle {wildcards.bundle}"
     input:
         tasks=RESULTS / "tasks/stability_{bundle}.json",
-        code=modules("stability"),
+        code=modules("kinds.stability.stage"),
     output:
         RESULTS / "done/stability_{bundle}.json",
     log:
@@ -11,4 +11,4 @@ rule stability:
     benchmark:
         RESULTS / "benchmarks/stability_{bundle}.tsv"
     shell:
-        "python -m springtune.stages.stability {input.tasks} {output} > {log} 2>&1"
+        "python -m springtune.kinds.stability.stage {input.tasks} {output} > {log} 2>&1"

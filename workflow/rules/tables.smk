@@ -1,4 +1,4 @@
-from springtune.tables import names as table_names
+from springtune.output import table_names
 
 TABLES = {
     kind: [RESULTS / "tables" / name for name in names] for kind, names in table_names.of_study(STUDY).items()
@@ -10,8 +10,8 @@ rule tables:
         "Writing the tables"
     input:
         dataset=rules.collect.output,
-        code=modules("tables"),
-        page=PACKAGE / "tables/page.html",
+        code=modules("campaign.tables"),
+        page=PACKAGE / "output/page.html",
     output:
         TABLES["tables"],
     params:
@@ -21,7 +21,7 @@ rule tables:
     benchmark:
         RESULTS / "benchmarks/tables.tsv"
     shell:
-        "python -m springtune.stages.tables {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.tables {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule tables_definitions:
@@ -29,7 +29,7 @@ rule tables_definitions:
         "Writing the tables of definitions"
     input:
         dataset=rules.collect.output,
-        code=modules("tables_definitions"),
+        code=modules("campaign.tables_definitions"),
     output:
         TABLES["definitions"],
     params:
@@ -39,7 +39,7 @@ rule tables_definitions:
     benchmark:
         RESULTS / "benchmarks/tables_definitions.tsv"
     shell:
-        "python -m springtune.stages.tables_definitions {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.tables_definitions {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule tables_stability:
@@ -47,7 +47,7 @@ rule tables_stability:
         "Writing the page of the experiments on stability"
     input:
         dataset=rules.collect.output,
-        code=modules("tables_stability"),
+        code=modules("campaign.tables_stability"),
     output:
         TABLES["stability"],
     params:
@@ -57,7 +57,7 @@ rule tables_stability:
     benchmark:
         RESULTS / "benchmarks/tables_stability.tsv"
     shell:
-        "python -m springtune.stages.tables_stability {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.tables_stability {input.dataset} {params.folder} > {log} 2>&1"
 
 
 rule tables_benchmark:
@@ -65,7 +65,7 @@ rule tables_benchmark:
         "Writing the page of the benchmark"
     input:
         dataset=rules.collect.output,
-        code=modules("tables_benchmark"),
+        code=modules("campaign.tables_benchmark"),
     output:
         TABLES["benchmark"],
     params:
@@ -75,4 +75,4 @@ rule tables_benchmark:
     benchmark:
         RESULTS / "benchmarks/tables_benchmark.tsv"
     shell:
-        "python -m springtune.stages.tables_benchmark {input.dataset} {params.folder} > {log} 2>&1"
+        "python -m springtune.campaign.tables_benchmark {input.dataset} {params.folder} > {log} 2>&1"

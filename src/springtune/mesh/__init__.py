@@ -3,7 +3,7 @@
 from functools import partial
 
 from .cells import Mesh, corner_angles, quality, signed_areas
-from .files import MeshError, read_beam_mesh, read_mesh, write_mesh
+from .formats import MeshError, read_beam_mesh, read_mesh, write_mesh
 from .free import free
 from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
 from .squares import alternating, braced, right

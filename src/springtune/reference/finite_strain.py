@@ -6,8 +6,9 @@ The strain energy is that of CalculiX and Abaqus,
 
 with the shear modulus mu and the bulk modulus K of the material at small strain. In plane stress the stretch across
 the sheet is eliminated in every point; an incompressible material, nu = 0.5, has there
-:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane. Kinds of load are those of `springtune.loads`:
-under an axial load and one on a face half of the beam is solved, which does not buckle; in bending and shear, whose
+:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane. Kinds of load are those of
+`springtune.problem.loads`: under an axial load and one on a face half of the beam is solved, which does not buckle; in
+bending and shear, whose
 symmetry large rotations break, the whole. Elements shrink towards the corners, and the load grows in steps where it
 must.
 """
@@ -18,7 +19,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
-from ..factors import Factor, SingularError
+from ..linalg.factors import Factor, SingularError
 
 COUNTS = (5, 8)
 """Elements over half the height of the two meshes that are solved; the second is the answer."""
@@ -51,7 +52,7 @@ class FiniteStrainSolution:
     Attributes
     ----------
     displacement : float
-        Displacement of the load, see `springtune.loads` [m].
+        Displacement of the load, see `springtune.problem.loads` [m].
     mean_displacement : float
         Mean displacement of the loaded side along the force [m].
     error_estimate : float
@@ -80,7 +81,7 @@ def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower
     force : float
         Force [N], positive outwards.
     kind : str
-        Kind of load, one of `springtune.loads.KINDS`.
+        Kind of load, one of `springtune.problem.loads.KINDS`.
     plane : str
         ``"stress"`` or ``"strain"``.
     follower : bool

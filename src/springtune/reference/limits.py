@@ -128,7 +128,7 @@ def objection(result, force, kinematics):
     Parameters
     ----------
     result : dict
-        A stored reference of small strain, for 1 N, see `springtune.stages.references.read`.
+        A stored reference of small strain, for 1 N, see `springtune.kinds.scenes.stored_reference.read`.
     force : float
         Force on the network [N].
     kinematics : str

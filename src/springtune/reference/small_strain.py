@@ -1,7 +1,7 @@
 """Reference for a beam: linear elasticity at small strain, plane stress, by finite elements.
 
-Kinds of load are those of `springtune.loads`. Of each beam half is solved; the dashed line is its axis of symmetry or
-antisymmetry::
+Kinds of load are those of `springtune.problem.loads`. Of each beam half is solved; the dashed line is its axis of
+symmetry or antisymmetry::
 
         axial                          bending                            shear
           ____________________ ->        ____________________            o  o  o  o  o  o
@@ -26,13 +26,13 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.sparse import block_array, coo_array, csr_array, diags_array, kron
 
-from ..factors import factorised
-from ..geometry import Beam
-from ..loads import KINDS
-from ..materials import Material
+from ..linalg.factors import factorised
+from ..problem.geometry import Beam
+from ..problem.loads import KINDS
+from ..problem.materials import Material
 from .field import interpolate
 from .limits import rotation_and_strain
-from .unit import unit_problem, unit_scales
+from .similarity import unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
 FIRST_LEVEL, LAST_LEVEL = 3, 8
@@ -128,7 +128,7 @@ def solve_small_strain(
     tolerance : float
         Largest relative error estimate to accept [1].
     kind : str
-        Kind of load, one of `springtune.loads.KINDS`.
+        Kind of load, one of `springtune.problem.loads.KINDS`.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def solve_small_strain(
 
     Notes
     -----
-    The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.unit`.
+    The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.similarity`.
 
     The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive levels
     are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and what is missing is the sum of all
@@ -160,8 +160,8 @@ def solve_small_strain(
 
     Examples
     --------
-    >>> from springtune.geometry import Beam
-    >>> from springtune.materials import Material
+    >>> from springtune.problem.geometry import Beam
+    >>> from springtune.problem.materials import Material
     >>> solution = solve_small_strain(Beam("200x40", 0.2, 0.04, 0.001), Material("steel", 210e9, 0.3), 400e3)
     >>> round(solution.displacement * 1e3, 3)
     9.501
@@ -176,7 +176,7 @@ def solve_small_strain(
 
 
 def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-4) -> ReferenceSolution:
-    """Displacements of a beam of height 2 with E = 1 under traction 1; see `springtune.reference.unit`.
+    """Displacements of a beam of height 2 with E = 1 under traction 1; see `springtune.reference.similarity`.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-
     nu : float
         Poisson's ratio [1].
     kind : str
-        Kind of load, one of `springtune.loads.KINDS`.
+        Kind of load, one of `springtune.problem.loads.KINDS`.
     tolerance : float
         Largest relative error estimate to accept [1].
 
@@ -253,7 +253,7 @@ class UnitLevel:
     degree : int
         Level: degree of the polynomials along each axis, and number of layers at a corner.
     kind : str
-        Kind of load, one of `springtune.loads.KINDS`.
+        Kind of load, one of `springtune.problem.loads.KINDS`.
 
     Attributes
     ----------

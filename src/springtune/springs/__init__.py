@@ -8,7 +8,7 @@ or with a material.
 import importlib
 from dataclasses import dataclass
 
-from ..loads import KINDS
+from ..problem.loads import KINDS
 from .base import DefinitionError, Springs
 
 __all__ = ["DEFINITIONS", "Definition", "DefinitionError", "Springs"]
@@ -29,7 +29,7 @@ class Definition:
     cells : tuple of int
         Numbers of corners of the cells that it can have.
     kinds : tuple of str
-        Kinds of load that it is for, of `springtune.loads.KINDS`.
+        Kinds of load that it is for, of `springtune.problem.loads.KINDS`.
     needs : str
         What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
     """

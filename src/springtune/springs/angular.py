@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from ..energies import AngleEnergy
+from ..mechanics.energies import AngleEnergy
 from ..mesh import signed_areas
 from .base import Springs, triangles_only
 from .lattice import half_weight

@@ -15,7 +15,7 @@ Cauchy part, an energy of the volume alone the rest. The plane form is derived h
 
 import numpy as np
 
-from ..energies import AreaEnergy
+from ..mechanics.energies import AreaEnergy
 from .base import Springs
 from .lattice import COEFFICIENT, half_weight
 

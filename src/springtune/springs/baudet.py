@@ -19,7 +19,7 @@ well as they should be under any load; G stays exact, E and nu are not, since th
 
 import numpy as np
 
-from ..energies import AreaEnergy
+from ..mechanics.energies import AreaEnergy
 from .base import Springs, from_rectangles, not_negative, rectangles_only
 
 

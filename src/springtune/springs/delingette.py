@@ -16,7 +16,7 @@ nu = 1/3; without it E is wrong by (10 - 6 nu) / (9 (1 - nu^2)) there.
 
 import numpy as np
 
-from ..energies import BiquadraticEnergy
+from ..mechanics.energies import BiquadraticEnergy
 from ..mesh import corner_angles, signed_areas
 from .base import Springs, triangles_only, zero
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..factors import SingularError
-from ..network import Network
+from ..linalg.factors import SingularError
+from ..mechanics.network import Network
 from . import lattice
 
 SPAN = 10.0

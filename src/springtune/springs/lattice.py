@@ -78,7 +78,7 @@ def predicted_stiffness(material, beam, mesh_size, load="traction"):
     mesh_size : float
         Edge length a [m].
     load : str, optional
-        Key of `springtune.loads.LOADS`.
+        Key of `springtune.problem.loads.LOADS`.
 
     Returns
     -------

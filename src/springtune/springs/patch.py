@@ -8,7 +8,7 @@ Derived here.
 
 from dataclasses import replace
 
-from ..moduli import axial_moduli
+from ..mechanics.moduli import axial_moduli
 from . import area, lattice
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from .asked import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, Study
 from .checks import check_definitions, check_meshes, check_names
 from .config import SECTIONS, StudyConfig, expected_value, json_schema
 from .expand import build, expand, files_of_meshes
 from .fields import NAME, NAME_RULE
-from .problems import Problems, StudyError, show
-from .source import read_yaml
+from .messages import Problems, StudyError, show
+from .model import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, Study
+from .yaml_lines import read_yaml
 
 __all__ = [
     "OUTPUTS",

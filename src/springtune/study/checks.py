@@ -3,13 +3,13 @@
 import math
 from collections import Counter
 
-from ..loads import LOADS
+from ..kinds.benchmark.names import method_names
 from ..mesh import MESH_TYPES, QUADS
-from ..schemes import method_names
+from ..problem.loads import LOADS
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
 from .config import PLAUSIBLE
-from .problems import nearest
+from .messages import nearest
 
 MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""

@@ -4,8 +4,9 @@ from typing import Annotated, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..loads import LOADS
-from ..schemes import EXPERIMENTS, RIVALS
+from ..kinds.benchmark.names import RIVALS
+from ..kinds.stability.names import EXPERIMENTS
+from ..problem.loads import LOADS
 from .fields import (
     BeamName,
     DefinitionName,
@@ -35,7 +36,7 @@ from .fields import (
     Stress,
     Text,
 )
-from .problems import nearest, refuse, show
+from .messages import nearest, refuse, show
 
 PLAUSIBLE = 20.0
 """A stated stiffness farther than this factor from sqrt(3)/2 E t is taken for an error of units."""

@@ -2,14 +2,17 @@
 
 from itertools import product
 
-from ..geometry import Beam, Strip, Trapezoid
-from ..loads import LOADINGS, LOADS, REFERENCE_SIZES
-from ..materials import Material
+from ..kinds.benchmark.names import CURVE_COUNTS, RIVALS, method_names
+from ..kinds.stability.names import AXES, EXPERIMENTS, ONCE
+from ..linalg import SOLVERS
 from ..mesh import MESH_TYPES
-from ..schemes import AXES, CURVE_COUNTS, EXPERIMENTS, ONCE, RIVALS, SOLVERS, method_names
+from ..problem.geometry import Beam, Strip, Trapezoid
+from ..problem.loads import LOADINGS, LOADS, REFERENCE_SIZES
+from ..problem.materials import Material
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
-from .asked import (
+from .checks import check_files, mesh_type_names, stated_rows
+from .model import (
     FURTHER_REFERENCES,
     KINEMATICS,
     OUTPUTS,
@@ -24,7 +27,6 @@ from .asked import (
     Scene,
     Study,
 )
-from .checks import check_files, mesh_type_names, stated_rows
 from .printed import read_printed
 
 

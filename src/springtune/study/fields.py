@@ -7,12 +7,13 @@ from typing import Annotated
 from pydantic_core import core_schema
 
 from .. import units
-from ..loads import LOADINGS, LOADS
+from ..kinds.benchmark.names import RIVALS
+from ..kinds.stability.names import EXPERIMENTS
 from ..mesh import MESH_TYPES
-from ..schemes import EXPERIMENTS, RIVALS
+from ..problem.loads import LOADINGS, LOADS
 from ..springs import DEFINITIONS
-from .asked import FURTHER_REFERENCES, KINEMATICS, OUTPUTS
-from .problems import nearest, refuse, show
+from .messages import nearest, refuse, show
+from .model import FURTHER_REFERENCES, KINEMATICS, OUTPUTS
 
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""

@@ -4,9 +4,9 @@ import csv
 import math
 from decimal import Decimal
 
-from ..loads import LOADS
-from .asked import PrintedCell
-from .problems import Problems, nearest
+from ..problem.loads import LOADS
+from .messages import Problems, nearest
+from .model import PrintedCell
 
 _PRINTED_COLUMNS = {
     # column: field and unit of PrintedCell; without unit, a text

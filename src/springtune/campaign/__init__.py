@@ -1,0 +1,1 @@
+"""A campaign: the plan of a study's jobs, its dataset, its figures and tables."""

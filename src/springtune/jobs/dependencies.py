@@ -1,0 +1,108 @@
+"""Which modules a stage runs on, and a digest of them.
+
+Snakemake does not see edits of an imported package, and taking the whole package as input would solve everything
+again after an edit of a plot. So each stage depends on the modules that it imports, found in their source.
+"""
+
+import ast
+import hashlib
+from functools import cache
+from importlib.util import resolve_name
+from pathlib import Path
+
+from ..springs import DEFINITIONS
+
+PACKAGE = Path(__file__).parents[1]
+
+CHOOSING = {
+    "kinds.scenes.solve",
+    "kinds.moduli.stage",
+    "kinds.laying.stage",
+    "kinds.stability.stage",
+    "kinds.benchmark.stage",
+}
+"""Stages that run definitions by name: which modules those are no import in them says."""
+
+
+@cache
+def modules(stage):
+    """Files of the package that a stage runs on: its own, all that it imports and the definitions that it may choose.
+
+    Parameters
+    ----------
+    stage : str
+        Module of a stage, from the package on, such as ``"campaign.collect"``.
+
+    Returns
+    -------
+    tuple of str
+        Paths, sorted.
+    """
+    found = set(_closure(_place(stage)))
+    for name in DEFINITIONS if stage in CHOOSING else ():
+        found |= set(_closure(_definition_file(name)))
+    return tuple(sorted(found))
+
+
+@cache
+def digest(stage):
+    """Hash of the source of a stage's modules, definitions left out."""
+    return _hash(_closure(_place(stage)))
+
+
+@cache
+def definition_digest(name):
+    """Hash of the source of a definition and of what it imports."""
+    return _hash(_closure(_definition_file(name)))
+
+
+def _place(stage):
+    return stage.replace(".", "/") + ".py"
+
+
+def _definition_file(name):
+    return f"springs/{DEFINITIONS[name].place.partition(':')[0]}.py"
+
+
+@cache
+def _closure(start):
+    """A file of the package and those that it imports, directly or not: paths, sorted."""
+    found, waiting = set(), {PACKAGE / start}
+    while waiting:
+        path = waiting.pop()
+        found.add(path)
+        waiting |= set(_imported(path)) - found
+    return tuple(sorted(str(path) for path in found))
+
+
+def _hash(paths):
+    total = hashlib.sha256()
+    for path in paths:
+        total.update(_source(path))
+    return total.hexdigest()
+
+
+@cache
+def _source(path):
+    return Path(path).read_bytes()
+
+
+@cache
+def _imported(path):
+    relative = path.relative_to(PACKAGE.parent).with_suffix("")
+    package = ".".join(relative.parts[:-1])
+    names = set()
+    for node in ast.walk(ast.parse(_source(path))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = resolve_name("." * node.level + (node.module or ""), package) if node.level else node.module
+            names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
+    files = []
+    for name in names:
+        parts = name.split(".")
+        if parts[0] != PACKAGE.name:
+            continue
+        place = PACKAGE.joinpath(*parts[1:])
+        files += [file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()]
+    return tuple(files)

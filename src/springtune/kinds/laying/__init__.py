@@ -1,0 +1,1 @@
+"""Strips laid on a trapezoid."""

@@ -1,0 +1,53 @@
+"""Stage `laying`: strips laid on a trapezoid."""
+
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from ...jobs import atomic, store
+from ...jobs.costs import Work, laying_units
+from ...problem.geometry import Strip, Trapezoid
+from ...problem.materials import Material
+from ...springs import DefinitionError
+from .lay import lay
+
+
+def run(tasks, done):
+    """Lay the strips that are not stored yet.
+
+    A strip that does not lie is stored with its status and message; it never stops the others.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder`` and ``strips``, each with ``key`` and what `springtune.kinds.laying.lay.lay` takes.
+    done : str or Path
+        JSON file to write: what the work was.
+    """
+    tasks, work = atomic.read_json(tasks), Work()
+    for task in tasks["strips"]:
+        path = Path(tasks["folder"]) / f"{task['key']}.h5"
+        if task["key"] not in store.stored(path):
+            begin = time.perf_counter()
+            store.add(path, {task["key"]: _lay(task)})
+            work.add("laying", laying_units(task["mesh_size"]), time.perf_counter() - begin)
+    atomic.write_json(done, work.summary())
+
+
+def _lay(task):
+    try:
+        found = lay(
+            Strip(**task["strip"]), Trapezoid(**task["trapezoid"]), Material(**task["material"]),
+            Material(**task["support"]), task["definition"], task["mesh_size"], loading=task["loading"],
+            pressure=task["pressure"], friction=task["friction"],
+        )  # fmt: skip
+    except DefinitionError as error:
+        return {"status": "failed", "message": f"{task['definition']}: {error}"}
+    except Exception as error:  # the other strips shall still arrive
+        return {"status": "failed", "message": f"{type(error).__name__}: {error}"}
+    return asdict(found) | {"status": "not_converged" if found.message else "solved"}
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Effective moduli of definitions, measured on patches."""

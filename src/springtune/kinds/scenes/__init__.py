@@ -1,0 +1,1 @@
+"""Scenes of the grids: meshes, references, networks and sensitivity curves."""

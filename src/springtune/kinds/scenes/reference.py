@@ -1,0 +1,64 @@
+"""Stage `reference`: one finite-element solution a unit problem, and one a scene at finite strain."""
+
+import sys
+import time
+from pathlib import Path
+
+from ...jobs import atomic, store
+from ...jobs.costs import Work
+from ...problem.geometry import Beam
+from ...problem.materials import Material
+from ...reference.small_strain import solve_unit
+
+
+def run(tasks, done):
+    """Solve the references of a bundle that are not there yet.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder``, ``references``, each with ``key`` and ``problem``, what
+        `springtune.reference.similarity.unit_problem` gives, and ``finite``, each with ``key, beam, material, force,
+        load, plane, follower``.
+    done : str or Path
+        JSON file to write: what the work was.
+    """
+    tasks, work = atomic.read_json(tasks), Work()
+    for kind, asked, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
+        for task in tasks[asked]:
+            path = Path(tasks["folder"]) / f"{task['key']}.h5"
+            if task["key"] in store.stored(path):
+                continue
+            begin = time.perf_counter()
+            result = solve(task)
+            result["seconds"] = time.perf_counter() - begin
+            store.add(path, {task["key"]: result})
+            work.add(kind, 0, result["seconds"])
+    atomic.write_json(done, work.summary())
+
+
+def _unit(task):
+    """Result of a unit problem."""
+    try:
+        solution = solve_unit(*task["problem"])
+    except RuntimeError as error:
+        return {"message": str(error)}
+    names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
+    return {name: getattr(solution, name) for name in names} | {"message": ""}
+
+
+def _finite(task):
+    """Result at finite strain."""
+    from ...reference.finite_strain import solve_neo_hooke  # here, since few studies need it
+
+    try:
+        beam, material = Beam(**task["beam"]), Material(**task["material"])
+        solution = solve_neo_hooke(beam, material, task["force"], task["load"], task["plane"], task["follower"])
+    except (RuntimeError, ValueError) as error:
+        return {"message": str(error)}
+    names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
+    return {name: getattr(solution, name) for name in names} | {"message": ""}
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

@@ -1,0 +1,98 @@
+"""Stage `sensitivity`: displacement against uniform stiffness, one equilibrium path for all loads of a mesh.
+
+Here, where equilibria are at hand, the stiffness at which a curve meets its reference is solved for, too.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ...jobs import atomic, store
+from ...jobs.costs import Work
+from ...mechanics.network import Network
+from ...mechanics.series import LinearPath, StablePath
+from ...mechanics.statics import StaticProblem
+from ...mesh import read_mesh
+from ...problem.boundary import held, measured, weights
+from ...problem.compare import Best, best_stiffness
+from ...reference.limits import objection
+from ...springs.lattice import uniform
+from . import stored_reference as references
+
+
+def run(tasks, done):
+    """Trace the curves of a bundle that are not stored yet.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name`` and
+        ``curves``, and each of these with ``key, kind, force, kinematics, stiffnesses, reference`` (see
+        `springtune.kinds.scenes.stored_reference.read`).
+    done : str or Path
+        JSON file to write: what the work was.
+    """
+    tasks, work = atomic.read_json(tasks), Work()
+    for family in tasks["families"]:
+        path = Path(tasks["folder"]) / f"{family['name']}.h5"
+        present = store.stored(path)
+        missing = [curve for curve in family["curves"] if curve["key"] not in present]
+        if not missing:
+            continue
+        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        results = {}
+        for kind in {curve["kind"]: None for curve in missing}:
+            problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
+            alike = [curve for curve in missing if curve["kind"] == kind]
+            results |= _trace(problem, measured(mesh, kind), alike, tasks["references"])
+        store.add(path, results)
+        for result in results.values():
+            work.add("curve", len(mesh.points), result["seconds"])
+    atomic.write_json(done, work.summary())
+
+
+def _trace(problem, weights, curves, folder):
+    """Results of the curves of a network by key; those under loads of one sign lie on one path."""
+    results = {}
+    for kinematics, sign in {(curve["kinematics"], np.sign(curve["force"])): None for curve in curves}:
+        begin = time.perf_counter()
+        alike = [curve for curve in curves if (curve["kinematics"], np.sign(curve["force"])) == (kinematics, sign)]
+        loads = [curve["force"] / np.array(curve["stiffnesses"]) for curve in alike]
+        path = (LinearPath if kinematics == "linear" else StablePath)(problem, weights, np.concatenate(loads))
+        parts = np.cumsum([len(each) for each in loads])[:-1]
+        found = zip(alike, np.split(path.values, parts), np.split(path.stable, parts))
+        of_these = {curve["key"]: _result(path, curve, *values, folder) for curve, *values in found}
+        seconds = (time.perf_counter() - begin) / len(alike)
+        results |= {key: result | {"seconds": seconds} for key, result in of_these.items()}
+    return results
+
+
+def _result(path, curve, displacement, stable, folder):
+    force, stiffnesses = curve["force"], np.array(curve["stiffnesses"])
+    reference = references.read(folder, curve["reference"])
+    why = objection(reference, force, curve["kinematics"])
+    if why:
+        best = Best(np.nan, "failed", f"{why}; take a smaller force or linear kinematics")
+    else:
+        asked = force * reference["displacement"]
+        best = best_stiffness(stiffnesses, displacement, stable, asked, lambda stiffness: path.value(force / stiffness))
+    return {
+        "displacement": displacement,
+        "stable": stable,
+        "message": "" if stable.all() else _ending(path, force),
+        "best_stiffness": best.stiffness,
+        "best_status": best.status,
+        "best_message": best.message,
+    }
+
+
+def _ending(path, force):
+    """Why a curve is not solved throughout."""
+    reason = path.end or "not followed through its turn"
+    return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Experiments on numerical stability."""

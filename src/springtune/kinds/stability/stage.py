@@ -1,0 +1,57 @@
+"""Stage `stability`: experiments on numerical stability."""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ...jobs import atomic, store
+from ...jobs.costs import Work
+from ...problem.geometry import Beam
+from ...problem.materials import Material
+from . import experiments as stability
+
+
+def run(tasks, done):
+    """Do the experiments that are not stored yet.
+
+    An experiment that fails is stored with its message; it never stops the others.
+
+    Parameters
+    ----------
+    tasks : str or Path
+        JSON file: ``folder`` and ``experiments``, each with ``key``, ``name`` and what
+        `springtune.kinds.stability.experiments.Setup` takes.
+    done : str or Path
+        JSON file to write: what the work was.
+    """
+    tasks, work = atomic.read_json(tasks), Work()
+    for task in tasks["experiments"]:
+        path = Path(tasks["folder"]) / f"{task['key']}.h5"
+        if task["key"] not in store.stored(path):
+            result = _experiment(task)
+            store.add(path, {task["key"]: result})
+            work.add(task["name"], 0, result.get("seconds", 0.0))
+    atomic.write_json(done, work.summary())
+
+
+def _experiment(task):
+    setup = stability.Setup(
+        Beam(**task["beam"]), Material(**task["material"]), task["force"], task["definition"], task["mesh_type"],
+        tuple(task["mesh_sizes"]),
+    )  # fmt: skip
+    begin = time.perf_counter()
+    try:
+        found = stability.run(task["name"], setup)
+    except Exception as error:  # the other experiments shall still arrive
+        return {"failure": f"{type(error).__name__}: {error}"}
+    # Texts are no arrays of a file.
+    found = {name: np.asarray(values) for name, values in found.items()}
+    texts = {name: values.tolist() for name, values in found.items() if values.dtype.kind == "O"}
+    arrays = {name: values for name, values in found.items() if name not in texts}
+    return arrays | texts | {"seconds": time.perf_counter() - begin}
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

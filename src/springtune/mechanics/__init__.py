@@ -1,0 +1,1 @@
+"""Mechanics of networks: equilibria, paths, motion, contact and moduli."""

@@ -1,0 +1,637 @@
+r"""Contact of bodies that must not penetrate each other, with Coulomb friction or without; no penalty to tune.
+
+Two polygons penetrate each other the most where a corner of one lies inside the other. So no corner of any outline may
+lie behind the edge of another body that it is nearest to, in both directions; what is left between the bodies is
+nothing but rounding, whichever body is finer. A field that a continuum would have, such as even pressure through a
+plane joint, stays exact whatever the two meshes are, since all functions that the meshes can form and that do not
+penetrate compete.
+
+Each Newton step minimises the quadratic energy of all bodies under these conditions, linearised,
+
+.. math:: \min_d \tfrac{1}{2} d^T K d - r^T d \quad \text{with} \quad g + G d \ge 0,
+
+by its dual: the contact forces are the minimum over the positive quadrant of a dense problem with as many unknowns as
+corners close or nearly do, each body entering with its own factorised tangent. A body that does not move far is
+factorised once; a rigid one has no unknowns at all, a floor neither.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.optimize import nnls
+from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array, vstack
+from scipy.sparse.linalg import splu
+
+from ..linalg.factors import SingularError, factorised
+
+REACH = 2.0
+"""Distance up to which corners and edges are watched, over the mesh size."""
+
+STRAIGHT = 1e-6
+"""Sine of the angle below which two edges are taken for one line."""
+
+JOINT = 1e-6
+"""Distance from the joint of two edges within which a corner is at it, over the mesh size."""
+
+LONGEST_STEP = 0.5
+"""Longest way of a particle in one Newton step, over the mesh size."""
+
+TOLERANCE = 1e-9
+"""Longest last Newton step, over the mesh size: its error is of the order of its square."""
+
+MAX_ITERATIONS = 40
+
+SMALLEST_STEP = 1e-4
+"""Smallest step of the load [1]."""
+
+SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
+"""Resistance to any motion that is tried in turn to make a tangent definite, over its mean diagonal."""
+
+GAP = 1e-9
+"""Depth of a corner behind an edge that counts as none, over the mesh size."""
+
+COMPLIANCE = 1e-11
+"""Of a contact beside the bodies' own at it [1]."""
+
+EXCHANGES = 30
+"""How often a set of closed contacts is exchanged before non-negative least squares look for it."""
+
+CHANGES = 4
+"""How often a Newton step may change which contacts it takes for closed."""
+
+FRICTION_TOLERANCE = 1e-6
+"""As `TOLERANCE`, where friction lags a step behind."""
+
+SLIP = 1e-3
+"""Way over which friction grows to its limit, over the mesh size, from where the load step began: what sticks creeps by
+about as much in each."""
+
+
+class ContactError(RuntimeError):
+    """A scene of contact that has no solution near the last good load step; the message says which."""
+
+
+def oriented_outline(mesh):
+    """Sides of the outline, the body on their left, shape (n, 2)."""
+    sides = np.concatenate(
+        [corners[:, [i, (i + 1) % count]] for count, corners in mesh.cells.items() for i in range(count)]
+    )
+    codes = np.sort(sides, axis=1) @ [len(mesh.points), 1]
+    _, first, counts = np.unique(codes, return_index=True, return_counts=True)
+    return sides[first[counts == 1]]
+
+
+def neighbours(outline):
+    """Edge after and edge before each edge of an outline, shape (2, n)."""
+    starts = np.empty(outline.max() + 1, dtype=int)
+    starts[outline[:, 0]] = np.arange(len(outline))
+    after = starts[outline[:, 1]]
+    before = np.empty(len(outline), dtype=int)
+    before[after] = np.arange(len(outline))
+    return np.stack([after, before])
+
+
+class Body:
+    """A network that others touch.
+
+    Parameters
+    ----------
+    network : Network
+    reference : float
+        Reference stiffness of the network [N/m].
+    forces : ndarray of float, shape (n_points, 2), optional
+        Dead forces at full load [N].
+    pressure : FollowerPressure, optional
+        Pressure that follows a side; it comes with `force`.
+    force : float, optional
+        Its total force at full load [N], positive outwards.
+    moves_little : bool, optional
+        Whether its tangent at rest serves throughout: it is factorised once.
+    prescribed : ndarray of float, shape (n_points, 2), optional
+        Displacements of held directions at full load [m]; zero without.
+    """
+
+    def __init__(self, network, reference, forces=None, pressure=None, force=0.0, moves_little=False, prescribed=None):
+        self.network, self.reference, self.prescribed = network, reference, prescribed
+        self.forces = np.zeros(network.held.shape) if forces is None else forces
+        self.pressure, self.force, self.moves_little = pressure, force, moves_little
+        self.outline = oriented_outline(network.mesh)
+        self.neighbours = neighbours(self.outline)
+        self.displacements = np.zeros(network.held.shape)
+        self._factorised = self._solve = None
+
+    @property
+    def points(self):
+        """Where the particles are [m], shape (n_points, 2)."""
+        return self.network.mesh.points + self.displacements
+
+    def missing(self, share):
+        """Loads less resistance [N], shape (unknowns,)."""
+        network, moved = self.network, self.displacements
+        load = network.reduce(share * self.forces)
+        if self.pressure is not None:
+            load = load + share * self.force * network.reduce(self.pressure.forces(moved))
+        resistance = network.linear_resistance(moved) if self.moves_little else network.resistance(moved)
+        return load - self.reference * resistance
+
+    def tangent(self, share, more=None):
+        """Tangent of resistance less load [N/m], symmetric.
+
+        Parameters
+        ----------
+        share : float
+            Share of the load [1].
+        more : sparse matrix, optional
+            Stiffness to add [N/m].
+        """
+        if self.moves_little:
+            tangent = self._rest_tangent
+        else:
+            follower = None if self.pressure is None else (share * self.force / self.reference, self.pressure)
+            tangent = self.network.tangent(self.displacements, follower)
+            if follower:
+                # A pressure on a side with free ends is not quite conservative; the minimum needs a symmetric matrix.
+                tangent = 0.5 * (tangent + tangent.T)
+            tangent = (self.reference * tangent).tocsc()
+        return tangent if more is None else (tangent + more).tocsc()
+
+    @cached_property
+    def _rest_tangent(self):
+        return (self.reference * self.network.tangent()).tocsc()
+
+    def factorise(self, tangent):
+        """Function that solves with a tangent [m/N], made definite where it is not; the last one is kept."""
+        if self._factorised is tangent:
+            return self._solve
+        scale = float(np.abs(tangent.diagonal()).mean())
+        # A little resistance to any motion: free bodies are held by contact alone, which the tangent does not know.
+        for added in SHIFTS:
+            matrix = (tangent + added * scale * eye_array(tangent.shape[0], format="csc")).tocsc()
+            factor = factorised(matrix)
+            with suppress(SingularError):  # a zero pivot
+                if not factor.negative_pivots:
+                    break
+        self._factorised, self._solve = tangent, factor.solve
+        return self._solve
+
+
+@dataclass
+class Obstacle:
+    """A rigid polygon.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n, 2)
+        Corners, counter-clockwise [m].
+    """
+
+    points: np.ndarray
+    outline: np.ndarray = field(init=False)
+
+    def __post_init__(self):
+        numbers = np.arange(len(self.points))
+        self.outline = np.stack([numbers, np.roll(numbers, -1)], axis=1)
+        self.neighbours = neighbours(self.outline)
+
+
+class _Sides:
+    """Edges and corners of an outline where they are now.
+
+    Attributes
+    ----------
+    start, along, length, normals : ndarray
+        Of each edge: its start [m], unit vector, length [m] and unit normal out of the body.
+    turn : ndarray of float
+        Sine of the turn at the end of each edge, positive where the body has a corner that sticks out.
+    corners : ndarray of int
+        Particles of the outline.
+    meeting : ndarray of float, shape (n_corners, 2, 2)
+        Normals of the edges that meet at each corner.
+    outward : ndarray of float, shape (n_corners, 2)
+        Their mean, a unit vector.
+    wraps : ndarray of bool, shape (n_corners,)
+        Whether the body is bent around each corner.
+    """
+
+    def __init__(self, body):
+        first, last = body.outline.T
+        self.start = body.points[first]
+        side = body.points[last] - self.start
+        self.length = np.linalg.norm(side, axis=1)
+        self.along = along = side / self.length[:, None]
+        self.normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        after, _ = body.neighbours
+        self.turn = along[:, 0] * along[after, 1] - along[:, 1] * along[after, 0]
+        order = np.argsort(last)
+        self.corners = last[order]
+        self.meeting = np.stack([self.normals, self.normals[after]], axis=1)[order]
+        both = self.meeting.sum(axis=1)
+        self.outward = both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)
+        self.wraps = (self.turn < -STRAIGHT)[order]
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Corners near edges.
+
+    Attributes
+    ----------
+    owners, corners : ndarray of int, shape (n,)
+        Body of each corner and the corner's particle.
+    targets, edges : ndarray of int, shape (n,) and (n, 2)
+        Body of each edge, -1 for the floor, and the edge's particles.
+    shares : ndarray of float, shape (n,)
+        Place of the corner along the edge [1].
+    normals : ndarray of float, shape (n, 2)
+        Unit normals of the edges, out of their body.
+    gaps : ndarray of float, shape (n,)
+        Distance of the corner from the edge [m], negative behind it.
+    """
+
+    owners: np.ndarray
+    corners: np.ndarray
+    targets: np.ndarray
+    edges: np.ndarray
+    shares: np.ndarray
+    normals: np.ndarray
+    gaps: np.ndarray
+
+
+class Contact:
+    """Bodies, rigid obstacles and a floor at y = 0.
+
+    Parameters
+    ----------
+    bodies : list of Body
+    obstacles : list of Obstacle, optional
+    floor : bool, optional
+        Whether y = 0 may not be passed.
+    size : float
+        Mesh size, the unit of tolerances [m].
+    friction : float, optional
+        Coulomb's coefficient of friction [1].
+    """
+
+    def __init__(self, bodies, obstacles=(), floor=False, size=1e-3, friction=0.0):
+        self.bodies, self.obstacles = list(bodies), list(obstacles)
+        self.floor, self.size, self.friction = floor, size, friction
+        self.all = self.bodies + self.obstacles
+        self.iterations, self.share = 0, 0.0
+        self.contacts, self.forces, self.drag = None, np.zeros(0), 0.0
+        self._anchor = [body.displacements.copy() for body in self.bodies]
+
+    # -- geometry ------------------------------------------------------------------------------------------------------
+
+    def find(self):
+        """Corners that are near an edge of another body that faces them: the nearest one of each other body.
+
+        Where the edges of the other body turn towards the corner, it has to stay before the next ones as well; where
+        they turn away and it is at their joint, that joint's own conditions hold it.
+
+        Returns
+        -------
+        Contacts
+        """
+        none = np.zeros(0, dtype=int)
+        parts = [(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
+        reach = REACH * self.size
+        sides = [_Sides(body) for body in self.all]
+        for owner, first in enumerate(self.all):
+            corners, outward, wraps = sides[owner].corners, sides[owner].outward, sides[owner].wraps
+            places = first.points[corners]
+            if self.floor and owner < len(self.bodies):
+                near = places[:, 1] <= reach
+                count = int(near.sum())
+                up = np.tile([0.0, 1.0], (count, 1))
+                parts.append(
+                    (np.full(count, owner), corners[near], np.full(count, -1), np.zeros((count, 2), int),
+                     np.zeros(count), up, places[near, 1])
+                )  # fmt: skip
+            for target, second in enumerate(self.all):
+                if target == owner or min(owner, target) >= len(self.bodies):
+                    continue
+                met = sides[target]
+                near = _near(met.start, places, reach)
+                shown = np.flatnonzero(_near(places, met.start, reach + met.length))
+                if not near.any() or not len(shown):
+                    continue
+                after, before = second.neighbours
+                turn = met.turn
+                start, along, length, normals = (
+                    part[shown] for part in (met.start, met.along, met.length, met.normals)
+                )
+                offset = places[near][:, None, :] - start[None, :, :]
+                gaps = np.einsum("nea,ea->ne", offset, normals)
+                shares = np.einsum("nea,ea->ne", offset, along) / length
+                beyond = length * np.maximum(np.maximum(-shares, shares - 1), 0)
+                # Of two edges equally near it is the one that faces the corner.
+                facing = JOINT * self.size * (1 + outward[near] @ normals.T)
+                nearest = (np.hypot(gaps, beyond) + facing).argmin(axis=1)
+                rows, edge = np.flatnonzero(near), shown[nearest]
+                gaps, shares, beyond = (part[np.arange(len(rows)), nearest] for part in (gaps, shares, beyond))
+                at_end, at_start = turn[edge], turn[before[edge]]
+                slack = np.where(wraps[rows], JOINT * self.size / met.length[edge], -1e-9)
+                # Beyond the end of an edge is the next one's place, or nobody's, unless the two make a notch.
+                beside = (shares < np.where(at_start > STRAIGHT, slack, -1e-9)) & (at_start >= -STRAIGHT)
+                beside |= (1 - shares < np.where(at_end > STRAIGHT, slack, -1e-9)) & (at_end >= -STRAIGHT)
+                beside |= np.hypot(gaps, beyond) > reach
+                # The far face of a thin body is turned away from the corner.
+                opposed = np.einsum("na,nba->nb", met.normals[edge], sides[owner].meeting[rows]).min(axis=1) < 0
+                rows, edge = rows[opposed & ~beside], edge[opposed & ~beside]
+                ahead, behind = turn[edge] < -STRAIGHT, turn[before[edge]] < -STRAIGHT
+                rows = np.concatenate([rows, rows[ahead], rows[behind]])
+                edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
+                offset = places[rows] - met.start[edge]
+                shares = np.einsum("na,na->n", offset, met.along[edge]) / met.length[edge]
+                gaps = np.einsum("na,na->n", offset, met.normals[edge])
+                parts.append(
+                    (np.full(len(rows), owner), corners[rows], np.full(len(rows), target), second.outline[edge],
+                     shares, met.normals[edge], gaps)
+                )  # fmt: skip
+        return Contacts(*(np.concatenate(column) for column in zip(*parts)))
+
+    def _rows(self, contacts, directions):
+        """Derivative of the corners' way against the edges along directions, for each body: (unknowns, n_contacts)."""
+        count = len(contacts.corners)
+        columns = []
+        for number, body in enumerate(self.bodies):
+            own, met = np.flatnonzero(contacts.owners == number), np.flatnonzero(contacts.targets == number)
+            shares = contacts.shares[met, None]
+            particles = np.concatenate([contacts.corners[own], *contacts.edges[met].T])
+            of = np.concatenate([own, met, met])
+            values = np.concatenate([directions[own], -(1 - shares) * directions[met], -shares * directions[met]])
+            held = body.network.held
+            places = (2 * particles[:, None] + [0, 1], np.repeat(of[:, None], 2, axis=1))
+            full = csc_array((values.ravel(), [place.ravel() for place in places]), shape=(held.size, count))
+            columns.append(full.tocsr()[~held.ravel()].tocsc())
+        return columns
+
+    @property
+    def penetration(self):
+        """Largest depth of a corner inside another body or below the floor [m]."""
+        deepest = 0.0
+        for owner, first in enumerate(self.all):
+            places = first.points[np.unique(first.outline)]
+            if self.floor and owner < len(self.bodies):
+                deepest = max(deepest, -places[:, 1].min())
+            for target, second in enumerate(self.all):
+                if target != owner and min(owner, target) < len(self.bodies):
+                    deepest = max(deepest, _depth(places, *second.points[second.outline].transpose(1, 0, 2)))
+        return float(deepest)
+
+    # -- mechanics -----------------------------------------------------------------------------------------------------
+
+    def solve(self, first=0.02, smallest=SMALLEST_STEP):
+        """Equilibrium under the whole load, in load steps that are as long as Newton's method allows.
+
+        Parameters
+        ----------
+        first, smallest : float
+            First and smallest load step [1].
+
+        Raises
+        ------
+        ContactError
+            Where no equilibrium is found; displacements are those of the last good step, at `share`.
+        """
+        step = first
+        while self.share < 1.0:
+            step = min(step, 1.0 - self.share)
+            kept = [body.displacements.copy() for body in self.bodies]
+            count = self.newton(self.share + step)
+            if count is None:
+                for body, before in zip(self.bodies, kept):
+                    body.displacements = before
+                step *= 0.35
+                if step < smallest:
+                    raise ContactError(f"no equilibrium beyond {100 * self.share:.3g} % of the load")
+                continue
+            self.share += step
+            self._anchor = [body.displacements.copy() for body in self.bodies]
+            if count <= 12:
+                step *= 2.0
+
+    def newton(self, share):
+        """Newton's method at a share of the load; number of steps, or None where it does not converge."""
+        limit = LONGEST_STEP * self.size
+        near = False
+        for body in self.bodies:
+            if body.prescribed is not None:
+                held = body.network.held
+                body.displacements = np.where(held, share * body.prescribed, body.displacements)
+        for count in range(1, MAX_ITERATIONS + 1):
+            self.iterations += 1
+            contacts = self.find()
+            with np.errstate(all="ignore"):
+                missing = [body.missing(share) for body in self.bodies]
+            if not all(np.isfinite(part).all() for part in missing):
+                return None
+            known = self._known(contacts)
+            more = self._turning(contacts, known)
+            drag = 0.0
+            if self.friction:
+                rubbing, stiffening, drag = self._friction(contacts, known)
+                missing = [part + force for part, force in zip(missing, rubbing)]
+                more = [_sum(*pair) for pair in zip(more, stiffening)]
+            rows = self._rows(contacts, contacts.normals)
+            try:
+                tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
+                found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
+                if found is None:
+                    found = self._opening(tangents, missing, rows, contacts.gaps, known > 0)
+            except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
+                return None
+            steps, forces = found
+            longest = max(np.abs(part).max() if len(part) else 0.0 for part in steps)
+            if not np.isfinite(longest):
+                return None
+            shorter = min(1.0, limit / longest) if longest > 0 else 1.0
+            for body, part in zip(self.bodies, steps):
+                body.displacements = body.displacements + body.network.expand(shorter * part)
+            self.contacts, self.forces, self.drag = contacts, forces, drag
+            near = longest <= limit
+            if longest <= (FRICTION_TOLERANCE if self.friction else TOLERANCE) * self.size:
+                return None if any(body.network.inverted(body.displacements) for body in self.bodies) else count
+        return None
+
+    def _opening(self, tangents, missing, rows, gaps, likely):
+        """Steps and contact forces from the quadratic minimum under the conditions of all contacts.
+
+        Of many contacts few close: the minimum is found under the conditions of those that are likely to, and of
+        those that it breaks besides.
+        """
+        solves = [body.factorise(tangent) for body, tangent in zip(self.bodies, tangents)]
+        steps = free = [solve(part) for solve, part in zip(solves, missing)]
+        opening = gaps + sum(row.T @ part for row, part in zip(rows, free))
+        forces, watched = np.zeros(len(gaps)), np.zeros(0, dtype=int)
+        answers = [np.zeros((len(part), 0)) for part in free]
+        more = np.flatnonzero(likely) if likely.any() else np.flatnonzero(opening < 0)[:1]
+        while len(more):
+            watched = np.concatenate([watched, more])
+            for number, (solve, row) in enumerate(zip(solves, rows)):
+                answers[number] = np.hstack([answers[number], solve(row[:, more].toarray())])
+            schur = sum(row[:, watched].T @ answer for row, answer in zip(rows, answers))
+            forces[watched] = _complementary(schur, opening[watched], likely[watched])
+            steps = [part + answer @ forces[watched] for part, answer in zip(free, answers)]
+            left = gaps + sum(row.T @ part for row, part in zip(rows, steps))
+            left[watched] = 0.0
+            # The worst first: most others are then kept, too.
+            more = np.flatnonzero(left < min(-GAP * self.size, 0.5 * left.min()))
+        return steps, forces
+
+    def _closed(self, tangents, missing, rows, gaps, closed):
+        """Newton step with the contacts that were closed; None where it is not clear which ones are.
+
+        Its tangent needs to be definite on what the closed contacts leave free, no more: the step of a true Newton
+        method, where `_opening` adds resistance. Contacts that pull are opened and those that close are added, a few
+        times over.
+        """
+        scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
+        stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)
+        sizes = np.cumsum([len(part) for part in missing])
+        for _ in range(CHANGES):
+            conditions = stacked[:, np.flatnonzero(closed)]
+            # Two corners may close one gap: a hair of compliance lets them share its force.
+            corner = -1e-10 / scale * eye_array(conditions.shape[1], format="csc")
+            matrix = block_array([[stiffness, -conditions], [-conditions.T, corner]], format="csc")
+            answer = splu(matrix).solve(np.concatenate([*missing, gaps[closed]]))
+            if not np.isfinite(answer).all():
+                return None
+            forces = np.zeros(len(gaps))
+            forces[closed] = answer[sizes[-1] :]
+            left = gaps + stacked.T @ answer[: sizes[-1]]
+            pulls = closed & (forces < -1e-9 * np.abs(forces).max(initial=0.0))
+            closes = ~closed & (left < -GAP * self.size)
+            if not pulls.any() and not closes.any():
+                return np.split(answer[: sizes[-1]], sizes[:-1]), np.maximum(forces, 0.0)
+            closed = (closed & ~pulls) | closes
+        return None
+
+    def _known(self, contacts):
+        """Contact forces of the step before on the corners that are still near [N], shape (n_contacts,)."""
+        old = self.contacts
+        if old is None:
+            return np.zeros(len(contacts.gaps))
+        forces = dict(zip(zip(old.owners, old.corners, old.targets, old.edges[:, 0]), self.forces))
+        keys = zip(contacts.owners, contacts.corners, contacts.targets, contacts.edges[:, 0])
+        return np.array([forces.get(key, 0.0) for key in keys])
+
+    def _turning(self, contacts, forces):
+        """Stiffness of the contact forces as the edges turn that they act on: the curvature of the gaps, by body."""
+        parts = [None] * len(self.bodies)
+        for number, body in enumerate(self.bodies):
+            met = np.flatnonzero((contacts.targets == number) & (forces > 0))
+            if not len(met) or body.moves_little:
+                continue
+            edges = contacts.edges[met]
+            start, end = (body.points[edges[:, i]] for i in range(2))
+            side = end - start
+            length = np.linalg.norm(side, axis=1)[:, None, None]
+            along = (side / length[:, :, 0])[:, :, None]
+            # From the start of the edge to the corner: along the edge, since the gap is closed.
+            corner = contacts.shares[met][:, None] * side
+            turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+            first, second = (corner @ turn.T)[:, :, None], (side @ turn)[:, :, None]
+            sides = (first @ along.transpose(0, 2, 1) + along @ first.transpose(0, 2, 1)) / length**2
+            mixed = -turn / length + along @ second.transpose(0, 2, 1) / length**2
+            curvature = np.concatenate(
+                [np.concatenate([sides, mixed], axis=2), np.concatenate([mixed.transpose(0, 2, 1), 0 * sides], axis=2)],
+                axis=1,
+            )
+            unit = np.eye(2)
+            change = np.block([[-unit, unit], [-unit, 0 * unit]])
+            matrices = -forces[met][:, None, None] * (change.T @ curvature @ change)
+            parts[number] = body.network.stiffness_of(edges, matrices)
+        return parts
+
+    def _friction(self, contacts, forces):
+        """Forces and stiffness of friction, its normal forces those of the step before; its force at each contact."""
+        tangents = np.stack([contacts.normals[:, 1], -contacts.normals[:, 0]], axis=1)
+        rows = self._rows(contacts, tangents)
+        slip = np.zeros(len(forces))
+        for row, body, anchor in zip(rows, self.bodies, self._anchor):
+            slip += row.T @ body.network.reduce(body.displacements - anchor)
+        width = SLIP * self.size
+        size = np.sqrt(slip**2 + width**2)
+        pull = self.friction * forces * slip / size
+        stiffness = self.friction * forces * width**2 / size**3 + 1e-3 * self.friction * forces / size
+        parts = []
+        for row in rows:
+            parts.append((row @ diags_array(stiffness) @ row.T).tocsc())
+        return [-(row @ pull) for row in rows], parts, -pull[:, None] * tangents
+
+    def contact_force(self):
+        """Sum of the contact forces and friction on the bodies from obstacles and floor [N], shape (2,)."""
+        bodies = len(self.bodies)
+        forces = self.forces[:, None] * self.contacts.normals + self.drag
+        outer = (self.contacts.owners < bodies) & ((self.contacts.targets < 0) | (self.contacts.targets >= bodies))
+        inner = (self.contacts.owners >= bodies) & (self.contacts.targets >= 0)
+        return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
+
+
+def _sum(first, second):
+    """Sum of two matrices, either of which may be missing."""
+    return second if first is None else first + second
+
+
+def _near(others, places, reach):
+    """Which places are within reach of the box around others, shape (n,)."""
+    reach = np.broadcast_to(reach, len(places))[:, None]
+    return ((places >= others.min(axis=0) - reach) & (places <= others.max(axis=0) + reach)).all(axis=1)
+
+
+def _depth(places, start, end):
+    """Largest depth of places inside a polygon of sides from start to end [m]."""
+    places = places[_near(start, places, 0.0)]
+    offset, side = places[:, None, :] - start, end - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Sides to the right of a place, at its height: an odd number of them where it is inside.
+        crossing = start[:, 0] + (places[:, 1:] - start[:, 1]) * side[:, 0] / side[:, 1] > places[:, :1]
+    passing = (start[:, 1] > places[:, 1:]) != (end[:, 1] > places[:, 1:])
+    inside = (passing & crossing).sum(axis=1) % 2 == 1
+    offset = offset[inside]
+    shares = np.clip(np.einsum("nea,ea->ne", offset, side) / np.einsum("ea,ea->e", side, side), 0, 1)
+    return np.linalg.norm(offset - shares[:, :, None] * side, axis=2).min(axis=1).max(initial=0.0)
+
+
+def _complementary(schur, opening, likely):
+    """Forces, none negative, that open gaps ``opening + schur @ forces`` to zero or more, and act on closed ones alone.
+
+    The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and Kunisch,
+    SIAM J. Optim. 13:865, 2002), and by non-negative least squares where that cycles. Corners along a plane joint, or
+    several on one edge, are more conditions than there are ways to move: a hair of compliance lets them share a force.
+
+    Parameters
+    ----------
+    schur : ndarray of float, shape (n, n)
+    opening : ndarray of float, shape (n,)
+    likely : ndarray of bool, shape (n,)
+        Contacts that are closed, as a first guess.
+
+    Returns
+    -------
+    ndarray of float, shape (n,)
+    """
+    # Corners of stiff and of soft bodies: each in units of its own compliance.
+    own = np.diagonal(schur)
+    unit = np.where(own > COMPLIANCE * own.max(), 1 / np.sqrt(np.maximum(own, 1e-300)), 0.0)
+    matrix = unit[:, None] * (0.5 * (schur + schur.T)) * unit
+    matrix[np.diag_indices(len(unit))] += COMPLIANCE
+    right = -unit * opening
+    closed = likely | (right > 0)
+    for _ in range(EXCHANGES):
+        forces = np.zeros(len(unit))
+        at = np.flatnonzero(closed)
+        try:
+            forces[at] = cho_solve(cho_factor(matrix[np.ix_(at, at)], lower=True), right[at])
+        except LinAlgError:
+            break
+        new = np.where(closed, forces > 0, matrix @ forces < right)
+        if (new == closed).all():
+            return unit * forces
+        closed = new
+    root = cholesky(matrix, lower=True)
+    return unit * nnls(root.T, solve_triangular(root, right, lower=True), maxiter=30 * len(unit))[0]

@@ -1,0 +1,17 @@
+"""Names of time integrators, and what a run makes of noise."""
+
+EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
+"""Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
+it comes with, to first order; that of central differences half a step earlier. `central-difference` takes damping in
+proportion to mass implicitly; dampers along springs lag by half a step in all of them."""
+
+IMPLICIT = ("backward-euler", "implicit-midpoint")
+"""Implicit schemes: the first one in the manner of SOFA, one linear solve a step, the second one of second order."""
+
+INTEGRATORS = (*EXPLICIT, *IMPLICIT)
+
+LAGGED = ("symplectic-euler", "central-difference-lagged")
+"""Schemes in which all damping lags, and narrows the step."""
+
+BEHAVIOURS = ("stable", "decaying", "growing", "nan")
+"""Meanings of the flags of ``behaviour``: what a run makes of noise."""

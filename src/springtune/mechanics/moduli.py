@@ -1,0 +1,153 @@
+"""Effective moduli of networks: patch tests with an even strain.
+
+::
+
+          o------o------o------o          u_x given on both ends, u_y free but for one particle: E and nu
+        ->|    sheet           |->
+          o------o------o------o          both given on the whole outline, as for even shear: G
+
+Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1]. They are those of the
+mesh that is given: rows of triangles fitted to a box are stretched, and their moduli differ from the exact lattice's
+(`springtune.mesh.lattice`) by a few percent.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from ..linalg.factors import SingularError
+from .network import Network
+
+
+def ends(mesh):
+    """Particles of the left and of the right end, straight or staggered: of outline edges that lie on neither face."""
+    y = mesh.points[:, 1]
+    tolerance = 1e-9 * np.ptp(y)
+    edges = mesh.edges[mesh.on_outline]
+    faces = [(np.abs(y[edges] - value) <= tolerance).all(axis=1) for value in (y.min(), y.max())]
+    edges = edges[~faces[0] & ~faces[1]]
+    middles = mesh.points[edges, 0].mean(axis=1)
+    left = middles < 0.5 * (middles.min() + middles.max())
+    return np.unique(edges[left]), np.unique(edges[~left])
+
+
+def mean_gradient(mesh, displacements):
+    """Mean displacement gradient over the area [1], shape (2, 2): derivative of row by column."""
+    total = np.zeros((2, 2))
+    for corners in mesh.cells.values():
+        # By the divergence theorem, side by side around each cell.
+        here, moved = mesh.points[corners], displacements[corners]
+        side = np.roll(here, -1, axis=1) - here
+        normal = np.stack([side[..., 1], -side[..., 0]], axis=2)
+        middle = 0.5 * (np.roll(moved, -1, axis=1) + moved)
+        total += np.einsum("nia,nib->ab", middle, normal)
+    return total / mesh.area
+
+
+class PatchTest:
+    """Patch tests of many networks on one mesh, whose numbering of unknowns they share.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    """
+
+    def __init__(self, mesh):
+        self.mesh = mesh
+        self._first = {}
+
+    def _network(self, name, held, springs):
+        network = Network(self.mesh, held, springs.relative, springs.energies, self._first.get(name))
+        self._first.setdefault(name, network)
+        if network.unknowns and network.rest_factor.negative_pivots:
+            raise SingularError("the network is unstable at rest")
+        return network
+
+    @cached_property
+    def _rollers(self):
+        """Particles at both ends, directions held and displacements given between rollers."""
+        left, right = ends(self.mesh)
+        held = np.zeros(self.mesh.points.shape, dtype=bool)
+        held[left, 0] = held[right, 0] = True
+        held[left[0], 1] = True
+        return left, right, held, np.where(held, self.mesh.points * [1.0, 0.0], 0.0)
+
+    @cached_property
+    def _frame(self):
+        """Directions held and displacements given under even shear of the whole outline."""
+        held = np.zeros(self.mesh.points.shape, dtype=bool)
+        held[self.mesh.edges[self.mesh.on_outline]] = True
+        return held, self.mesh.points[:, ::-1] * [1.0, 0.0]
+
+    def axial(self, springs):
+        """See `axial_moduli`."""
+        mesh, (left, right, held, given) = self.mesh, self._rollers
+        network = self._network("rollers", held, springs)
+        moved = given + network.expand(network.rest_factor.solve(-network.linear_resistance(given)))
+        force = network.linear_forces(moved)[right, 0].sum()
+        height = mesh.area / (mesh.points[right, 0].mean() - mesh.points[left, 0].mean())
+        stress = force / height
+        if springs.lateral:
+            pushed = network.expand(network.rest_factor.solve(network.reduce(lateral_forces(mesh))))
+            own = network.linear_forces(pushed)[right, 0].sum() * springs.lateral
+            stress = force / (height - own)
+            moved += stress * springs.lateral * pushed
+        strain = mean_gradient(mesh, moved)
+        return stress / strain[0, 0], -strain[1, 1] / strain[0, 0]
+
+    def shear(self, springs):
+        """See `shear_modulus`."""
+        held, given = self._frame
+        network = self._network("frame", held, springs)
+        moved = given
+        if network.unknowns:
+            moved = given - network.expand(network.rest_factor.solve(network.linear_resistance(given)))
+        return float((network.linear_forces(moved) * given).sum()) / self.mesh.area
+
+
+def axial_moduli(mesh, springs):
+    """Young's modulus along x and Poisson's ratio, between rollers.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    springs : Springs
+
+    Returns
+    -------
+    young_modulus : float
+        E t over the reference stiffness [1].
+    poisson_ratio : float
+        Mean transverse over mean axial strain, sign changed [1].
+
+    Raises
+    ------
+    SingularError
+        If the network is singular or unstable at rest.
+    """
+    return PatchTest(mesh).axial(springs)
+
+
+def shear_modulus(mesh, springs):
+    """Shear modulus under even shear of the whole outline.
+
+    Returns
+    -------
+    float
+        G t over the reference stiffness [1].
+
+    Raises
+    ------
+    SingularError
+        If the network is singular or unstable at rest.
+    """
+    return PatchTest(mesh).shear(springs)
+
+
+def lateral_forces(mesh):
+    """Forces of a unit stress [N/m] that pulls outwards on the lower and the upper face, shape (n_points, 2)."""
+    forces = np.zeros(mesh.points.shape)
+    y = mesh.points[:, 1]
+    for value, sign in ((y.min(), -1.0), (y.max(), 1.0)):
+        forces[:, 1] += sign * mesh.side_shares(mesh.outline_edges(1, value), 0)
+    return forces

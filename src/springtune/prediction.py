@@ -1,0 +1,397 @@
+"""Which definition and stiffness to use on a mesh, and how far off it is: solved, with linear kinematics.
+
+What a user without a study needs. Every definition worth a choice is solved on the mesh itself under three loads and
+compared with the converged reference of small strain; a patch test between rollers measures Young's modulus and
+Poisson's ratio of the network. Meshes too large for that have bands from coarser ones of their type.
+"""
+
+from dataclasses import dataclass, field, fields, replace
+from math import ceil, inf, nan, sqrt
+
+import numpy as np
+
+from .linalg.factors import SingularError
+from .mechanics.energies import AreaEnergy
+from .mechanics.moduli import PatchTest
+from .mechanics.network import Network
+from .mechanics.statics import StaticProblem
+from .mesh import ISOSCELES, MESH_TYPES, ROW_HEIGHT, row_height
+from .problem.boundary import held, weights
+from .problem.loads import LOADS
+from .reference.small_strain import ReferenceNotConvergedError, solve_small_strain
+from .springs import DEFINITIONS, DefinitionError, Springs, lattice
+from .springs.lattice import uniform
+
+CASES = ("traction", "bending", "shear")
+"""Loads that are solved, keys of `springtune.problem.loads.LOADS`."""
+
+ON_TRIANGLES = ("patch", "lattice", "van-gelder", "uniform", "delingette", "area", "patch-area")
+"""Definitions that are tried on triangles, springs alone first: of all that need no tuning, those that are the best one
+by their worst load on many beams; without any of them the choice is worse by points of percent."""
+
+ON_QUADS = ("patch", "baudet", "element-fit", "area")
+"""As `ON_TRIANGLES`, on meshes that have quadrilaterals. On rectangles a patch test changes nothing."""
+
+NEED_ENERGIES = ("delingette", "area", "patch-area")
+"""Those of them that need more than springs."""
+
+ALIKE = 1e-5
+"""Difference of stiffnesses, relative, below which they are one: they are shown with five digits."""
+
+SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
+"""Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
+
+BANDS_FROM = 10_000
+"""Particles of the finest mesh that a band is from."""
+
+MESHED = 10_000_000
+"""Particles beyond which no mesh is made anywhere: its edges alone take gigabytes."""
+
+FEWEST_CELLS = 4
+"""Cells across a beam from which on errors are taken to change regularly with the mesh size."""
+
+COARSER, TRIED = 6, 30
+"""Meshes that a band is from, and sizes of which each of them is chosen."""
+
+MARGIN, LEAST_MARGIN = 1.0, 5e-4
+"""What is added to a band at either end, over its width, and at least [1]."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A definition on a mesh: its stiffness, and what it gets wrong there.
+
+    Numbers are those of the mesh. Where it is too large to solve they are bands, pairs of a lower and an upper bound.
+
+    Attributes
+    ----------
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`; ``"uniform"`` with its stiffness corrected for the outline, see
+        `springtune.springs.lattice.predicted_stiffness`.
+    inside, outline : float
+        Stiffness of the sides of cells inside and on the outline [N/m]; NaN where they differ from one to the next.
+    extra : str
+        What there is besides these springs.
+    energies : bool
+        Whether a simulator needs more than springs for it.
+    traction, bending, shear : float
+        Deformation error under each load, linear kinematics against the reference of small strain [1]; NaN where there
+        is none, because of the reference or for the reason in `failures`.
+    young_modulus_error : float
+        Young's modulus along x between rollers over the material's, less one [1].
+    poisson_ratio : float
+        Poisson's ratio there [1].
+    failures : dict of str to str
+        What has no number on this mesh, a load, the ``"patch test"`` or the ``"springs"`` themselves, and why: the
+        network is unstable or singular at rest, or too ill-conditioned, or the definition refuses the mesh.
+    """
+
+    definition: str
+    inside: float
+    outline: float
+    extra: str
+    energies: bool
+    traction: float
+    bending: float
+    shear: float
+    young_modulus_error: float
+    poisson_ratio: float
+    failures: dict = field(default_factory=dict)
+
+    @property
+    def worst(self):
+        """Largest size of an error under the loads that have a reference [1]; infinite where the network fails."""
+        errors = np.abs([np.broadcast_to(getattr(self, load), 2) for load in CASES])
+        return inf if self.failures or np.isnan(errors).all() else float(np.nanmax(errors))
+
+
+def references(beam, material):
+    """References of the loads.
+
+    Parameters
+    ----------
+    beam : Beam
+    material : Material
+
+    Returns
+    -------
+    dict of str to ReferenceSolution or str
+        For 1 N, by load; where there is none the reason.
+    """
+    found = {}
+    for load in CASES:
+        try:
+            found[load] = solve_small_strain(beam, material, 1.0, kind=LOADS[load].kind)
+        except ReferenceNotConvergedError as error:
+            found[load] = str(error)
+    return found
+
+
+def predict(mesh, beam, material, known=None):
+    """Choices for a mesh, solved on it, the best one by its worst load first.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        That fills the beam.
+    beam : Beam
+    material : Material
+    known : dict, optional
+        What `references` gave for the beam and the material.
+
+    Returns
+    -------
+    list of Choice
+        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last.
+
+    Raises
+    ------
+    DefinitionError
+        If none of them can live on the mesh.
+    """
+    known = references(beam, material) if known is None else known
+    sheet, seen, choices, refusals = _Sheet(mesh, beam, material, known), set(), [], []
+    for name in ON_QUADS if len(mesh.quads) else ON_TRIANGLES:
+        try:
+            springs = sheet.springs(name)
+        except DefinitionError as error:
+            refusals.append(f"{name}: {error}")
+            choices.append(sheet.failed(name, "springs", str(error)))
+            continue
+        except SingularError as error:
+            choices.append(sheet.failed(name, "patch test", f"unstable: {error}"))
+            continue
+        # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
+        same = f"{springs.reference:.9g}", *sheet.key(springs)
+        if same not in seen:
+            seen.add(same)
+            choices.append(sheet.choice(name, springs))
+    if len(refusals) == len(choices):
+        raise DefinitionError("; ".join(refusals))
+    return sorted(choices, key=lambda choice: choice.worst)
+
+
+def particles(mesh_type, beam, size):
+    """Number of particles that a mesh would have, about.
+
+    Parameters
+    ----------
+    mesh_type : str
+        Key of `springtune.mesh.MESH_TYPES`.
+    beam : Beam
+    size : float
+        Length of an edge [m].
+
+    Returns
+    -------
+    float
+    """
+    return (beam.length / size + 1.5) * (beam.height / (_row_height(mesh_type) * size) + 1.0)
+
+
+def _row_height(mesh_type):
+    """Height of a row of cells over the mesh size [1]."""
+    if mesh_type in ISOSCELES:
+        return row_height(1.0, ISOSCELES[mesh_type])
+    return ROW_HEIGHT if mesh_type in ("structured", "free") else 1.0
+
+
+def _stretch(mesh_type, beam, size):
+    """How much wider cells come out than high, over what they should be, as whole numbers of them fit the beam [1]."""
+    shape, whole = _row_height(mesh_type), round
+    if mesh_type == "free":  # its sides are divided, each by itself
+        shape, whole = 1.0, ceil
+    rows = max(1, whole(beam.height / (shape * size)))
+    if mesh_type in ISOSCELES:
+        size = beam.height / (shape * rows)
+    return beam.length / max(1, whole(beam.length / size)) / (beam.height / (shape * rows))
+
+
+def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
+    """Choices for a mesh that is too large to solve: bands from coarser meshes of its type.
+
+    What a network gets wrong depends on the shape of its cells, which are stretched to fit the beam, and changes about
+    in proportion to the mesh size or to a higher power of it. So a band holds what meshes give whose sizes cover an
+    octave, chosen for cells that are stretched a little more and a little less than those asked for, and what a
+    straight line through these gives; its width is added at either end.
+
+    Parameters
+    ----------
+    mesh_type : str
+        Key of `springtune.mesh.MESH_TYPES`.
+    size : float
+        Length of an edge [m].
+    beam : Beam
+    material : Material
+    known : dict, optional
+        What `references` gave for the beam and the material.
+    most : int, optional
+        Largest number of particles to solve.
+
+    Returns
+    -------
+    choices : list of Choice
+        Their numbers are pairs of bounds; what fails on one of the meshes fails.
+    sizes : list of float
+        Mesh sizes that were solved [m].
+
+    Raises
+    ------
+    ValueError
+        If the beam is so slender that a mesh of so many particles has less than four cells across.
+    DefinitionError
+        If no definition can live on meshes of the type.
+    """
+    finest = sqrt(beam.length * beam.height / most)
+    while particles(mesh_type, beam, finest) > most:
+        finest *= 1.02
+    if 2 * finest > min(beam.length, beam.height) / FEWEST_CELLS:
+        raise ValueError(
+            f"a mesh of {1e3 * size:.6g} mm is too large to be solved here, and coarser ones that are not have less "
+            f"than {FEWEST_CELLS} cells across beam '{beam.name}'; make it a scene of a study"
+        )
+    parts = np.geomspace(finest, 2 * finest, COARSER * TRIED).reshape(COARSER, TRIED)
+    sizes = [_like(mesh_type, beam, size, part, sign) for part, sign in zip(parts, COARSER // 2 * (1, -1))]
+    known = references(beam, material) if known is None else known
+    solved = []
+    for one in sizes:
+        mesh = MESH_TYPES[mesh_type](beam.length, beam.height, one)
+        solved.append({choice.definition: choice for choice in predict(mesh, beam, material, known)})
+    # The same springs may go by one name on one mesh and by two on another.
+    names = [name for name in solved[0] if all(name in one for one in solved)]
+    choices = [_band([one[name] for one in solved], sizes, size) for name in names]
+    return sorted(choices, key=lambda choice: choice.worst), sizes
+
+
+def _like(mesh_type, beam, size, sizes, sign):
+    """Of some mesh sizes that whose cells are next to those of a size in their stretch, on one side of it if any is."""
+    asked = _stretch(mesh_type, beam, size)
+    apart = sign * np.array([_stretch(mesh_type, beam, one) / asked - 1 for one in sizes])
+    return float(sizes[np.argmin(np.where(apart >= -1e-9, np.abs(apart), 1 + np.abs(apart)))])
+
+
+def _band(choices, sizes, size):
+    """Bands of a definition at a size, from choices on meshes of other sizes."""
+    bands, failures = {}, {}
+    for part in fields(Choice):
+        if part.type is float:
+            values = np.array([getattr(choice, part.name) for choice in choices])
+            values = np.append(values, np.polyval(np.polyfit(sizes, values, 1), size))
+            low, high = values.min(), values.max()
+            margin = MARGIN * (high - low)
+            if part.name not in ("inside", "outline") and margin > 1e-9:  # what is exact is so on every mesh
+                margin = max(margin, LEAST_MARGIN)
+            bands[part.name] = float(low - margin), float(high + margin)
+    for choice in choices:
+        failures |= choice.failures
+    extra = "" if failures else _band_in_words([choice.extra.split(" ") for choice in choices])
+    return replace(choices[0], **bands, extra=extra, failures=failures)
+
+
+def _band_in_words(texts):
+    """One text of several that differ in their numbers, given in words."""
+    merged = []
+    for words in zip(*texts):
+        ends = [words[0]] if len(set(words)) == 1 else [min(words, key=float), max(words, key=float)]
+        merged.append(" to ".join(ends))
+    return " ".join(merged)
+
+
+class _Sheet:
+    """A mesh on which springs are solved; networks that differ in their reference stiffness alone once."""
+
+    def __init__(self, mesh, beam, material, known):
+        self.mesh, self.beam, self.material, self.known = mesh, beam, material, known
+        self._patterns, self._found, self._test = {}, {}, PatchTest(mesh)
+
+    def springs(self, name):
+        """Springs of a definition."""
+        if name != "uniform":
+            return DEFINITIONS[name].springs(self.mesh, self.material, self.beam.thickness)
+        faces = np.concatenate([self.mesh.outline_edges(1, value) for value in (0.0, self.beam.height)])
+        size = float(np.median(np.abs(np.diff(self.mesh.points[faces, 0]))))
+        return Springs(lattice.predicted_stiffness(self.material, self.beam, size), uniform(self.mesh))
+
+    @staticmethod
+    def key(springs):
+        """What tells networks apart but for their reference stiffness."""
+        return springs.relative.tobytes(), *(energy.key for energy in springs.energies)
+
+    def choice(self, name, springs):
+        """What springs are worth."""
+        displacements, moduli, failures = self._solved(springs)
+        numbers = dict.fromkeys(CASES, nan)
+        for load, displacement in displacements.items():
+            if not isinstance(self.known[load], str):
+                numbers[load] = displacement / (springs.reference * float(self.known[load].displacement)) - 1
+        young, ratio = moduli
+        young *= springs.reference / (self.material.young_modulus * self.beam.thickness)
+        numbers |= {"young_modulus_error": float(young) - 1, "poisson_ratio": float(ratio)}
+        return Choice(name, *self._parts(name, springs), bool(springs.energies), **numbers, failures=failures)
+
+    def failed(self, name, part, reason):
+        """Choice of a definition that gives no springs here."""
+        numbers = dict.fromkeys((*CASES, "young_modulus_error", "poisson_ratio"), nan)
+        return Choice(name, nan, nan, "", name in NEED_ENERGIES, **numbers, failures={part: reason})
+
+    def _solved(self, springs):
+        """Displacement of each load for unit force over reference stiffness [1]; E and nu; what has none and why."""
+        key = self.key(springs)
+        if key not in self._found:
+            displacements, moduli, failures, networks = {}, (nan, nan), {}, {}
+            for load in CASES:
+                try:
+                    displacements[load] = self._displacement(springs, LOADS[load].kind, networks)
+                except SingularError as error:
+                    failures[load] = str(error)
+            try:
+                moduli = self._test.axial(springs)
+            except SingularError as error:
+                failures["patch test"] = f"unstable: {error}"
+            self._found[key] = displacements, moduli, failures
+        return self._found[key]
+
+    def _displacement(self, springs, kind, networks):
+        directions, pattern = held(self.mesh, kind), weights(self.mesh, kind)
+        name = directions.tobytes()
+        if name not in networks:  # two loads hold the same
+            like = self._patterns.get(name)
+            networks[name] = Network(self.mesh, directions, springs.relative, springs.energies, like)
+            self._patterns.setdefault(name, networks[name])
+        problem = StaticProblem(networks[name], pattern)
+        try:
+            found = problem.linear(1.0)
+            status, message, _ = problem.judge(1.0, found)
+        except SingularError as error:
+            raise SingularError(f"unstable: {error}") from None
+        if status != "solved":
+            raise SingularError(message)
+        return float(np.tensordot(found.displacements, pattern, axes=2))
+
+    def _parts(self, name, springs):
+        """Stiffness of sides inside and on the outline, and in words what else there is."""
+        outline, several = self.mesh.on_outline, self.mesh.cells_per_edge > 1
+
+        def common(values):
+            values = springs.reference * values
+            alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
+            return float(np.median(values)) if alike else nan
+
+        inside, at_outline, diagonals = (
+            common(springs.relative[part]) for part in (several, outline, ~outline & ~several)
+        )
+        extra = []
+        for energy in springs.energies:
+            if isinstance(energy, AreaEnergy):
+                modulus = common(energy.modulus) / self.beam.thickness
+                extra.append(f"area energy, K_A = {1e-6 * modulus:.4g} MPa")
+            else:
+                extra.append("coupling of the sides of each triangle")
+        if len(self.mesh.quads):
+            extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
+        plain = {"patch": "lattice", "patch-area": "area"}.get(name)
+        if plain and not len(self.mesh.quads):
+            extra.append(f"{springs.reference / self.springs(plain).reference:.5f} times {plain}")
+        if name == "uniform":
+            extra.append("corrected for the outline")
+        return inside, at_outline, "; ".join([*(() if springs.energies else ("none",)), *extra])
