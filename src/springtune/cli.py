@@ -26,7 +26,8 @@ def main():
 @click.argument("config", type=click.Path(path_type=Path))
 def scenes(config):
     """Say what a study asks for, before anything runs."""
-    from .study import StudyError, load_study  # here, so that --help does not wait for it
+    from .kinds import load_study  # here, so that --help does not wait for it
+    from .study import StudyError
 
     try:
         study = load_study(config)
@@ -354,6 +355,8 @@ def summary(study):
     -------
     str
     """
+    from .kinds import kinds
+
     units = {unit_problem(one.beam, one.material, LOADS[one.load].kind) for one in study.references}
     networks = _networks(study)
     asked = sum(len(grid.scenes) for grid in study.grids)
@@ -370,9 +373,8 @@ def summary(study):
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
         ["networks", networks, "to factorise at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]
-    if study.moduli:
-        patches = {(one.mesh_type, one.mesh_size) for one in study.moduli}
-        rows.append(["moduli", len(study.moduli), f"measured on {_count(len(patches), 'patch')}"])
+    for kind in kinds():
+        rows += kind.summary(study.parts[kind.name]) if study.parts[kind.name] else []
     if study.printed:
         rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
     lines = [f"{study.name}: {study.title}", "", _table(rows, left=0, right=(1,)), ""]
@@ -438,9 +440,10 @@ def _table(rows, left, right=()):
 
 def schema_text():
     """JSON schema of studies, as the file holds it."""
-    from .study import json_schema
+    from .kinds import kinds
+    from .study import json_schema, study_model
 
-    return json.dumps(json_schema(), indent=2) + "\n"
+    return json.dumps(json_schema(study_model(kinds())), indent=2) + "\n"
 
 
 def manual_text(frame):
@@ -468,10 +471,11 @@ def manual_text(frame):
 
 
 def _key_tables():
-    from .study import SECTIONS
+    from .kinds import kinds
+    from .study import sections, study_model
 
     parts = []
-    for place, model in SECTIONS.items():
+    for place, model in sections(study_model(kinds())).items():
         paragraphs = [" ".join(paragraph.split()) for paragraph in inspect.getdoc(model).split("\n\n")]
         parts += ["", f"### `{place}`" if place else "### The file", "", "\n\n".join(paragraphs), ""]
         parts += ["| key | value | default | meaning |", "|---|---|---|---|"]

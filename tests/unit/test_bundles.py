@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.jobs import atomic, bundles
-from springtune.jobs.costs import Work
+from springtune.jobs.spent import Spent
 from springtune.kinds.stability.names import EXPERIMENTS
 from springtune.springs import DEFINITIONS
 
@@ -51,14 +51,14 @@ def test_two_new_tasks_run_two_bundles_again():
 def test_costs_follow_what_the_machine_measures(tmp_path):
     path, done = tmp_path / "costs.json", tmp_path / "done_0.json"
     assert bundles.Costs(path).of("reference") == bundles.COSTS["reference"][0]
-    work = Work()
+    spent = Spent()
     for _ in range(10):
-        work.add("reference", 0, 3 * bundles.COSTS["reference"][0])
-        work.add("a kind of no cost", 0, 1.0)
-    atomic.write_json(done, work.summary())
+        spent.add("reference", 0, 3 * bundles.COSTS["reference"][0])
+        spent.add("a kind of no cost", 0, 1.0)
+    atomic.write_json(done, spent.summary())
     bundles.remember(path, [done])
     assert bundles.Costs(path).of("reference") == pytest.approx(3 * bundles.COSTS["reference"][0])
-    assert bundles.Costs(path).start_up == work.start_up + bundles.SPAWNED
+    assert bundles.Costs(path).start_up == spent.start_up + bundles.SPAWNED
     before = path.read_text()
     bundles.remember(path, [done])  # the same jobs again say nothing new
     assert path.read_text() == before

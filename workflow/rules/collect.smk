@@ -3,16 +3,9 @@ rule collect:
         "Comparing, and collecting the dataset"
     input:
         config=CONFIG,
-        references=REFERENCES,
-        calibration=CALIBRATION,
-        curves=expand(RESULTS / "done/sensitivity_{bundle}.json", bundle=BUNDLES["sensitivity"]),
-        scenes=expand(RESULTS / "done/solve_{bundle}.json", bundle=BUNDLES["solve"]),
-        laying=expand(RESULTS / "done/laying_{bundle}.json", bundle=BUNDLES["laying"]),
-        stability=expand(RESULTS / "done/stability_{bundle}.json", bundle=BUNDLES["stability"]),
-        benchmark=expand(RESULTS / "done/benchmark_{race}.json", race=BUNDLES["benchmark"]),
-        moduli=expand(RESULTS / "done/moduli_{bundle}.json", bundle=BUNDLES["moduli"]),
+        done=DONE,
         printed=STUDY.printed_path or [],
-        code=modules("campaign.collect"),
+        code=modules("campaign.collect", *(f"kinds.{name}.{part}" for name in KINDS for part in ("kind", "collect"))),
     output:
         RESULTS / "dataset.nc",
     params:

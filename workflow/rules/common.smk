@@ -6,9 +6,10 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from springtune.campaign import plan as tasks
+from springtune.campaign import plan
 from springtune.jobs.dependencies import PACKAGE, modules
-from springtune.study import StudyError, load_study
+from springtune.kinds import KINDS, kinds, load_study
+from springtune.study import StudyError
 
 # One thread a process: the solvers are sequential, and cores are Snakemake's to share out.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -45,8 +46,4 @@ def loaded_study():
 CONFIG = chosen_config()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
-BUNDLES = tasks.write_tasks(STUDY, RESULTS, workflow.cores or 1)
-
-
-wildcard_constraints:
-    bundle="[0-9]+",
+BUNDLES = plan.write_tasks(STUDY, RESULTS, workflow.cores or 1)

@@ -1,78 +1,29 @@
-from springtune.output import table_names
+"""Tables and pages of text, one rule an output that has any."""
 
-TABLES = {
-    kind: [RESULTS / "tables" / name for name in names] for kind, names in table_names.of_study(STUDY).items()
-}
+TABLES = []
+PAGE_TABLES = [f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
 
+for made in plan.outputs():
+    if made.tables(STUDY) and made.name in STUDY.outputs:
+        TABLES += [RESULTS / "tables" / name for name in made.tables(STUDY)]
 
-rule tables:
-    message:
-        "Writing the tables"
-    input:
-        dataset=rules.collect.output,
-        code=modules("campaign.tables"),
-        page=PACKAGE / "output/page.html",
-    output:
-        TABLES["tables"],
-    params:
-        folder=str(RESULTS / "tables"),
-    log:
-        RESULTS / "logs/tables.log",
-    benchmark:
-        RESULTS / "benchmarks/tables.tsv"
-    shell:
-        "python -m springtune.campaign.tables {input.dataset} {params.folder} > {log} 2>&1"
-
-
-rule tables_definitions:
-    message:
-        "Writing the tables of definitions"
-    input:
-        dataset=rules.collect.output,
-        code=modules("campaign.tables_definitions"),
-    output:
-        TABLES["definitions"],
-    params:
-        folder=str(RESULTS / "tables"),
-    log:
-        RESULTS / "logs/tables_definitions.log",
-    benchmark:
-        RESULTS / "benchmarks/tables_definitions.tsv"
-    shell:
-        "python -m springtune.campaign.tables_definitions {input.dataset} {params.folder} > {log} 2>&1"
-
-
-rule tables_stability:
-    message:
-        "Writing the page of the experiments on stability"
-    input:
-        dataset=rules.collect.output,
-        code=modules("campaign.tables_stability"),
-    output:
-        TABLES["stability"],
-    params:
-        folder=str(RESULTS / "tables"),
-    log:
-        RESULTS / "logs/tables_stability.log",
-    benchmark:
-        RESULTS / "benchmarks/tables_stability.tsv"
-    shell:
-        "python -m springtune.campaign.tables_stability {input.dataset} {params.folder} > {log} 2>&1"
-
-
-rule tables_benchmark:
-    message:
-        "Writing the page of the benchmark"
-    input:
-        dataset=rules.collect.output,
-        code=modules("campaign.tables_benchmark"),
-    output:
-        TABLES["benchmark"],
-    params:
-        folder=str(RESULTS / "tables"),
-    log:
-        RESULTS / "logs/tables_benchmark.log",
-    benchmark:
-        RESULTS / "benchmarks/tables_benchmark.tsv"
-    shell:
-        "python -m springtune.campaign.tables_benchmark {input.dataset} {params.folder} > {log} 2>&1"
+        rule:
+            name:
+                f"tables_{made.name}"
+            message:
+                f"Writing the tables of {made.name}"
+            input:
+                dataset=rules.collect.output,
+                code=modules("campaign.tabulate", made.write, *(PAGE_TABLES if made.write == "campaign.page" else [])),
+                template=PACKAGE / "output/page.html",
+            output:
+                [RESULTS / "tables" / name for name in made.tables(STUDY)],
+            params:
+                folder=str(RESULTS / "tables"),
+                module=made.write,
+            log:
+                RESULTS / "logs" / f"tables_{made.name}.log",
+            benchmark:
+                RESULTS / "benchmarks" / f"tables_{made.name}.tsv"
+            shell:
+                "python -m springtune.campaign.tabulate {input.dataset} {params.folder} {params.module} > {log} 2>&1"

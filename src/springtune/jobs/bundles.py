@@ -1,44 +1,15 @@
 """Which tasks share a job: bundles of about equal cost, by what such tasks have cost on this machine.
 
 One process a scene would be all start-up, so tasks are put together until start-up is a small share of a job. Jobs say
-what their tasks cost (`springtune.jobs.costs`), the stage `collect` adds that up over studies (`remember`), and the
+what their tasks cost (`springtune.jobs.spent`), the stage `collect` adds that up over studies (`remember`), and the
 next bundles are made by it. A bundle once made keeps its tasks as long as the study asks for them: only what is new is
 shared out.
 """
 
 from collections import defaultdict
 from math import ceil
-from pathlib import Path
 
 from . import atomic
-
-COSTS = {
-    "mesh": (4e-3, 2.5e-5),
-    "linear": (5e-4, 1e-6),
-    "nonlinear": (1.5e-3, 1e-5),
-    "curve": (1.5e-3, 1e-5),
-    "moduli": (5e-4, 2e-6),
-    "reference": (3e-2, 0.0),
-    "finite": (1.0, 0.0),
-    "laying": (0.0, 1.5),
-    "adjoint": (0.05, 2e-4),
-    "annealed": (0.05, 1e-3),
-    "evolved": (0.05, 1e-3),
-    "limits": (10.0, 0.0),
-    "maps": (8.0, 0.0),
-    "drift": (9.0, 0.0),
-    "rest": (2.0, 0.0),
-    "sizes": (3.0, 0.0),
-    "strains": (2.0, 0.0),
-    "buckling": (2.0, 0.0),
-    "slivers": (0.1, 0.0),
-    "contrast": (0.1, 0.0),
-    "poisson": (0.3, 0.0),
-    "perturbation": (0.5, 0.0),
-}
-"""Seconds of a task, in any case and per particle, before any was measured; what a machine measures multiplies them.
-
-Kinds are the scenes' kinematics, other stages' tasks, definitions that search, and experiments on stability."""
 
 START_UP = 0.25
 """Seconds of imports of a job before any was measured."""
@@ -59,25 +30,31 @@ class Costs:
     Parameters
     ----------
     path : Path
-        File of `remember`; without it, costs are those of `COSTS`.
+        File of `remember`; without it, costs are the usual ones.
+    usual : dict of str to tuple
+        Seconds of a task, in any case and per unit, before any was measured, by name; what a machine measures
+        multiplies them.
     """
 
-    def __init__(self, path):
+    def __init__(self, path, usual):
+        self.usual = usual
         known = atomic.read_json(path) if path.exists() else {}
-        self.ratios = {kind: seconds / usual for kind, (usual, seconds) in known.get("kinds", {}).items() if usual}
+        self.ratios = {
+            kind: seconds / expected for kind, (expected, seconds) in known.get("kinds", {}).items() if expected
+        }
         self.start_up = known.get("start_up", START_UP) + SPAWNED
 
     def of(self, kind, units=0.0):
-        """Seconds of a task."""
-        return self.ratios.get(kind, 1.0) * _usual(kind, 1, units)
+        """Seconds of a task, none of one of no known cost."""
+        return self.ratios.get(kind, 1.0) * _usual(self.usual, kind, 1, units) if kind in self.usual else 0.0
 
 
-def _usual(kind, count, units):
-    always, each = COSTS[kind]
+def _usual(usual, kind, count, units):
+    always, each = usual[kind]
     return always * count + each * units
 
 
-def remember(path, done):
+def remember(path, done, usual):
     """Add what the jobs of a run did to what is known of the machine.
 
     Parameters
@@ -85,7 +62,9 @@ def remember(path, done):
     path : Path
         JSON file: sums of usual and of measured seconds by kind, and a job's imports.
     done : iterable of Path
-        Files of jobs that hold a `Work.summary`; those older than the file at `path` are in it already.
+        Files of jobs that hold a `Spent.summary`; those older than the file at `path` are in it already.
+    usual : dict of str to tuple
+        As of `Costs`.
     """
     known = atomic.read_json(path) if path.exists() else {"kinds": {}}
     since = path.stat().st_mtime if path.exists() else 0.0
@@ -93,13 +72,13 @@ def remember(path, done):
     sums = defaultdict(lambda: [0.0, 0.0])
     for note in notes:
         for kind, (count, units, seconds) in note.get("work", {}).items():
-            if kind in COSTS:
-                sums[kind][0] += _usual(kind, count, units)
+            if kind in usual:
+                sums[kind][0] += _usual(usual, kind, count, units)
                 sums[kind][1] += seconds
-    for kind, (usual, seconds) in sums.items():
+    for kind, (expected, seconds) in sums.items():
         before = known["kinds"].get(kind, [0.0, 0.0])
-        fade = min(1.0, REMEMBERED * usual / before[0]) if before[0] else 0.0
-        known["kinds"][kind] = [fade * before[0] + usual, fade * before[1] + seconds]
+        fade = min(1.0, REMEMBERED * expected / before[0]) if before[0] else 0.0
+        known["kinds"][kind] = [fade * before[0] + expected, fade * before[1] + seconds]
     starts = sorted(note["start_up"] for note in notes if note.get("work"))
     if starts:
         known["start_up"] = starts[len(starts) // 2]
@@ -153,8 +132,3 @@ def _number(seconds, size, start_up, cores, most):
     if count > cores:
         count = cores * ceil(count / cores)
     return max(1, min(max(count, min(cores, ceil(seconds / (2 * start_up)))), most))
-
-
-def work_of(folder):
-    """Files of a study's jobs that say what their tasks cost."""
-    return sorted(Path(folder).glob("done/*_*.json"))

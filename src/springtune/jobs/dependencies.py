@@ -14,32 +14,24 @@ from ..springs import DEFINITIONS
 
 PACKAGE = Path(__file__).parents[1]
 
-CHOOSING = {
-    "kinds.scenes.solve",
-    "kinds.moduli.stage",
-    "kinds.laying.stage",
-    "kinds.stability.stage",
-    "kinds.benchmark.stage",
-}
-"""Stages that run definitions by name: which modules those are no import in them says."""
 
-
-@cache
-def modules(stage):
-    """Files of the package that a stage runs on: its own, all that it imports and the definitions that it may choose.
+def modules(*names, definitions=False):
+    """Files of the package that modules run on: their own and all that they import.
 
     Parameters
     ----------
-    stage : str
-        Module of a stage, from the package on, such as ``"campaign.collect"``.
+    *names : str
+        Modules, from the package on, such as ``"campaign.collect"``.
+    definitions : bool, optional
+        Whether they run definitions by name: which modules those are no import in them says.
 
     Returns
     -------
     tuple of str
         Paths, sorted.
     """
-    found = set(_closure(_place(stage)))
-    for name in DEFINITIONS if stage in CHOOSING else ():
+    found = {path for name in names for path in _closure(_place(name))}
+    for name in DEFINITIONS if definitions else ():
         found |= set(_closure(_definition_file(name)))
     return tuple(sorted(found))
 

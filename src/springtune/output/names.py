@@ -84,7 +84,7 @@ def benchmark(scenes):
 
 def stability(study):
     """Selections of the figures of the experiments on stability."""
-    done = {one.name for one in study.stability}
+    done = {one.name for one in study.parts["stability"]}
     return {stem: {} for stem, experiment in STABILITY.items() if experiment in done}
 
 

@@ -51,11 +51,5 @@ LOADS = {
 }
 """Loads by name."""
 
-LOADINGS = ("pressure", "gravity", "ends")
-"""What lays a strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
-
-REFERENCE_SIZES = (1.0, 1.25, 1.6)
-"""Mesh sizes on which a laid strip's reference is solved, over the one that is asked for; the first is the answer."""
-
 KINDS = ("axial", "bending", "shear", "face")
 """Kinds of load; loads of one kind differ by a factor."""

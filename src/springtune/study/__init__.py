@@ -1,6 +1,6 @@
 """Studies: what a config file asks for, validated, named, free of duplicates and in a canonical order.
 
-`load_study` reads a YAML file. `springtune.study.config` says what the file may hold.
+`load` reads a YAML file; `springtune.study.config` says what the file may hold, study kinds add to it.
 """
 
 from pathlib import Path
@@ -8,36 +8,39 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from .checks import check_definitions, check_meshes, check_names
-from .config import SECTIONS, StudyConfig, expected_value, json_schema
-from .expand import build, expand, files_of_meshes
+from .config import StudyConfig, expected_value, json_schema, sections, study_model
+from .expand import Declared, build, expand, files_of_meshes
 from .fields import NAME, NAME_RULE
 from .messages import Problems, StudyError, show
-from .model import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, Study
+from .model import Curve, MeshSpec, Reference, Scene, Study
 from .yaml_lines import read_yaml
 
 __all__ = [
-    "OUTPUTS",
-    "SECTIONS",
     "Curve",
+    "Declared",
     "MeshSpec",
-    "Moduli",
     "Reference",
     "Scene",
     "Study",
+    "StudyConfig",
     "StudyError",
     "expected_value",
     "json_schema",
-    "load_study",
+    "load",
+    "sections",
+    "study_model",
 ]
 
 
-def load_study(path):
+def load(path, kinds):
     """Read, validate and expand a study.
 
     Parameters
     ----------
     path : str or Path
         YAML file.
+    kinds : tuple of Kind
+        Study kinds that it may have.
 
     Returns
     -------
@@ -58,8 +61,10 @@ def load_study(path):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
     content, lines = read_yaml(text, file)
     problems = Problems(file, lines)
-    config = _validate(content, problems)
+    config = _validate(study_model(kinds), content, problems)
     check_names(config, problems)
+    for kind in kinds:
+        kind.check(config, problems)
     problems.stop()
     check_meshes(config, content, problems)
     problems.stop()
@@ -69,16 +74,16 @@ def load_study(path):
     problems.stop()
     printed_path = path.parent / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    return build(config, grids, problems, about)
+    return build(config, grids, kinds, problems, about)
 
 
-def _validate(content, problems):
+def _validate(model, content, problems):
     """Config of what a file holds."""
     if content is None:
-        problems.add((), f"the file is empty; give the keys {', '.join(StudyConfig.model_fields)}")
+        problems.add((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
         problems.stop()
     try:
-        return StudyConfig.model_validate(content)
+        return model.model_validate(content)
     except ValidationError as error:
         for details in error.errors(include_url=False):
             path, place = [], content

@@ -3,7 +3,6 @@
 import math
 from collections import Counter
 
-from ..kinds.benchmark.names import method_names
 from ..mesh import MESH_TYPES, QUADS
 from ..problem.loads import LOADS
 from ..springs import DEFINITIONS
@@ -15,54 +14,43 @@ MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""
 
 
+def check_known(problems, path, what, name, names):
+    """A name that refers to what the study declares."""
+    if name not in names:
+        problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
+
+
 def check_names(config, problems):
     """Names that refer to what the study declares, and pairs of numbers."""
-
-    def known(path, what, name, names):
-        if name not in names:
-            problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
-
     mesh_types = mesh_type_names(config)
     for name in config.mesh_files or ():
         if name in MESH_TYPES:
             problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
         for number, row in enumerate(config.mesh_files[name]):
-            known(("mesh_files", name, number, "beam"), "beam", row.beam, config.beams)
+            check_known(problems, ("mesh_files", name, number, "beam"), "beam", row.beam, config.beams)
     for name, grid in config.grids.items():
         for mesh_type in grid.mesh_type:
             if mesh_type not in mesh_types:
                 message = f"unknown mesh type '{mesh_type}'; {nearest(mesh_type, mesh_types)}"
                 problems.add(("grids", name, "mesh_type"), f"{message}; or declare it under mesh_files")
         for beam in grid.beam:
-            known(("grids", name, "beam"), "beam", beam, config.beams)
+            check_known(problems, ("grids", name, "beam"), "beam", beam, config.beams)
         for material in grid.material:
-            known(("grids", name, "material"), "material", material, config.materials)
+            check_known(problems, ("grids", name, "material"), "material", material, config.materials)
         for beam in grid.force or ():
             if beam is not None:
-                known(("grids", name, "force", beam), "beam", beam, config.beams)
+                check_known(problems, ("grids", name, "force", beam), "beam", beam, config.beams)
         if grid.force and None not in grid.force:
             for beam in grid.beam:
                 if beam not in grid.force:
                     problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
-    if config.laying:
-        known(("laying", "strip"), "beam", config.laying.strip, config.beams)
-        for key in ("material", "support"):
-            known(("laying", key), "material", getattr(config.laying, key), config.materials)
-        _check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
-        base = config.laying.trapezoid
-        if not base.upper_base < base.lower_base:
-            problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
-    if config.benchmark:
-        _check_benchmark(config, known, problems)
-    if config.stability:
-        _check_stability(config, known, problems)
     calibrated, paper = config.definitions.calibrated, config.definitions.paper
     if calibrated:
-        known(("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
+        check_known(problems, ("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
     seen = set()
     for number, row in enumerate(paper.stiffness if paper else ()):
         path = ("definitions", "paper", "stiffness", number)
-        known((*path, "material"), "material", row.material, config.materials)
+        check_known(problems, (*path, "material"), "material", row.material, config.materials)
         if row.mesh_type not in mesh_types:
             problems.add(
                 (*path, "mesh_type"), f"unknown mesh type '{row.mesh_type}'; {nearest(row.mesh_type, mesh_types)}"
@@ -75,7 +63,7 @@ def check_names(config, problems):
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
 
 
-def _check_for_triangles(names, path, problems):
+def check_for_triangles(names, path, problems):
     """Definitions that derive a stiffness on triangles from mesh and material alone."""
     able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
     for name in names:
@@ -84,61 +72,10 @@ def _check_for_triangles(names, path, problems):
             problems.add(path, f"{message}; choose of {', '.join(able)}")
 
 
-def _check_density(config, name, path, problems):
+def check_density(config, name, path, problems):
     """What moves has a density; materials that are not declared are another problem."""
     if name in config.materials and config.materials[name].density is None:
         problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
-
-
-def _check_benchmark(config, known, problems):
-    """Names and numbers of the benchmark."""
-    asked = config.benchmark
-    if asked.second_beam:
-        known(("benchmark", "second_beam"), "beam", asked.second_beam, config.beams)
-    for beam in dict.fromkeys([*(scene.beam for scene in asked.scenes.values()), asked.second_beam]):
-        if beam in config.beams:
-            side = min(config.beams[beam].length, config.beams[beam].height)
-            if max(asked.mesh_size) > side / 2:
-                large = f"{1e3 * max(asked.mesh_size):g} mm"
-                message = f"{large} is too large for '{beam}'; give at most {500 * side:g} mm"
-                problems.add(("benchmark", "mesh_size"), message)
-    for name, scene in asked.scenes.items():
-        place = ("benchmark", "scenes", name)
-        known((*place, "beam"), "beam", scene.beam, config.beams)
-        known((*place, "material"), "material", scene.material, config.materials)
-        _check_density(config, scene.material, (*place, "material"), problems)
-        if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
-            problems.add((*place, "load"), f"'{scene.load}' is not raced; choose traction, bending or pressure")
-    for name in asked.definition:
-        if DEFINITIONS[name].needs:
-            able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)
-            problems.add(("benchmark", "definition"), f"'{name}' needs more than mesh and material; choose of {able}")
-    for name in asked.mesh_type:
-        if name not in MESH_TYPES:
-            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
-    methods = method_names(asked.definition, asked.mesh_type, asked.method)
-    for name in asked.thorough:
-        if name not in methods:
-            message = f"'{name}' is no method of this benchmark; {nearest(name, methods)}"
-            problems.add(("benchmark", "thorough"), message)
-
-
-def _check_stability(config, known, problems):
-    """Names and numbers of the experiments on stability."""
-    asked = config.stability
-    known(("stability", "beam"), "beam", asked.beam, config.beams)
-    known(("stability", "material"), "material", asked.material, config.materials)
-    _check_density(config, asked.material, ("stability", "material"), problems)
-    _check_for_triangles(asked.definition, ("stability", "definition"), problems)
-    made = [name for name in MESH_TYPES if name not in QUADS]
-    if asked.mesh_type not in made:
-        message = f"'{asked.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
-        problems.add(("stability", "mesh_type"), message)
-    if asked.beam in config.beams:
-        side = min(config.beams[asked.beam].length, config.beams[asked.beam].height)
-        if max(asked.mesh_size) > 0.3 * side:
-            message = f"{1e3 * max(asked.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
-            problems.add(("stability", "mesh_size"), message)
 
 
 def mesh_type_names(config):

@@ -2,39 +2,32 @@
 
 from typing import Annotated, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from ..kinds.benchmark.names import RIVALS
-from ..kinds.stability.names import EXPERIMENTS
 from ..problem.loads import LOADS
 from .fields import (
     BeamName,
     DefinitionName,
     Density,
-    ExperimentName,
     FileName,
     Flag,
     Force,
-    Friction,
     FurtherReference,
     Kinematics,
     Length,
     Load,
-    Loading,
     MaterialName,
     MeshType,
     Named,
     OneOrMore,
-    Output,
     PerBeam,
     Points,
     PoissonRatio,
     Ratio,
-    Rival,
-    Seconds,
     Stiffness,
     Stress,
     Text,
+    one_of,
 )
 from .messages import nearest, refuse, show
 
@@ -158,115 +151,6 @@ class MeshFileConfig(Section):
     unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
 
 
-class PatchConfig(Section):
-    """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
-
-    They are those of the mesh that a beam of this extent gets: give the extent of the beam that they stand beside.
-    """
-
-    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
-    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
-
-
-class TrapezoidConfig(Section):
-    """A symmetric trapezoid that stands on its lower base."""
-
-    lower_base: Length = Field(description="Length of the base on the floor.")
-    upper_base: Length = Field(description="Length of the upper base.")
-    height: Length = Field(description="Height.")
-
-
-class LayingConfig(Section):
-    """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
-
-    The reference of a loading and friction is a strip of linear triangles on a mesh of its own, and two coarser ones
-    that tell the band in which it is known.
-    """
-
-    strip: BeamName = Field(description="Beam that is the strip.")
-    trapezoid: TrapezoidConfig = Field(description="What it is laid on.")
-    material: MaterialName = Field(description="Material of the strip.")
-    support: MaterialName = Field(description="Material of the trapezoid; from 1e4 times as stiff on it is rigid.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    reference_size: Length = Field(
-        "1 mm", validate_default=True, description="Length of an edge of the reference's finest mesh."
-    )
-    loading: Annotated[list[Loading], OneOrMore()] = Field(
-        "pressure",
-        validate_default=True,
-        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: the "
-        "ends are drawn down to the floor.",
-    )
-    pressure: Stress = Field(description="Pressure, or weight over the upper face.")
-    friction: Annotated[list[Friction], OneOrMore()] = Field(
-        "0", validate_default=True, description="Coulomb's coefficients of friction."
-    )
-
-
-class StabilityConfig(Section):
-    """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
-
-    beam: BeamName = Field(description="Beam.")
-    material: MaterialName = Field(description="Material, with a density.")
-    force: Force = Field(description="Traction on the right end.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
-        "experiment is not about definitions."
-    )
-    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type of triangles.")
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
-        description="Lengths of an edge; most experiments take the coarsest."
-    )
-    experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
-        list(EXPERIMENTS),
-        validate_default=False,
-        description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
-    )
-
-
-class BenchmarkSceneConfig(Section):
-    """A scene of the benchmark."""
-
-    beam: BeamName = Field(description="Beam.")
-    material: MaterialName = Field(description="Material, with a density.")
-    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
-    force: Force = Field(description="Magnitude of the force.")
-
-
-class BenchmarkConfig(Section):
-    """Run time against error: every definition on every mesh type, and other methods; one method at a time."""
-
-    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
-    second_beam: BeamName | None = Field(
-        None,
-        description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
-        "it keeps that on both. None is called the quickest without.",
-    )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
-    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
-    method: Annotated[list[Rival], OneOrMore()] = Field(
-        list(RIVALS),
-        validate_default=False,
-        description="Other methods: finite elements, CalculiX where it is on the machine, motion to rest, and what the "
-        "paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
-    )
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    most_seconds: Seconds = Field(
-        "0.2",
-        validate_default=True,
-        description="Seconds that a run may take; a finer size that would take more is left out.",
-    )
-    thorough: Annotated[list[Text], OneOrMore()] = Field(
-        [], validate_default=False, description="Methods that may take more, such as `delingette/structured`."
-    )
-    most_thorough: Seconds = Field("8", validate_default=True, description="Seconds that a run of those may take.")
-
-
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
@@ -324,12 +208,6 @@ class GridConfig(Section):
         description="Whether each mesh, material, load and kinematics also gets a sensitivity curve. "
         "Curves that `calibrated` needs are made in any case.",
     )
-    moduli: Flag = Field(
-        "false",
-        validate_default=True,
-        description="Whether effective moduli are measured for each definition, mesh type, mesh size and Poisson's "
-        "ratio, on the box under `patch`. Definitions that are told their stiffness have none.",
-    )
 
 
 class StudyConfig(Section):
@@ -347,55 +225,80 @@ class StudyConfig(Section):
     mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
         None, description="Mesh types of your own: for each a list of files, one for each beam and mesh size."
     )
-    patch: PatchConfig = Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured.")
-    outputs: Annotated[list[Output], OneOrMore()] = Field(
-        ["sensitivity", "size", "deformed", "tables"],
-        validate_default=False,
-        description="What is made from the dataset: figures of sensitivity curves, of errors against mesh size, of "
-        "deformed networks (and the group `/fields` behind them), tables as the paper's; `definitions`: figures and "
-        "tables that compare definitions; `block`, `laying`, `stability`, `benchmark`: figures of these groups. "
-        "Figures of scenes are of nonlinear kinematics.",
-    )
+    outputs: list = Field([], validate_default=False)
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
         description="References at finite strain besides the small-strain one, for every beam, material and load: in "
         "the group `/finite_strain` with the networks' errors, and under pressure in `/block`, too. They take seconds "
         "each. An incompressible material has none in plane strain.",
     )
-    laying: LayingConfig | None = Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`.")
-    stability: StabilityConfig | None = Field(
-        None, description="Experiments on numerical stability; they make the group `/stability`."
-    )
-    benchmark: BenchmarkConfig | None = Field(
-        None, description="Run time against error; it makes the group `/benchmark`."
-    )
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )
-    grids: Annotated[dict[str, GridConfig], Named("grid", for_files=False)] = Field(description="Grids: what is asked.")
+    grids: dict[str, GridConfig]
 
 
-SECTIONS = {
-    "": StudyConfig,
-    "beams.<name>": BeamConfig,
-    "materials.<name>": MaterialConfig,
-    "definitions": DefinitionsConfig,
-    "definitions.paper": PaperConfig,
-    "definitions.paper.stiffness[]": StatedStiffness,
-    "definitions.calibrated": CalibratedConfig,
-    "sensitivity": SensitivityConfig,
-    "mesh_files.<name>[]": MeshFileConfig,
-    "patch": PatchConfig,
-    "laying": LayingConfig,
-    "laying.trapezoid": TrapezoidConfig,
-    "stability": StabilityConfig,
-    "benchmark": BenchmarkConfig,
-    "benchmark.scenes.<name>": BenchmarkSceneConfig,
-    "grids.<name>": GridConfig,
-}
-"""Model of each section of a study, by its place."""
+def study_model(kinds):
+    """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids.
+
+    Parameters
+    ----------
+    kinds : tuple of Kind
+
+    Returns
+    -------
+    type
+        Subclass of `StudyConfig`.
+    """
+    grid_fields, study_fields, outputs = {}, {}, []
+    for kind in kinds:
+        grid_fields |= kind.grid_fields
+        study_fields |= kind.study_fields
+        outputs += kind.outputs
+    grid = create_model("GridConfig", __base__=GridConfig, **grid_fields)
+    grid.__doc__ = GridConfig.__doc__
+    meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in outputs)
+    output_names = Annotated[list[one_of("output", [output.name for output in outputs])], OneOrMore()]
+    study_fields["outputs"] = (
+        output_names,
+        Field(
+            [output.name for output in outputs if output.usual],
+            validate_default=False,
+            description=f"What is made from the dataset: {meanings}. Figures of scenes are of nonlinear kinematics.",
+        ),
+    )
+    study_fields["grids"] = (
+        Annotated[dict[str, grid], Named("grid", for_files=False)],
+        Field(description="Grids: what is to be computed."),
+    )
+    model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
+    model.__doc__ = StudyConfig.__doc__
+    return model
 
 
-def json_schema():
+def sections(model, place=""):
+    """Model of each section of a study, by its place.
+
+    Parameters
+    ----------
+    model : type
+        Of the section at `place`.
+    place : str, optional
+
+    Returns
+    -------
+    dict of str to type
+    """
+    found = {place: model}
+    for name, field in model.model_fields.items():
+        here = f"{place}.{name}".lstrip(".")
+        for part in (field.annotation, *get_args(field.annotation)):
+            if isinstance(part, type) and issubclass(part, Section):
+                ending = {dict: ".<name>", list: "[]"}.get(get_origin(field.annotation), "")
+                found |= sections(part, here + ending)
+    return found
+
+
+def json_schema(model):
     """JSON schema of a study, for editors."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | StudyConfig.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | model.model_json_schema()

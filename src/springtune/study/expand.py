@@ -1,38 +1,22 @@
 """From the sections of a study to all that they ask for."""
 
+from dataclasses import dataclass
 from itertools import product
 
-from ..kinds.benchmark.names import CURVE_COUNTS, RIVALS, method_names
-from ..kinds.stability.names import AXES, EXPERIMENTS, ONCE
-from ..linalg import SOLVERS
 from ..mesh import MESH_TYPES
-from ..problem.geometry import Beam, Strip, Trapezoid
-from ..problem.loads import LOADINGS, LOADS, REFERENCE_SIZES
+from ..problem.geometry import Beam
+from ..problem.loads import LOADS
 from ..problem.materials import Material
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
 from .checks import check_files, mesh_type_names, stated_rows
-from .model import (
-    FURTHER_REFERENCES,
-    KINEMATICS,
-    OUTPUTS,
-    Curve,
-    Experiment,
-    Grid,
-    Laying,
-    MeshSpec,
-    Moduli,
-    Race,
-    Reference,
-    Scene,
-    Study,
-)
+from .model import FURTHER_REFERENCES, KINEMATICS, Curve, Grid, MeshSpec, Reference, Scene, Study
 from .printed import read_printed
 
 
 def files_of_meshes(config, folder, problems):
     """Meshes from files by (mesh type, beam's name, mesh size)."""
-    found = {}
+    found, beams = {}, declared(config).beams
     for name, rows in (config.mesh_files or {}).items():
         for number, row in enumerate(rows):
             path, label = folder / row.file, (name, row.beam, row.mesh_size)
@@ -41,11 +25,43 @@ def files_of_meshes(config, folder, problems):
                 problems.add((*where, "file"), f"'{path}' is not a file; give its path relative to the study's folder")
             if label in found:
                 problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")
-            beam = config.beams[row.beam]
-            beam = Beam(row.beam, beam.length, beam.height, beam.thickness)
-            found[label] = MeshSpec(beam, name, row.mesh_size, path, row.unit)
+            found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Bodies and materials that a study declares, by name.
+
+    Attributes
+    ----------
+    beams : dict of str to Beam
+    materials : dict of str to Material
+    """
+
+    beams: dict
+    materials: dict
+
+
+def declared(config):
+    """What a study declares.
+
+    Parameters
+    ----------
+    config : StudyConfig
+
+    Returns
+    -------
+    Declared
+    """
+    return Declared(
+        {name: Beam(name, beam.length, beam.height, beam.thickness) for name, beam in config.beams.items()},
+        {
+            name: Material(name, material.young_modulus, material.poisson_ratio, material.density)
+            for name, material in config.materials.items()
+        },
+    )
 
 
 def _ranks(config):
@@ -83,8 +99,7 @@ def _order(ranks):
 def expand(config, mesh_files, problems):
     """Grids with their scenes and curves, in canonical order."""
     order = _order(_ranks(config))
-    beams = {name: Beam(name, beam.length, beam.height, beam.thickness) for name, beam in config.beams.items()}
-    materials = _materials(config)
+    beams, materials = declared(config).beams, declared(config).materials
     forces, grids = {}, []
     for name, grid in config.grids.items():
         scenes, curves, absent = [], [], set()
@@ -115,17 +130,9 @@ def expand(config, mesh_files, problems):
         for mesh_type, beam, size in sorted(absent):
             row = f"{{file: <path>, beam: {beam}, mesh_size: {size}}}"
             problems.add(("grids", name, "mesh_size"), f"no file for {size}; add {row} to mesh_files.{mesh_type}")
-        moduli = _moduli(grid, materials) if grid.moduli else ()
-        grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order)), moduli))
+        grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order))))
     problems.stop()
     return tuple(grids)
-
-
-def _moduli(grid, materials):
-    """Moduli that a grid asks for: of definitions that derive a stiffness."""
-    derived = [name for name in grid.definition if DEFINITIONS[name].needs != "stiffness"]
-    ratios = dict.fromkeys(materials[name].poisson_ratio for name in grid.material)
-    return tuple(Moduli(*labels) for labels in product(derived, grid.mesh_type, grid.mesh_size, ratios))
 
 
 def _calibrating(config, scenes, problems):
@@ -156,85 +163,8 @@ def _calibrating(config, scenes, problems):
     return curves
 
 
-def _laying(config, materials):
-    """Strips to lay, and their references."""
-    asked = config.laying
-    if not asked:
-        return (), ()
-    beam, base = config.beams[asked.strip], asked.trapezoid
-    parts = {
-        "strip": Strip(beam.length, beam.height, beam.thickness),
-        "trapezoid": Trapezoid(base.lower_base, base.upper_base, base.height),
-        "material": materials[asked.material],
-        "support": materials[asked.support],
-        "pressure": asked.pressure,
-    }
-    labels = list(product(asked.loading, asked.friction))
-    strips = [
-        Laying(**parts, definition=definition, mesh_size=size, loading=loading, friction=friction)
-        for definition in DEFINITIONS
-        if definition in asked.definition
-        for size in sorted(asked.mesh_size)
-        for loading, friction in labels
-    ]
-    references = [
-        Laying(**parts, definition="delingette", mesh_size=size, loading=loading, friction=friction)
-        for loading, friction in labels
-        for size in (ratio * asked.reference_size for ratio in REFERENCE_SIZES)
-    ]
-    return tuple(strips), tuple(references)
-
-
-def _stability(config, materials):
-    """Experiments on stability: one a definition, or one in all."""
-    asked = config.stability
-    if not asked:
-        return ()
-    beam = config.beams[asked.beam]
-    beam = Beam(asked.beam, beam.length, beam.height, beam.thickness)
-    return tuple(
-        Experiment(
-            name, beam, materials[asked.material], asked.force, definition, asked.mesh_type,
-            tuple(sorted(asked.mesh_size)),
-        )
-        for name in EXPERIMENTS
-        if name in asked.experiment
-        for definition in (asked.definition[:1] if name in ONCE else asked.definition)
-    )  # fmt: skip
-
-
-def _benchmark(config, materials):
-    """Scenes of the benchmark."""
-    asked = config.benchmark
-    races = []
-
-    def beam(name):
-        one = config.beams[name]
-        return Beam(name, one.length, one.height, one.thickness)
-
-    for name, scene in asked.scenes.items() if asked else ():
-        races.append(
-            Race(
-                name, beam(scene.beam), materials[scene.material],
-                scene.load, LOADS[scene.load].sign * scene.force,
-                method_names([one for one in DEFINITIONS if one in asked.definition], asked.mesh_type,
-                             [one for one in RIVALS if one in asked.method]),
-                tuple(sorted(asked.mesh_size)), asked.most_seconds, asked.most_thorough, tuple(asked.thorough),
-                beam(asked.second_beam) if asked.second_beam else None,
-            )
-        )  # fmt: skip
-    return tuple(races)
-
-
-def _materials(config):
-    return {
-        name: Material(name, material.young_modulus, material.poisson_ratio, material.density)
-        for name, material in config.materials.items()
-    }
-
-
-def build(config, grids, problems, about):
-    """Study of a config and its grids."""
+def build(config, grids, kinds, problems, about):
+    """Study of a config and its grids, with the parts of all study kinds."""
     ranks = _ranks(config)
     order = _order(ranks)
 
@@ -247,66 +177,49 @@ def build(config, grids, problems, about):
     references = in_order(Reference(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes)
     check_files(meshes, scenes, references, problems)
     problems.stop()
-    used = {name: {getattr(scene, name) for scene in scenes} for name in ("load", "definition", "kinematics")}
-    used["beam"] = {mesh.beam.name for mesh in meshes}
-    used["mesh_type"] = {mesh.mesh_type for mesh in meshes}
-    used["material"] = {scene.material.name for scene in scenes}
-    axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}
-    axes["mesh_size"] = tuple(sorted({mesh.mesh_size for mesh in meshes}))
-    moduli = tuple(dict.fromkeys(one for grid in grids for one in grid.moduli))
-    axes["poisson_ratio"] = tuple(sorted({one.poisson_ratio for one in moduli}))
-    outputs = tuple(name for name in OUTPUTS if name in config.outputs)
-    laying, laying_references = _laying(config, _materials(config))
-    stability = _stability(config, _materials(config))
-    # Groups of a dataset share their dimensions with its root.
-    others = {one.definition for one in (*laying, *stability)}
-    axes["definition"] = tuple(name for name in DEFINITIONS if name in others or name in axes["definition"])
-    benchmark = _benchmark(config, _materials(config))
-    if benchmark:
-        axes |= {"scene": tuple(race.name for race in benchmark), "method": benchmark[0].methods}
-        axes |= {"curve_count": CURVE_COUNTS, "linear_solver": SOLVERS}
-    further = {one.mesh_size for one in laying}
-    further |= {size for one in (*stability, *benchmark) for size in one.mesh_sizes}
-    axes["mesh_size"] = tuple(sorted({*axes["mesh_size"], *further}))
-    axes |= AXES if stability else {}
-    axes["loading"] = tuple(name for name in LOADINGS if any(one.loading == name for one in laying))
-    axes["friction"] = tuple(sorted({one.friction for one in laying}))
-    shown = {
-        "laying": (laying, "shows laid strips and the study has none; add a section 'laying'"),
-        "benchmark": (benchmark, "shows races and the study has none; add a section 'benchmark'"),
-        "stability": (stability, "shows experiments and the study has none; add a section 'stability'"),
-        "block": (
-            [scene for scene in scenes if LOADS[scene.load].kind == "face"],
-            "shows scenes under pressure and no grid has them; add load 'pressure'",
-        ),
-        "definitions": (moduli, "compares moduli and no grid has them; add 'moduli: true' to a grid"),
-    }
-    for name, (there, lack) in shown.items():
-        if name in outputs and not there:
-            problems.add(("outputs",), f"'{name}' {lack}")
-    problems.stop()
+    parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}
+    names = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     steps = [first + (last - first) * step / (points - 1) for step in range(points)]
     calibrated = config.definitions.calibrated
-    return Study(
+    study = Study(
         title=config.title,
         meshes=meshes,
         scenes=scenes,
         curves=in_order(curves),
         references=references,
-        moduli=moduli,
-        patch=Beam("patch", config.patch.length, config.patch.height, 1.0) if moduli else None,
-        outputs=outputs,
+        outputs=tuple(name for name in names if name in config.outputs),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
-        laying=laying,
-        laying_references=laying_references,
-        stability=stability,
-        benchmark=benchmark,
+        parts=parts,
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
         printed=read_printed(about["printed_path"], mesh_type_names(config), problems) if about["printed_path"] else (),
-        axes=axes,
+        axes=_axes(ranks, meshes, scenes, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
         **about,
     )
+    for output in (output for kind in kinds for output in kind.outputs if output.name in study.outputs):
+        lack = output.lack(study)
+        if lack:
+            problems.add(("outputs",), f"'{output.name}' {lack}")
+    problems.stop()
+    return study
+
+
+def _axes(ranks, meshes, scenes, further):
+    """Labels of each dimension; groups of a dataset share those that its root has."""
+    used = {name: {getattr(scene, name) for scene in scenes} for name in ("load", "definition", "kinematics")}
+    used["beam"] = {mesh.beam.name for mesh in meshes}
+    used["mesh_type"] = {mesh.mesh_type for mesh in meshes}
+    used["material"] = {scene.material.name for scene in scenes}
+    used["mesh_size"] = {mesh.mesh_size for mesh in meshes}
+    own = {}
+    for labels in further:
+        for name, values in labels.items():
+            if name in used:
+                used[name] |= set(values)
+            else:
+                own[name] = values
+    axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}
+    return axes | {"mesh_size": tuple(sorted(used["mesh_size"]))} | own

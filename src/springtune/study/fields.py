@@ -7,13 +7,11 @@ from typing import Annotated
 from pydantic_core import core_schema
 
 from .. import units
-from ..kinds.benchmark.names import RIVALS
-from ..kinds.stability.names import EXPERIMENTS
 from ..mesh import MESH_TYPES
-from ..problem.loads import LOADINGS, LOADS
+from ..problem.loads import LOADS
 from ..springs import DEFINITIONS
 from .messages import nearest, refuse, show
-from .model import FURTHER_REFERENCES, KINEMATICS, OUTPUTS
+from .model import FURTHER_REFERENCES, KINEMATICS
 
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
@@ -37,7 +35,7 @@ class Scalar:
         return self.read(value)
 
 
-def _quantity(kind, negative="give a size above zero"):
+def quantity(kind, negative="give a size above zero"):
     example = units.KINDS[kind].example
 
     def read(value):
@@ -53,7 +51,7 @@ def _quantity(kind, negative="give a size above zero"):
     return Annotated[float, Scalar(read, schema, f"a {kind} such as '{example}'")]
 
 
-def _number(words, low, high, *, above=False, whole=False):
+def number(words, low, high, *, above=False, whole=False):
     def read(value):
         try:
             number = int(value) if whole else float(value)
@@ -69,7 +67,7 @@ def _number(words, low, high, *, above=False, whole=False):
     return Annotated[int if whole else float, Scalar(read, schema, words)]
 
 
-def _one_of(what, names):
+def one_of(what, names):
     names = list(names)
 
     def read(value):
@@ -89,27 +87,21 @@ def _read_flag(value):
 NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
 NAME_RULE = "use letters, digits, '.', '_' and '-', and no '.' in front: names become parts of file names"
 
-Length = _quantity("length")
-Force = _quantity("force", "the load's name carries the sign: give a magnitude")
-Stiffness = _quantity("stiffness")
-Stress = _quantity("stress")
-Density = _quantity("density")
-PoissonRatio = _number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
-Ratio = _number("a number above 0", 0, math.inf, above=True)
-Points = _number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
+Length = quantity("length")
+Force = quantity("force", "the load's name carries the sign: give a magnitude")
+Stiffness = quantity("stiffness")
+Stress = quantity("stress")
+Density = quantity("density")
+PoissonRatio = number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
+Ratio = number("a number above 0", 0, math.inf, above=True)
+Points = number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
 MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
 ]
-Load = _one_of("load", LOADS)
-Output = _one_of("output", OUTPUTS)
-Loading = _one_of("loading", LOADINGS)
-Rival = _one_of("method", RIVALS)
-Seconds = _number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)
-ExperimentName = _one_of("experiment", EXPERIMENTS)
-Friction = _number("a coefficient from 0 to 2, such as 0.3", 0, 2)
-FurtherReference = _one_of("reference", FURTHER_REFERENCES)
-Kinematics = _one_of("kinematics", KINEMATICS)
-DefinitionName = _one_of("definition", DEFINITIONS)
+Load = one_of("load", LOADS)
+FurtherReference = one_of("reference", FURTHER_REFERENCES)
+Kinematics = one_of("kinematics", KINEMATICS)
+DefinitionName = one_of("definition", DEFINITIONS)
 Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
 FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]

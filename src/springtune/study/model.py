@@ -1,18 +1,13 @@
-"""What a study asks for: meshes, scenes, curves and all else, free of duplicates and in a canonical order."""
+"""A study: its meshes, scenes and curves, free of duplicates and in a canonical order."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..problem.geometry import Beam, Strip, Trapezoid
+from ..problem.geometry import Beam
 from ..problem.materials import Material
 
 KINEMATICS = ("nonlinear", "linear")
 """Kinematics of a network: springs that keep their length law, or their tangent at rest."""
-
-OUTPUTS = ("sensitivity", "size", "deformed", "tables", "definitions", "block", "laying", "stability", "benchmark")
-"""What is made from a dataset: figures of curves, of errors against mesh size and of deformed networks; tables as the
-paper's; figures and tables that compare definitions; the figure of a pressed block, that of laid strips, and figures
-and the pages of the experiments on stability and of the benchmark."""
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one."""
@@ -100,126 +95,6 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Moduli:
-    """Effective moduli of a definition on a patch, see `Study.patch`.
-
-    Attributes
-    ----------
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    mesh_type : str
-    mesh_size : float
-        Length of an edge [m].
-    poisson_ratio : float
-        Poisson's ratio that the definition is asked for [1].
-    """
-
-    definition: str
-    mesh_type: str
-    mesh_size: float
-    poisson_ratio: float
-
-
-@dataclass(frozen=True)
-class Laying:
-    """A strip to lay on a trapezoid, see `springtune.kinds.laying.lay`.
-
-    Attributes
-    ----------
-    strip : Strip
-    trapezoid : Trapezoid
-    material, support : Material
-        Of the strip and of the trapezoid.
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    mesh_size : float
-        Length of an edge [m].
-    loading : str
-        One of `springtune.problem.loads.LOADINGS`.
-    pressure : float
-        Pressure on the strip, or its weight over its upper face [Pa].
-    friction : float
-        Coulomb's coefficient [1].
-    """
-
-    strip: Strip
-    trapezoid: Trapezoid
-    material: Material
-    support: Material
-    definition: str
-    mesh_size: float
-    loading: str
-    pressure: float
-    friction: float
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """An experiment on numerical stability, see `springtune.kinds.stability.experiments`.
-
-    Attributes
-    ----------
-    name : str
-        Key of `springtune.kinds.stability.names.EXPERIMENTS`.
-    beam : Beam
-    material : Material
-        With a density.
-    force : float
-        Traction [N].
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    mesh_type : str
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    """
-
-    name: str
-    beam: Beam
-    material: Material
-    force: float
-    definition: str
-    mesh_type: str
-    mesh_sizes: tuple
-
-
-@dataclass(frozen=True)
-class Race:
-    """A scene of the benchmark, see `springtune.kinds.benchmark.measure`.
-
-    Attributes
-    ----------
-    name : str
-    beam : Beam
-    material : Material
-        With a density.
-    load : str
-        Key of `springtune.problem.loads.LOADS`.
-    force : float
-        Force on the loaded side, tension positive [N].
-    methods : tuple of str
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    most_seconds, most_thorough : float
-        Seconds that a run may take: of most methods, and of those below.
-    thorough : tuple of str
-    second_beam : Beam or None
-        Beam on which errors are checked.
-    """
-
-    name: str
-    beam: Beam
-    material: Material
-    load: str
-    force: float
-    methods: tuple
-    mesh_sizes: tuple
-    most_seconds: float
-    most_thorough: float
-    thorough: tuple
-    second_beam: Beam | None
-
-
-@dataclass(frozen=True)
 class Grid:
     """What one grid of a study asks for, whether or not other grids ask for it, too.
 
@@ -228,13 +103,11 @@ class Grid:
     name : str
     scenes : tuple of Scene
     curves : tuple of Curve
-    moduli : tuple of Moduli
     """
 
     name: str
     scenes: tuple
     curves: tuple
-    moduli: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -295,20 +168,14 @@ class Study:
     scenes : tuple of Scene
     curves : tuple of Curve
     references : tuple of Reference
-    moduli : tuple of Moduli
-    patch : Beam or None
-        Box on whose meshes moduli are measured; its thickness does not matter.
     mesh_files : dict
         `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
     outputs : tuple of str
-        What is made from the dataset: of `OUTPUTS`.
+        What is made from the dataset.
     further_references : tuple of str
         Of `FURTHER_REFERENCES`.
-    laying : tuple of Laying
-    laying_references : tuple of Laying
-        Strips of finite elements that the others are compared with: one a loading and friction.
-    stability : tuple of Experiment
-    benchmark : tuple of Race
+    parts : dict
+        What further study kinds ask for, by their names; nothing where the study does not have them.
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -332,15 +199,10 @@ class Study:
     scenes: tuple
     curves: tuple
     references: tuple
-    moduli: tuple
-    patch: Beam | None
     mesh_files: dict
     outputs: tuple
     further_references: tuple
-    laying: tuple
-    laying_references: tuple
-    stability: tuple
-    benchmark: tuple
+    parts: dict
     grids: tuple
     stiffness_ratios: tuple
     stiffness_table: dict

@@ -14,7 +14,7 @@ from ...mesh import structured
 from ...problem.boundary import held, measured, weights
 from ...reference import calculix
 from ...springs import DEFINITIONS
-from .names import RIVALS
+from .names import OTHER_APPROACHES
 
 
 def network(scene, mesh, definition, clock):
@@ -22,7 +22,7 @@ def network(scene, mesh, definition, clock):
     with clock("assembling"):
         problem, reference, seen = _problem(scene, mesh, definition)
         problem.network.tangent()
-    with clock("factorising"):
+    with clock("factorizing"):
         problem.rest_factor  # noqa: B018  factorised when first asked for
     with clock("solving"):
         found = problem.linear(scene.force / reference)
@@ -109,7 +109,7 @@ def _triangles(scene, size, clock, degree):
         clamp = basis.get_dofs(lambda x: np.isclose(x[1 if scene.kind == "face" else 0], 0.0)).all()
         free = np.setdiff1d(np.arange(len(load)), clamp)
         matrix = matrix[free][:, free].tocsc()
-    with clock("factorising"):
+    with clock("factorizing"):
         factor = factorised(matrix)
     with clock("solving"):
         solution = np.zeros(len(load))
@@ -186,14 +186,14 @@ def tensor_mass(scene, size, clock):
 def condensation(scene, size, clock):
     """Responses of the loaded side, each computed once beforehand; any load is then a product (pre-computation).
 
-    The answers to unit loads are the part that is paid once (``factorising``), the product is what a load costs.
+    The answers to unit loads are the part that is paid once (``factorizing``), the product is what a load costs.
     """
     with clock("meshing"):
         mesh = _mesh(scene, size)
     with clock("assembling"):
         problem, reference, seen = _problem(scene, mesh, "delingette")
         problem.network.tangent()
-    with clock("factorising"):
+    with clock("factorizing"):
         net, factor = problem.network, problem.rest_factor
         loaded = np.flatnonzero(problem.load)
         responses = np.zeros((len(loaded), len(loaded)))
@@ -263,7 +263,7 @@ def boundary_elements(scene, size, clock):
         traction[loaded, axis] = scene.force / (scene.beam.thickness * lengths[loaded].sum())
         matrix = np.where(clamped[None, :], -u, t)
         right = u[:, ~clamped] @ traction.ravel()[~clamped]
-    with clock("factorising"):
+    with clock("factorizing"):
         solution = np.linalg.solve(matrix, right)
     with clock("solving"):
         moved = np.where(clamped, 0.0, solution).reshape(-1, 2)[:, axis]
@@ -331,5 +331,5 @@ def calculix_cps8(scene, size, clock):
     return float(moved @ shares), int((~clamp).sum())
 
 
-METHODS = {name: globals()[name.replace("-", "_")] for name in RIVALS}
+METHODS = {name: globals()[name.replace("-", "_")] for name in OTHER_APPROACHES}
 """Function of each method."""

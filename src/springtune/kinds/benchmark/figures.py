@@ -65,8 +65,8 @@ def _precision(race, folder, stem):
     with style.figure(folder, stem, figsize=(8.0, 5.0), layout="constrained") as (_, panel):
         labelled, ends = set(), []
         rings = unbeaten(race.assured_error.values, race.seconds.values)
-        for ring, method in zip(rings, map(str, race.method.values)):
-            case = race.sel({"method": method})
+        for ring, method in zip(rings, map(str, race.approach.values)):
+            case = race.sel({"approach": method})
             errors, seconds = 100 * np.abs(case.error.values), case.seconds.values
             good = np.isfinite(errors)
             if not good.any():
@@ -105,9 +105,9 @@ def _name_ends(panel, ends):
 
 def _lines(data, panel, x, y):
     for number, method in enumerate(SHOWN):
-        if method not in data.method.values:
+        if method not in data.approach.values:
             continue
-        case = data.sel({"method": method})
+        case = data.sel({"approach": method})
         there = np.isfinite(case[y].values) & np.isfinite(case[x].values if x in case else case[y].values)
         if there.sum() < 2:
             continue
@@ -139,11 +139,11 @@ def _costs(data, folder):
         axes[0].set(**LOGARITHMIC, xlabel="unknowns", ylabel="seconds", title="Run time; exponents from 3000 on")
         above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.06), "columnspacing": 0.8}
         axes[0].legend(fontsize=6, ncols=3, **above)
-        if "delingette/structured" in scene.method.values:
-            case = scene.sel({"method": "delingette/structured"})
+        if "delingette/structured" in scene.approach.values:
+            case = scene.sel({"approach": "delingette/structured"})
             there = np.isfinite(case.seconds.values)
             size, bottom = np.arange(there.sum()), np.zeros(there.sum())
-            for number, part in enumerate(("meshing", "assembling", "factorising", "solving")):
+            for number, part in enumerate(("meshing", "assembling", "factorizing", "solving")):
                 share = 100 * (case[f"{part}_seconds"] / case.seconds).values[there][::-1]
                 axes[1].bar(size, share, bottom=bottom, color=style.line(number)["color"], label=part)
                 bottom = bottom + share

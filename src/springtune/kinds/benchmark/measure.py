@@ -32,7 +32,7 @@ from ...springs.lattice import COEFFICIENT, half_weight
 from .approaches import METHODS, network
 from .names import CURVE_COUNTS
 
-PARTS = ("meshing", "assembling", "factorising", "solving")
+PARTS = ("meshing", "assembling", "factorizing", "solving")
 """Parts of the seconds."""
 
 REPETITIONS = 3

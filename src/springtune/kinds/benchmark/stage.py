@@ -13,31 +13,31 @@ CURVE_SIZE = 1e-3
 
 
 def run(tasks, done):
-    """Race the scenes that are not stored yet.
+    """Time the scenes that are not stored yet.
 
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder`` and ``races``, each with ``key``, ``curves`` and what
+        JSON file: ``folder`` and ``cases``, each with ``key``, ``curves`` and what
         `springtune.kinds.benchmark.measure.run` takes.
     done : str or Path
-        JSON file to write: how many were raced.
+        JSON file to write: how many were timed.
     """
     tasks = atomic.read_json(tasks)
     count = 0
-    for task in tasks["races"]:
+    for task in tasks["cases"]:
         path = Path(tasks["folder"]) / f"{task['key']}.h5"
         if task["key"] not in store.stored(path):
-            store.add(path, {task["key"]: _race(task)})
+            store.add(path, {task["key"]: _case(task)})
             count += 1
-    atomic.write_json(done, {"races": count})
+    atomic.write_json(done, {"cases": count})
 
 
-def _race(task):
+def _case(task):
     scene = benchmark.Scene(Beam(**task["beam"]), Material(**task["material"]), task["load"], task["force"])
     second = Beam(**task["second_beam"]) if task["second_beam"] else None
     limits = task["most_seconds"], task["thorough"], task["most_thorough"]
-    found = benchmark.run(scene, task["methods"], task["mesh_sizes"], *limits, second)
+    found = benchmark.run(scene, task["approaches"], task["mesh_sizes"], *limits, second)
     if task["curves"]:
         size = max(CURVE_SIZE, min(task["mesh_sizes"]))
         found |= benchmark.curves(scene, size) | benchmark.explicit(scene, size)

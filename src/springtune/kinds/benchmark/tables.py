@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs.atomic import write_text
-from ...output.markdown import table
-from ...output.table_names import BENCHMARK
+from ...output.tables import markdown_table
+from .outputs import PAGE
 
 TARGETS = (0.01, 0.001, 0.0001)
 """Errors to reach [1]."""
@@ -26,8 +26,8 @@ def write(tree, folder):
     list of str
         Names of the files written.
     """
-    write_text(Path(folder) / BENCHMARK, page(tree))
-    return [BENCHMARK]
+    write_text(Path(folder) / PAGE, page(tree))
+    return [PAGE]
 
 
 def page(tree):
@@ -36,10 +36,10 @@ def page(tree):
     loads = ", ".join(f"{float(value):.1f}" for value in data.machine_load.values)
     parts = [f"Machine load at the start of each scene: {loads}.", "", _rule(data), ""]
     for scene in map(str, data.scene.values):
-        race = data.sel(scene=scene)
-        if np.isfinite(race.assured_error).any():
-            parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(race), ""]
-        parts += [f"### {scene}: methods on one mesh size", "", *_one_size(race), ""]
+        cells = data.sel(scene=scene)
+        if np.isfinite(cells.assured_error).any():
+            parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(cells), ""]
+        parts += [f"### {scene}: approaches on one mesh size", "", *_one_size(cells), ""]
     parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
     return "\n".join([*parts, "### A sensitivity curve", "", *_curve(data), ""])
 
@@ -71,41 +71,41 @@ def _rule(data):
     )
 
 
-def _quickest(race):
-    """The three methods that come first to each error and keep it, with their mesh size."""
+def _quickest(cells):
+    """The three approaches that come first to each error and keep it, with their mesh size."""
     rows = []
-    errors, seconds = race.assured_error.transpose("method", "mesh_size").values, race.seconds.values
+    errors, seconds = cells.assured_error.transpose("approach", "mesh_size").values, cells.seconds.values
     for target in TARGETS:
         good = np.where(errors <= target, seconds, np.inf)
         best = good.min(axis=1)
         row = [f"{100 * target:g} %"]
         for i in np.argsort(best)[:3]:
             if np.isfinite(best[i]):
-                size = 1e3 * float(race.mesh_size.values[good[i].argmin()])
-                row.append(f"`{race.method.values[i]}`, {size:g} mm: {_time(best[i])}")
+                size = 1e3 * float(cells.mesh_size.values[good[i].argmin()])
+                row.append(f"`{cells.approach.values[i]}`, {size:g} mm: {_time(best[i])}")
         rows.append(row + [""] * (4 - len(row)))
-    return table(["error", "first", "second", "third"], rows)
+    return markdown_table(["error", "first", "second", "third"], rows)
 
 
-def _one_size(race):
-    """Error, seconds and memory on the finest size that half of the methods have."""
-    counts = np.isfinite(race.seconds.values).sum(axis=0)
+def _one_size(cells):
+    """Error, seconds and memory on the finest size that half of the approaches have."""
+    counts = np.isfinite(cells.seconds.values).sum(axis=0)
     place = int(np.flatnonzero(counts >= 0.5 * counts.max())[0])
-    cells = race.isel(mesh_size=place)
+    cells = cells.isel(mesh_size=place)
     order = np.argsort(np.abs(cells.error.values))
     rows = []
     for i in order:
-        cell = cells.isel(method=i)
+        cell = cells.isel(approach=i)
         if np.isnan(cell.seconds):
             continue
         rows.append([
-            f"`{cell.method.item()}`", _percent(cell.error), _time(cell.seconds), _time(cell.cold_seconds),
-            *(_time(cell[f"{part}_seconds"]) for part in ("meshing", "assembling", "factorising", "solving")),
+            f"`{cell.approach.item()}`", _percent(cell.error), _time(cell.seconds), _time(cell.cold_seconds),
+            *(_time(cell[f"{part}_seconds"]) for part in ("meshing", "assembling", "factorizing", "solving")),
             f"{float(cell.peak_memory) / 1e6:.0f}", _plain(cell.error_rate, 1), _plain(cell.cost_exponent, 2),
         ])  # fmt: skip
-    heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", "meshing", "assembling", "factorising",
+    heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", "meshing", "assembling", "factorizing",
              "solving", "memory [MB]", "order", "exponent of cost"]  # fmt: skip
-    return table(heads, rows)
+    return markdown_table(heads, rows)
 
 
 def _solvers(data):
@@ -119,7 +119,7 @@ def _solvers(data):
         ]
         for size in sizes
     ]
-    return table(["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)], rows)
+    return markdown_table(["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)], rows)
 
 
 def _curve(data):
@@ -127,7 +127,7 @@ def _curve(data):
         [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
         for count in data.curve_count.values
     ]  # fmt: skip
-    lines = table(["stiffnesses", "one path", "solve by solve"], rows)
+    lines = markdown_table(["stiffnesses", "one path", "solve by solve"], rows)
     lines += ["", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
               f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
     if "explicit_steps" in data and np.isfinite(data.explicit_steps):
@@ -142,7 +142,7 @@ NOISE = 1.3
 
 
 def comparison(old, new):
-    """Ratios of the seconds of two benchmarks, method by method.
+    """Ratios of the seconds of two benchmarks, approach by approach.
 
     A machine that is slower on the whole is no regression: ratios are over their median. Flagged is what lies outside
     of `NOISE` and of three times the spread that the runs showed.
@@ -156,19 +156,19 @@ def comparison(old, new):
     -------
     lines : list of str
     flagged : int
-        Number of methods that became slower.
+        Number of approaches that became slower.
     """
     both = {name: [label for label in old[name].values if label in new[name].values]
-            for name in ("scene", "method", "mesh_size")}  # fmt: skip
+            for name in ("scene", "approach", "mesh_size")}  # fmt: skip
     old, new = old.sel(both), new.sel(both)
-    ratio = (new.seconds / old.seconds).transpose("method", "scene", "mesh_size").values
+    ratio = (new.seconds / old.seconds).transpose("approach", "scene", "mesh_size").values
     if not np.isfinite(ratio).any():
         return ["The two datasets have no case in common."], 0
-    spread = [(one.seconds_spread / one.seconds).transpose("method", "scene", "mesh_size").values for one in (old, new)]
+    spread = [(one.seconds_spread / one.seconds).transpose("approach", "scene", "mesh_size").values for one in (old, new)]
     middle = float(np.nanmedian(ratio))
     lines = [f"{int(np.isfinite(ratio).sum())} cases in common, median ratio new / old {middle:.2f}."]
     flagged = 0
-    for i, method in enumerate(both["method"]):
+    for i, approach in enumerate(both["approach"]):
         cells = np.isfinite(ratio[i])
         if not cells.any():
             continue
@@ -176,5 +176,5 @@ def comparison(old, new):
         noise = max(NOISE, 1 + 3 * float(np.median(np.fmax(*(part[i][cells] for part in spread)))))
         word = "slower" if own > noise else "faster" if own < 1 / noise else ""
         flagged += own > noise
-        lines.append(f"{own:6.2f}  {method}  {word}".rstrip())
+        lines.append(f"{own:6.2f}  {approach}  {word}".rstrip())
     return lines, flagged

@@ -6,10 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...jobs import atomic, store
-from ...jobs.costs import Work, laying_units
+from ...jobs.spent import Spent
 from ...problem.geometry import Strip, Trapezoid
 from ...problem.materials import Material
 from ...springs import DefinitionError
+from .cost import cost_units
 from .lay import lay
 
 
@@ -23,16 +24,16 @@ def run(tasks, done):
     tasks : str or Path
         JSON file: ``folder`` and ``strips``, each with ``key`` and what `springtune.kinds.laying.lay.lay` takes.
     done : str or Path
-        JSON file to write: what the work was.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
+    tasks, spent = atomic.read_json(tasks), Spent()
     for task in tasks["strips"]:
         path = Path(tasks["folder"]) / f"{task['key']}.h5"
         if task["key"] not in store.stored(path):
             begin = time.perf_counter()
             store.add(path, {task["key"]: _lay(task)})
-            work.add("laying", laying_units(task["mesh_size"]), time.perf_counter() - begin)
-    atomic.write_json(done, work.summary())
+            spent.add("laying", cost_units(task["mesh_size"]), time.perf_counter() - begin)
+    atomic.write_json(done, spent.summary())
 
 
 def _lay(task):

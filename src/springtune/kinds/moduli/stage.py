@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from ...jobs import atomic, store
-from ...jobs.costs import Work
+from ...jobs.spent import Spent
 from ...mechanics.moduli import PatchTest
 from ...problem.materials import Material
 from ...springs import DEFINITIONS, DefinitionError
@@ -19,16 +19,16 @@ def run(tasks, done):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder`` and ``patches``, each with ``name``, ``mesh`` (what the stage `mesh` takes) and ``asked``,
-        each of these with ``key, definition, poisson_ratio``.
+        JSON file: ``folder`` and ``patches``, each with ``name``, ``mesh`` (what the stage `mesh` takes) and
+        ``measurements``, each of these with ``key, definition, poisson_ratio``.
     done : str or Path
-        JSON file to write: what the work was.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
+    tasks, spent = atomic.read_json(tasks), Spent()
     for patch in tasks["patches"]:
         path = Path(tasks["folder"]) / f"{patch['name']}.h5"
         present = store.stored(path)
-        missing = [asked for asked in patch["asked"] if asked["key"] not in present]
+        missing = [asked for asked in patch["measurements"] if asked["key"] not in present]
         if not missing:
             continue
         mesh = make(patch["mesh"])
@@ -39,10 +39,10 @@ def run(tasks, done):
             results[asked["key"]] = result = measure(asked)
             seconds = time.perf_counter() - begin
             of_definition = result.get("definition_seconds", 0.0)
-            work.add("moduli", len(mesh.points), seconds - of_definition)
-            work.add(asked["definition"], len(mesh.points), of_definition)
+            spent.add("moduli", len(mesh.points), seconds - of_definition)
+            spent.add(asked["definition"], len(mesh.points), of_definition)
         store.add(path, results)
-    atomic.write_json(done, work.summary())
+    atomic.write_json(done, spent.summary())
 
 
 class _Measure:

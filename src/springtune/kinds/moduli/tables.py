@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs.atomic import write_text
-from ...output.dataset import PATCH, SCENE, STATUS, most_asked
-from ...output.table_names import DEFINITIONS
+from ...output.dataset import STATUS, most_asked
+from ..scenes.variables import SCENE
+from .outputs import TABLES
+from .variables import PATCH
 
 SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
 MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulus_error", "spring_ratio")
@@ -30,9 +32,9 @@ def write(tree, folder):
     """
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
     texts = (_csv(root, SCENE, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
-    for name, text in zip(DEFINITIONS, texts):
+    for name, text in zip(TABLES, texts):
         write_text(Path(folder) / name, text)
-    return list(DEFINITIONS)
+    return list(TABLES)
 
 
 def _csv(data, dimensions, values):

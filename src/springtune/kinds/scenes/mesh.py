@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from ...jobs import atomic
-from ...jobs.costs import Work
+from ...jobs.spent import Spent
 from ...mesh import MESH_TYPES, MeshError, quality, read_beam_mesh, write_mesh
 
 
@@ -17,9 +17,9 @@ def run(tasks, done):
     tasks : str or Path
         JSON file: ``folder`` and ``meshes``, each with ``name``, ``key`` and what `make` takes.
     done : str or Path
-        JSON file to write: what the work was.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
+    tasks, spent = atomic.read_json(tasks), Spent()
     folder = Path(tasks["folder"])
     folder.mkdir(parents=True, exist_ok=True)
     for task in tasks["meshes"]:
@@ -37,8 +37,8 @@ def run(tasks, done):
         write_mesh(path, mesh)
         figures = quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
         atomic.write_json(notes, {"key": task["key"], "mesh_seconds": seconds} | figures)
-        work.add("mesh", len(mesh.points), time.perf_counter() - begin)
-    atomic.write_json(done, work.summary())
+        spent.add("mesh", len(mesh.points), time.perf_counter() - begin)
+    atomic.write_json(done, spent.summary())
 
 
 def make(source):

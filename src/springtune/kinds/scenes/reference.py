@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from ...jobs import atomic, store
-from ...jobs.costs import Work
+from ...jobs.spent import Spent
 from ...problem.geometry import Beam
 from ...problem.materials import Material
 from ...reference.small_strain import solve_unit
@@ -21,9 +21,9 @@ def run(tasks, done):
         `springtune.reference.similarity.unit_problem` gives, and ``finite``, each with ``key, beam, material, force,
         load, plane, follower``.
     done : str or Path
-        JSON file to write: what the work was.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
+    tasks, spent = atomic.read_json(tasks), Spent()
     for kind, asked, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
         for task in tasks[asked]:
             path = Path(tasks["folder"]) / f"{task['key']}.h5"
@@ -33,8 +33,8 @@ def run(tasks, done):
             result = solve(task)
             result["seconds"] = time.perf_counter() - begin
             store.add(path, {task["key"]: result})
-            work.add(kind, 0, result["seconds"])
-    atomic.write_json(done, work.summary())
+            spent.add(kind, 0, result["seconds"])
+    atomic.write_json(done, spent.summary())
 
 
 def _unit(task):

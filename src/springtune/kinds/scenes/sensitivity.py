@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import atomic, store
-from ...jobs.costs import Work
+from ...jobs.spent import Spent
 from ...mechanics.network import Network
 from ...mechanics.series import LinearPath, StablePath
 from ...mechanics.statics import StaticProblem
@@ -32,9 +32,9 @@ def run(tasks, done):
         ``curves``, and each of these with ``key, kind, force, kinematics, stiffnesses, reference`` (see
         `springtune.kinds.scenes.stored_reference.read`).
     done : str or Path
-        JSON file to write: what the work was.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
+    tasks, spent = atomic.read_json(tasks), Spent()
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
@@ -49,8 +49,8 @@ def run(tasks, done):
             results |= _trace(problem, measured(mesh, kind), alike, tasks["references"])
         store.add(path, results)
         for result in results.values():
-            work.add("curve", len(mesh.points), result["seconds"])
-    atomic.write_json(done, work.summary())
+            spent.add("curve", len(mesh.points), result["seconds"])
+    atomic.write_json(done, spent.summary())
 
 
 def _trace(problem, weights, curves, folder):

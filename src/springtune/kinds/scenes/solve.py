@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import atomic, store
-from ...jobs.costs import Work
+from ...jobs.spent import Spent
 from ...mechanics.moduli import lateral_forces
 from ...mechanics.network import Network
 from ...mechanics.statics import FollowerPressure, StaticProblem
@@ -25,7 +25,7 @@ NETWORKS = 6
 """Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""
 
 
-def run(tasks, done, calibration=None):
+def run(tasks, done):
     """Solve the scenes of a bundle that are not stored yet.
 
     A scene that fails is stored with its status and message; it never stops the others.
@@ -33,17 +33,16 @@ def run(tasks, done, calibration=None):
     Parameters
     ----------
     tasks : str or Path
-        JSON file: ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name``,
+        JSON file: ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
+        or nothing) and ``families``, each with ``name``,
         ``thickness``, ``keep_fields`` and ``scenes``, and each of these with ``key, material, kind, force, definition,
         kinematics``, ``reference`` (see `springtune.kinds.scenes.stored_reference.read`) and either ``stiffness``, or
         ``calibration``, the name of a group, and ``thickness_ratio``.
     done : str or Path
-        JSON file to write: what the work was.
-    calibration : str or Path, optional
-        JSON file of the stage `calibrate`, where scenes are calibrated.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
-    calibration = atomic.read_json(calibration) if calibration else {}
+    tasks, spent = atomic.read_json(tasks), Spent()
+    calibration = atomic.read_json(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
@@ -59,10 +58,10 @@ def run(tasks, done, calibration=None):
         for name in order:
             scene = missing[name]
             results[name] = result = solver.solve(scene, calibration)
-            work.add(scene["kinematics"], len(mesh.points), result["seconds"])
-            work.add(scene["definition"], len(mesh.points), solver.deriving)
+            spent.add(scene["kinematics"], len(mesh.points), result["seconds"])
+            spent.add(scene["definition"], len(mesh.points), solver.deriving)
         store.add(path, results)
-    atomic.write_json(done, work.summary())
+    atomic.write_json(done, spent.summary())
 
 
 def _stored_key(scene, calibration):

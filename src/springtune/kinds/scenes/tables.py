@@ -1,50 +1,31 @@
-"""Write the tables."""
+"""Tables of scenes, as in the paper."""
 
-import csv
-import io
-from pathlib import Path
-
-import jinja2
 import numpy as np
 
-from ...jobs.atomic import write_text
 from ...output.dataset import STATUS
-from ...output.table_names import TABLE, stem
+from ...output.tables import cells_with_values
+from .outputs import TABLE, stem
 
 ROW = ("beam", "mesh_size")
 
 
-def write(tree, folder):
-    """Write one CSV file a table and a page with all of them.
+def tables(tree):
+    """Tables of the page: the paper's, and those of references at finite strain and of pressed faces.
 
     Parameters
     ----------
     tree : xarray.DataTree
-    folder : str or Path
 
     Returns
     -------
-    list of str
-        Names of the files written.
+    list of dict
+        Each with ``stem`` and ``rows``; those as the paper's with their labels, the others with ``title`` and ``note``.
     """
     root = tree.to_dataset()
-    tables = [_table(root.sel(selection), selection) for selection in _selections(root)]
-    tables.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
-    written = {f"{table['stem']}.csv": _csv(table["rows"]) for table in tables}
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("springtune.output", ""), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    )
-    page = environment.get_template("page.html")
-    groups = {"finite_strain": _finite_strain, "block": _block, "laying": _laying}
-    further = [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree]
-    written |= {f"{table['stem']}.csv": _csv(table["rows"]) for table in further}
-    kinematics = [str(name) for name in root.kinematics.values]
-    written["index.html"] = page.render(
-        tables=tables, further=further, kinematics=kinematics, attributes=tree.attrs, missing=np.nan
-    )
-    for name, text in written.items():
-        write_text(Path(folder) / name, text)
-    return list(written)
+    found = [_table(root.sel(selection), selection) for selection in _selections(root)]
+    found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
+    groups = {"finite_strain": _finite_strain, "block": _block}
+    return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree]
 
 
 def _selections(root):
@@ -105,7 +86,7 @@ def _finite_strain(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
     rows = []
     dimensions = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
-    for place in _cells(finite.deformation_error, dimensions):
+    for place in cells_with_values(finite.deformation_error, dimensions):
         if place["kinematics"] == "linear":
             continue
         cell, scene = finite.sel(place), {name: label for name, label in place.items() if name != "reference"}
@@ -131,7 +112,7 @@ def _block(block, root):
     """Middle of the pressed face, every definition, mesh, material and kinematics."""
     rows = []
     dimensions = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
-    for place in _cells(block.face_displacement, dimensions):
+    for place in cells_with_values(block.face_displacement, dimensions):
         cell = block.sel(place)
         reference = cell.isel(reference=0)
         rows.append(
@@ -149,54 +130,3 @@ def _block(block, root):
         "1000 N/m."
     )
     return {"stem": "block", "title": "The pressed block (section 4.1)", "note": note, "rows": rows}
-
-
-def _laying(laid, root):
-    """Strips laid on the trapezoid."""
-    rows = []
-    for place in _cells(laid.area_under_strip, ("loading", "friction", "mesh_size", "definition")):
-        cell = laid.sel(place)
-        rows.append(
-            {name: place[name] for name in ("loading", "friction", "definition")}
-            | {
-                "mesh_size_mm": 1e3 * place["mesh_size"],
-                "area_mm2": 1e6 * float(cell.area_under_strip),
-                "area_error_percent": 100 * float(cell.area_error),
-                "elongation_percent": 100 * float(cell.elongation),
-                "reference_elongation_percent": 100 * float(cell.reference_elongation),
-                "reference_elongation_known_to_points": 100 * float(cell.reference_elongation_error_estimate),
-                "penetration_per_mesh_size": float(cell.penetration),
-            }
-        )
-    note = (
-        "Area between strip and floor and elongation of the strip's lower fibre; the reference's is known to so many "
-        "points: twice the spread of three meshes, since the trapezoid's corners catch between a strip's particles, "
-        "where depends on the mesh. The networks' own scatter as much. The paper prints 600.04 mm² (+2.57 %) and "
-        "4.17 % for its network, 585.62 mm² and 0.54 % for finite elements; the trapezoid has 585 mm²."
-    )
-    return {"stem": "laying", "title": "The laid strip (section 4.2)", "note": note, "rows": rows}
-
-
-def _cells(values, dimensions):
-    """Labels of the cells that have a value."""
-    stacked = values.transpose(*dimensions)
-    labels = [stacked[name].values.tolist() for name in dimensions]
-    for place in np.argwhere(np.isfinite(stacked.values)):
-        yield {name: label[i] for name, label, i in zip(dimensions, labels, place)}
-
-
-def _csv(rows):
-    """Rows as CSV; a number that is not there is an empty field."""
-    text = io.StringIO()
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({name: _number(value) for name, value in row.items()})
-    return text.getvalue()
-
-
-def _number(value):
-    if not isinstance(value, float):
-        return value
-    return "" if np.isnan(value) else f"{value:.8g}"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import atomic, store
-from ...jobs.costs import Work
+from ...jobs.spent import Spent
 from ...problem.geometry import Beam
 from ...problem.materials import Material
 from . import experiments as stability
@@ -24,16 +24,16 @@ def run(tasks, done):
         JSON file: ``folder`` and ``experiments``, each with ``key``, ``name`` and what
         `springtune.kinds.stability.experiments.Setup` takes.
     done : str or Path
-        JSON file to write: what the work was.
+        JSON file to write: what was spent.
     """
-    tasks, work = atomic.read_json(tasks), Work()
+    tasks, spent = atomic.read_json(tasks), Spent()
     for task in tasks["experiments"]:
         path = Path(tasks["folder"]) / f"{task['key']}.h5"
         if task["key"] not in store.stored(path):
             result = _experiment(task)
             store.add(path, {task["key"]: result})
-            work.add(task["name"], 0, result.get("seconds", 0.0))
-    atomic.write_json(done, work.summary())
+            spent.add(task["name"], 0, result.get("seconds", 0.0))
+    atomic.write_json(done, spent.summary())
 
 
 def _experiment(task):

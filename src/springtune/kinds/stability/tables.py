@@ -6,8 +6,8 @@ import numpy as np
 
 from ...jobs.atomic import write_text
 from ...output.dataset import STATUS
-from ...output.markdown import table
-from ...output.table_names import STABILITY
+from ...output.tables import markdown_table
+from .outputs import PAGE
 
 
 def write(tree, folder):
@@ -24,8 +24,8 @@ def write(tree, folder):
     list of str
         Names of the files written.
     """
-    write_text(Path(folder) / STABILITY, page(tree))
-    return [STABILITY]
+    write_text(Path(folder) / PAGE, page(tree))
+    return [PAGE]
 
 
 def page(tree):
@@ -80,7 +80,7 @@ def _limits(data):
             )
     heads = ["definition", "mesh [mm]", "2/ω_max [ns]", "bound from particles [ns]"]
     heads += [f"damping {ratio:g} that lags: times" for ratio in data.damping_ratio.values[1:]]
-    return lines + table(heads, rows)
+    return lines + markdown_table(heads, rows)
 
 
 def _drift(data):
@@ -89,7 +89,7 @@ def _drift(data):
                         for kind in ("energy_drift", "energy_swing", "momentum_drift"))]
         for name in data.integrator.values
     ]  # fmt: skip
-    return ["### Energy and momentum, no damping, half of the limit", ""] + table(
+    return ["### Energy and momentum, no damping, half of the limit", ""] + markdown_table(
         ["integrator", "drift of energy", "swing of energy", "drift of momentum"], rows
     )
 
@@ -111,7 +111,7 @@ def _rest(data):
             rows.append(
                 [f"{1e3 * size:g} mm", str(count) if count else "direct", *(_number(x, 2) for x in cells.values)]
             )
-    return lines + table(["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)], rows)
+    return lines + markdown_table(["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)], rows)
 
 
 def _contrast(data):
@@ -121,7 +121,7 @@ def _contrast(data):
          _number(data.contrast_estimate.sel(stiffness_contrast=contrast), 2)]
         for contrast in data.stiffness_contrast.values
     ]  # fmt: skip
-    return ["### Stiff parts beside soft ones", ""] + table(["contrast", "status", "error", "estimated"], rows)
+    return ["### Stiff parts beside soft ones", ""] + markdown_table(["contrast", "status", "error", "estimated"], rows)
 
 
 def _poisson(data):
@@ -131,7 +131,7 @@ def _poisson(data):
                         for nu in ratios)]
         for name in _definitions(data, "poisson_step_limit")
     ]  # fmt: skip
-    return ["### Largest step [ns] over Poisson's ratio", ""] + table(
+    return ["### Largest step [ns] over Poisson's ratio", ""] + markdown_table(
         ["definition", *(f"{nu:g}" for nu in ratios)], rows
     )
 
@@ -143,7 +143,7 @@ def _sizes(data):
         for scale in data["scale"].values
     ]  # fmt: skip
     heads = ["mesh [mm]", "step over mesh size [s/m]", *(f"error, {kind}" for kind in data.precision.values)]
-    return ["### Scale and precision", ""] + table(heads, rows)
+    return ["### Scale and precision", ""] + markdown_table(heads, rows)
 
 
 def _strains(data):
@@ -166,7 +166,7 @@ def _strains(data):
                 texts.append(STATUS[int(flag)].replace("_", " ") + note)
             rows.append([f"`{name}`", *texts])
         heads = [f"{100 * strain:g} %".replace("-", "−") for strain in data.strain.values]
-        lines += [f"{load}:", "", *table(["definition", *heads], rows), ""]
+        lines += [f"{load}:", "", *markdown_table(["definition", *heads], rows), ""]
     return lines[:-1]
 
 
@@ -180,9 +180,10 @@ def _perturbation(data):
         for name in _definitions(data, "inverted_starts_right")
     ]  # fmt: skip
     heads = ["definition", *(f"{share:g} a" for share in shares), "inverted starts: right", "wrong"]
-    return ["### Displacement with particles moved at random, and Newton's method from inverted starts", ""] + table(
-        heads, rows
-    )
+    return [
+        "### Displacement with particles moved at random, and Newton's method from inverted starts",
+        "",
+    ] + markdown_table(heads, rows)
 
 
 def _slivers(data):
@@ -192,7 +193,7 @@ def _slivers(data):
         cells = data.sel(definition=name)
         limits = cells.sliver_step_limit.values
         rows.append([f"`{name}`", *(_number(limit / limits[0]) for limit in limits)])
-    return ["### Largest step with a sliver, over that at 30 degrees", ""] + table(
+    return ["### Largest step with a sliver, over that at 30 degrees", ""] + markdown_table(
         ["definition", *(f"{angle:g}°" for angle in angles)], rows
     )
 
@@ -204,7 +205,7 @@ def _buckling(data):
         for name in _definitions(data, "buckling_load")
     ]
     heads = ["definition", *(f"{count} rows" for count in data.rows.values)]
-    return ["### Buckling load of a slender column over Euler's", "", *table(heads, rows)]
+    return ["### Buckling load of a slender column over Euler's", "", *markdown_table(heads, rows)]
 
 
 def _scenes(root):
@@ -217,4 +218,8 @@ def _scenes(root):
         labels["mesh_size"] = f"{1e3 * labels['mesh_size']:g} mm"
         rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)], str(cell.message.item())])
     solved = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
-    return ["### Scenes of the study", "", solved, "", *table(["scene", "status", "message"], rows), ""] if rows else []
+    return (
+        ["### Scenes of the study", "", solved, "", *markdown_table(["scene", "status", "message"], rows), ""]
+        if rows
+        else []
+    )

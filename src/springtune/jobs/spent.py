@@ -4,12 +4,7 @@ import time
 from collections import defaultdict
 
 
-def laying_units(mesh_size):
-    """What the cost of laying a strip on a mesh of some size [m] is in proportion to."""
-    return (1e-3 / mesh_size) ** 3
-
-
-class Work:
+class Spent:
     """What the tasks of a job cost, for the file that says it is done."""
 
     def __init__(self):

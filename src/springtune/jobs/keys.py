@@ -1,0 +1,38 @@
+"""What the keys of results are made of: parameters, code and libraries."""
+
+import os
+from dataclasses import asdict
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+
+from .dependencies import digest
+
+
+def installed(package):
+    """Version of a package; "none" where it is an extra that is not there, or not wanted."""
+    unused = package == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"
+    try:
+        return "none" if unused else version(package)
+    except PackageNotFoundError:
+        return "none"
+
+
+@cache
+def stage_key(module, *packages):
+    """What the results of a stage depend on besides their parameters: its modules and these packages."""
+    return [digest(module), *(f"{package} {installed(package)}" for package in packages)]
+
+
+@cache
+def beam_key(beam):
+    """What of a beam results depend on: a new label is not a new beam."""
+    return asdict(beam) | {"name": ""}
+
+
+@cache
+def material_key(material, density=False):
+    """What of a material results depend on: statics depend on no density."""
+    known = asdict(material) | {"name": ""}
+    if not density:
+        del known["density"]
+    return known

@@ -1,0 +1,134 @@
+"""What a study kind is: all that study, plan, collect, drawing, tables and the rules loop over."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import import_module
+
+
+@dataclass(frozen=True)
+class Output:
+    """Figures and tables that are made from a dataset where a study asks for them under ``outputs``.
+
+    Attributes
+    ----------
+    name : str
+        As a study writes it.
+    meaning : str
+        What it is, for the manual.
+    figures : callable, optional
+        Of a study: selections of the figures by the stems of their files.
+    plot : str
+        Module with ``draw(tree, folder)``, which draws them; from the package on.
+    tables : callable, optional
+        Of a study: names of the files of its tables.
+    write : str
+        Module with ``write(tree, folder)``, which writes them; from the package on.
+    lack : callable, optional
+        Of a study: what it would need for this output and has not, with the remedy; empty where it has all.
+    usual : bool
+        Whether it is made where a study does not say what.
+    """
+
+    name: str
+    meaning: str
+    figures: Callable = lambda study: {}
+    plot: str = ""
+    tables: Callable = lambda study: []
+    write: str = ""
+    lack: Callable = lambda study: ""
+    usual: bool = False
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage before the dataset: jobs that each work off a bundle of tasks.
+
+    A stage is run by ``python -m springtune.<module> TASKS DONE`` and has a function ``run(tasks, done)``: what is to
+    do is the JSON file ``TASKS``; ``DONE`` appears when it is done and says what it cost.
+
+    Attributes
+    ----------
+    name : str
+        Name of the rule, and first part of the names of its files.
+    module : str
+        From the package on.
+    message : str
+        What a job does.
+    content : callable
+        Of a study, its folder and the values of a bundle's members: content of the task file; nothing where there is
+        nothing to do.
+    products : callable
+        Of that content: files that a job makes besides `DONE`.
+    members : callable, optional
+        Of a study and the `springtune.jobs.bundles.Costs` of a machine: by name, the seconds that it takes and a value.
+        Not of a stage that works on the bundles of another one.
+    like : str
+        Stage whose bundles it works on.
+    same, every : tuple of str
+        Stages that it waits for: for the job of the same bundle, and for all jobs.
+    alone : bool
+        Whether a job has a single member and the machine to itself, since other jobs would be in its seconds.
+    definitions : bool
+        Whether it runs definitions by name.
+    """
+
+    name: str
+    module: str
+    message: str
+    content: Callable
+    products: Callable
+    members: Callable | None = None
+    like: str = ""
+    same: tuple = ()
+    every: tuple = ()
+    alone: bool = False
+    definitions: bool = False
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A study kind.
+
+    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib, and a module
+    ``collect`` with ``groups(study, folder)``: groups of the dataset by name.
+
+    Attributes
+    ----------
+    name : str
+        Name of its part of a study, `springtune.study.Study.parts`.
+    package : str
+        Where it is.
+    study_fields, grid_fields : dict of str to tuple
+        Keys that it adds to a study and to its grids: type and pydantic's field.
+    check : callable, optional
+        Of a config and a `springtune.study.messages.Problems`: adds what is wrong with its values.
+    expand : callable, optional
+        Of a config and `springtune.study.expand.Declared`: its part of a study; nothing where it has none.
+    axes : callable, optional
+        Of that part: labels of the dimensions of its groups.
+    summary : callable, optional
+        Of that part: rows of what `springtune scenes` prints, each a name, a number and a remark.
+    stages : tuple of Stage
+    outputs : tuple of Output
+    tables : callable, optional
+        Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
+    costs : dict of str to tuple
+        Seconds of a task by its name in ``DONE``, in any case and per unit, before any was measured.
+    """
+
+    name: str
+    package: str
+    study_fields: dict = field(default_factory=dict)
+    grid_fields: dict = field(default_factory=dict)
+    check: Callable = lambda config, problems: None
+    expand: Callable = lambda config, declared: ()
+    axes: Callable = lambda part: {}
+    summary: Callable = lambda part: []
+    stages: tuple = ()
+    outputs: tuple = ()
+    tables: Callable | None = None
+    costs: dict = field(default_factory=dict)
+
+    def module(self, name):
+        """A module of its package."""
+        return import_module(f"{self.package}.{name}")

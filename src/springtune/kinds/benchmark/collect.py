@@ -1,0 +1,19 @@
+"""Errors and seconds, gathered in the group ``/benchmark``."""
+
+from ...jobs import store
+from . import plan
+from .variables import BENCHMARK
+
+
+def groups(study, folder):
+    """Groups of a dataset, see `springtune.kinds.scenes.collect.groups`."""
+    data = BENCHMARK.empty(study.axes)
+    for case in study.parts["benchmark"]:
+        data.attrs["second_beam"] = case.second_beam.name if case.second_beam else ""
+        key = plan.case_key(case)
+        result = store.read(folder / "benchmark" / f"{key}.h5", [key], BENCHMARK.variables)[key]
+        place = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
+        for name, values in result.items():
+            array = data[name]
+            array.loc[{dimension: place[dimension] for dimension in array.dims if dimension in place}] = values
+    return {BENCHMARK.name: data}

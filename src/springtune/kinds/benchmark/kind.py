@@ -1,0 +1,199 @@
+"""Run time against error: a study's section ``benchmark``."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from ...linalg import SOLVERS
+from ...mesh import MESH_TYPES
+from ...problem.geometry import Beam
+from ...problem.loads import LOADS
+from ...problem.materials import Material
+from ...springs import DEFINITIONS
+from ...study.checks import check_density, check_known
+from ...study.config import Section
+from ...study.fields import (
+    BeamName,
+    DefinitionName,
+    Force,
+    Length,
+    Load,
+    MaterialName,
+    MeshType,
+    Named,
+    OneOrMore,
+    Text,
+    number,
+    one_of,
+)
+from ...study.messages import nearest
+from ..base import Kind
+from .names import CURVE_COUNTS, OTHER_APPROACHES, approach_names
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+OtherApproach = one_of("approach", OTHER_APPROACHES)
+Seconds = number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)
+
+
+class BenchmarkSceneConfig(Section):
+    """A scene of the benchmark."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
+    force: Force = Field(description="Magnitude of the force.")
+
+
+class BenchmarkConfig(Section):
+    """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
+
+    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
+    second_beam: BeamName | None = Field(
+        None,
+        description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
+        "it keeps that on both. None is called the quickest without.",
+    )
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
+    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
+        list(OTHER_APPROACHES),
+        validate_default=False,
+        description="Other approaches: finite elements, CalculiX where it is on the machine, motion to rest, and what "
+        "the paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
+    )
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    most_seconds: Seconds = Field(
+        "0.2",
+        validate_default=True,
+        description="Seconds that a run may take; a finer size that would take more is left out.",
+    )
+    thorough: Annotated[list[Text], OneOrMore()] = Field(
+        [], validate_default=False, description="Approaches that may take more, such as `delingette/structured`."
+    )
+    most_thorough: Seconds = Field("8", validate_default=True, description="Seconds that a run of those may take.")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene of the benchmark, see `springtune.kinds.benchmark.measure`.
+
+    Attributes
+    ----------
+    name : str
+    beam : Beam
+    material : Material
+        With a density.
+    load : str
+        Key of `springtune.problem.loads.LOADS`.
+    force : float
+        Force on the loaded side, tension positive [N].
+    approaches : tuple of str
+    mesh_sizes : tuple of float
+        Lengths of an edge [m], ascending.
+    most_seconds, most_thorough : float
+        Seconds that a run may take: of most approaches, and of those below.
+    thorough : tuple of str
+    second_beam : Beam or None
+        Beam on which errors are checked.
+    """
+
+    name: str
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+    approaches: tuple
+    mesh_sizes: tuple
+    most_seconds: float
+    most_thorough: float
+    thorough: tuple
+    second_beam: Beam | None
+
+
+def _check(config, problems):
+    if not config.benchmark:
+        return
+    section = config.benchmark
+    if section.second_beam:
+        check_known(problems, ("benchmark", "second_beam"), "beam", section.second_beam, config.beams)
+    for beam in dict.fromkeys([*(scene.beam for scene in section.scenes.values()), section.second_beam]):
+        if beam in config.beams:
+            side = min(config.beams[beam].length, config.beams[beam].height)
+            if max(section.mesh_size) > side / 2:
+                large = f"{1e3 * max(section.mesh_size):g} mm"
+                message = f"{large} is too large for '{beam}'; give at most {500 * side:g} mm"
+                problems.add(("benchmark", "mesh_size"), message)
+    for name, scene in section.scenes.items():
+        place = ("benchmark", "scenes", name)
+        check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
+        check_known(problems, (*place, "material"), "material", scene.material, config.materials)
+        check_density(config, scene.material, (*place, "material"), problems)
+        if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
+            problems.add((*place, "load"), f"'{scene.load}' is not benchmarked; choose traction, bending or pressure")
+    for name in section.definition:
+        if DEFINITIONS[name].needs:
+            able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)
+            problems.add(("benchmark", "definition"), f"'{name}' needs more than mesh and material; choose of {able}")
+    for name in section.mesh_type:
+        if name not in MESH_TYPES:
+            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
+    approaches = approach_names(section.definition, section.mesh_type, section.approach)
+    for name in section.thorough:
+        if name not in approaches:
+            message = f"'{name}' is no approach of this benchmark; {nearest(name, approaches)}"
+            problems.add(("benchmark", "thorough"), message)
+
+
+def _expand(config, declared):
+    section = config.benchmark
+    if not section:
+        return ()
+    definitions = [name for name in DEFINITIONS if name in section.definition]
+    others = [name for name in OTHER_APPROACHES if name in section.approach]
+    return tuple(
+        Case(
+            name,
+            declared.beams[scene.beam],
+            declared.materials[scene.material],
+            scene.load,
+            LOADS[scene.load].sign * scene.force,
+            approach_names(definitions, section.mesh_type, others),
+            tuple(sorted(section.mesh_size)),
+            section.most_seconds,
+            section.most_thorough,
+            tuple(section.thorough),
+            declared.beams[section.second_beam] if section.second_beam else None,
+        )
+        for name, scene in section.scenes.items()
+    )
+
+
+def _axes(cases):
+    return {
+        "mesh_size": {size for one in cases for size in one.mesh_sizes},
+        "scene": tuple(one.name for one in cases),
+        "approach": cases[0].approaches,
+        "curve_count": CURVE_COUNTS,
+        "linear_solver": SOLVERS,
+    }
+
+
+KIND = Kind(
+    "benchmark",
+    __package__,
+    study_fields={
+        "benchmark": (
+            BenchmarkConfig | None,
+            Field(None, description="Run time against error; it makes the group `/benchmark`."),
+        )
+    },
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    stages=STAGES,
+    outputs=OUTPUTS,
+)

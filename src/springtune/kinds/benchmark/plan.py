@@ -1,0 +1,47 @@
+"""Stage of the benchmark: what its jobs are to do, and the keys of what they store."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from ...jobs import store
+from ...jobs.dependencies import definition_digest
+from ...jobs.keys import beam_key, material_key, stage_key
+from ..base import Stage
+
+
+def case_key(case):
+    """Key of a scene of the benchmark."""
+    parameters = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
+    parameters["second_beam"] = case.second_beam and beam_key(case.second_beam)
+    packages = "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "netgen-mesher", "pyamg"
+    code = stage_key("kinds.benchmark.stage", *packages)
+    definitions = sorted({approach.partition("/")[0] for approach in case.approaches if "/" in approach})
+    return store.key(parameters, code, [definition_digest(name) for name in definitions])
+
+
+def _members(study, costs):
+    return {case.name: (0.0, case) for case in study.parts["benchmark"]}
+
+
+def _content(study, folder, cases):
+    first = study.parts["benchmark"][0]
+    tasks = [{"key": case_key(case), "curves": case is first} | asdict(case) for case in cases]
+    return {"folder": str(folder / "benchmark"), "cases": tasks}
+
+
+def _products(content):
+    return [Path(content["folder"]) / f"{case['key']}.h5" for case in content["cases"]]
+
+
+STAGES = (
+    Stage(
+        "benchmark",
+        "kinds.benchmark.stage",
+        "Timing approaches",
+        _content,
+        _products,
+        _members,
+        alone=True,
+        definitions=True,
+    ),
+)

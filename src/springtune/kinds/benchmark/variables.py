@@ -1,0 +1,62 @@
+"""Variables of the group ``/benchmark``."""
+
+import numpy as np
+
+from ...output.dataset import Group
+
+CASE = ("scene", "approach", "mesh_size")
+OF_SCENE = ("scene",)
+SOLVED = ("linear_solver", "mesh_size")
+
+BENCHMARK = Group(
+    "/benchmark",
+    {
+        "displacement": (CASE, "m", "displacement of the loaded side along the force", np.nan),
+        "error": (CASE, "1", "signed error of the displacement, over the reference's", np.nan),
+        "second_error": (CASE, "1", "signed error of the displacement on the second beam", np.nan),
+        "assured_error": (
+            CASE,
+            "1",
+            "largest absolute error of this and all finer mesh sizes that were run, on both beams",
+            np.nan,
+        ),
+        "seconds": (CASE, "s", "time from nothing to the displacement, median of warm runs", np.nan),
+        "seconds_spread": (CASE, "s", "longest less shortest of the warm runs", np.nan),
+        "cold_seconds": (CASE, "s", "time of the first run, imports included", np.nan),
+        "meshing_seconds": (CASE, "s", "time to make the mesh", np.nan),
+        "assembling_seconds": (CASE, "s", "time to derive parameters and assemble", np.nan),
+        "factorizing_seconds": (CASE, "s", "time to factorize, or of what is paid once", np.nan),
+        "solving_seconds": (CASE, "s", "time to solve", np.nan),
+        "peak_memory": (CASE, "B", "largest memory of the process above that at its start", np.nan),
+        "unknowns": (CASE, "1", "number of unknowns", np.nan),
+        "pareto": (CASE, "1", "1 where no approach of the scene is both more accurate and faster", 0),
+        "status": (CASE, "1", "what became of the case", 0),
+        "message": (CASE, "1", "why there are no numbers", ""),
+        "error_rate": (
+            ("scene", "approach"),
+            "1",
+            "exponent of the error in the mesh size, where it falls with that and keeps its sign",
+            np.nan,
+        ),
+        "cost_exponent": (("scene", "approach"), "1", "exponent of the seconds in the unknowns, from 3000 on", np.nan),
+        "reference_displacement": (OF_SCENE, "m", "displacement of the converged reference", np.nan),
+        "reference_error_estimate": (OF_SCENE, "1", "estimated relative error of the reference", np.nan),
+        "reference_seconds": (OF_SCENE, "s", "time of the reference", np.nan),
+        "machine_load": (OF_SCENE, "1", "load of the machine at the start, processes", np.nan),
+        "solver_seconds": (SOLVED, "s", "time from a matrix to a solution, its sparsity analysed", np.nan),
+        "solver_again_seconds": (SOLVED, "s", "time of the next matrix of that sparsity", np.nan),
+        "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", np.nan),
+        "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", np.nan),
+        "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", np.nan),
+        "linear_seconds": ((), "s", "time of one linear solve there", np.nan),
+        "explicit_steps": ((), "s-1", "explicit steps a second of nonlinear springs there", np.nan),
+        "explicit_bandwidth": ((), "B/s", "memory that these steps read and write", np.nan),
+        "copy_bandwidth": ((), "B/s", "memory that a plain copy reads and writes", np.nan),
+    },
+    dimensions={
+        "scene": "scene of the benchmark",
+        "approach": "definition / mesh type, or another approach",
+        "linear_solver": "solver of linear systems",
+        "curve_count": "number of stiffnesses of a sensitivity curve",
+    },
+)

@@ -1,0 +1,34 @@
+"""Stage of the laid strips: what its jobs are to do, and the keys of what they store."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from ...jobs import store
+from ...jobs.dependencies import definition_digest
+from ...jobs.keys import stage_key
+from ..base import Stage
+from .cost import cost_units
+
+
+def laying_key(one):
+    """Key of a laid strip."""
+    return store.key(
+        asdict(one), stage_key("kinds.laying.stage", "numpy", "scipy", "cvxopt"), definition_digest(one.definition)
+    )
+
+
+def _members(study, costs):
+    laying = study.parts["laying"]
+    strips = {store.key(asdict(one)): one for one in (*laying.strips, *laying.references)} if laying else {}
+    return {name: (costs.of("laying", cost_units(one.mesh_size)), one) for name, one in strips.items()}
+
+
+def _content(study, folder, strips):
+    return {"folder": str(folder / "laying"), "strips": [{"key": laying_key(one)} | asdict(one) for one in strips]}
+
+
+def _products(content):
+    return [Path(content["folder"]) / f"{strip['key']}.h5" for strip in content["strips"]]
+
+
+STAGES = (Stage("laying", "kinds.laying.stage", "Laying the strips", _content, _products, _members, definitions=True),)

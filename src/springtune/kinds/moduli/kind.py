@@ -1,0 +1,113 @@
+"""Effective moduli of definitions: a flag of a grid, and the box on whose meshes they are measured."""
+
+from dataclasses import dataclass
+from itertools import product
+
+from pydantic import Field
+
+from ...problem.geometry import Beam
+from ...springs import DEFINITIONS
+from ...study.config import Section
+from ...study.fields import Flag, Length
+from ..base import Kind
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+
+class PatchConfig(Section):
+    """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
+
+    They are those of the mesh that a beam of this extent gets: give the extent of the beam that they stand beside.
+    """
+
+    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
+    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Effective moduli of a definition on a patch.
+
+    Attributes
+    ----------
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_type : str
+    mesh_size : float
+        Length of an edge [m].
+    poisson_ratio : float
+        Poisson's ratio that the definition is asked for [1].
+    """
+
+    definition: str
+    mesh_type: str
+    mesh_size: float
+    poisson_ratio: float
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """What a study measures.
+
+    Attributes
+    ----------
+    patch : Beam
+        Box on whose meshes moduli are measured; its thickness does not matter.
+    measurements : tuple of Measurement
+    """
+
+    patch: Beam
+    measurements: tuple
+
+
+def _expand(config, declared):
+    """Moduli of definitions that derive a stiffness, on every grid that asks for them."""
+    found = {}
+    for grid in config.grids.values():
+        if grid.moduli:
+            derived = [name for name in grid.definition if DEFINITIONS[name].needs != "stiffness"]
+            ratios = dict.fromkeys(declared.materials[name].poisson_ratio for name in grid.material)
+            found |= dict.fromkeys(product(derived, grid.mesh_type, grid.mesh_size, ratios))
+    if not found:
+        return None
+    box = Beam("patch", config.patch.length, config.patch.height, 1.0)
+    return Moduli(box, tuple(Measurement(*labels) for labels in found))
+
+
+def _axes(moduli):
+    return {"poisson_ratio": tuple(sorted({one.poisson_ratio for one in moduli.measurements}))}
+
+
+def _summary(moduli):
+    patches = {(one.mesh_type, one.mesh_size) for one in moduli.measurements}
+    on = "1 patch" if len(patches) == 1 else f"{len(patches)} patches"
+    return [["moduli", len(moduli.measurements), f"measured on {on}"]]
+
+
+KIND = Kind(
+    "moduli",
+    __package__,
+    study_fields={
+        "patch": (
+            PatchConfig,
+            Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured."),
+        )
+    },
+    grid_fields={
+        "moduli": (
+            Flag,
+            Field(
+                "false",
+                validate_default=True,
+                description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
+                "Poisson's ratio, on the box under `patch`. Definitions that are told their stiffness have none.",
+            ),
+        )
+    },
+    expand=_expand,
+    axes=_axes,
+    summary=_summary,
+    stages=STAGES,
+    outputs=OUTPUTS,
+    costs={"moduli": (5e-4, 2e-6)},
+)

@@ -1,0 +1,68 @@
+"""Stage of the moduli: what its jobs are to do, and the keys of what they store."""
+
+from pathlib import Path
+
+from ...jobs import store
+from ...jobs.dependencies import definition_digest
+from ...jobs.keys import stage_key
+from ...mesh import MESH_TYPES
+from ...study.model import MeshSpec
+from ..base import Stage
+from ..scenes.plan import mesh_source, particles
+
+
+def moduli_key(study, one):
+    """Key of the effective moduli of a definition on a patch."""
+    mesh = mesh_of(study, one)
+    parameters = [mesh_source(mesh), one.definition, one.poisson_ratio]
+    code = (
+        stage_key("kinds.moduli.stage", "numpy", "scipy", "cvxopt", "netgen-mesher"),
+        definition_digest(one.definition),
+    )
+    return store.key(parameters, *code)
+
+
+def mesh_of(study, one):
+    """Mesh of a patch test: on the box, or the first mesh from a file."""
+    if one.mesh_type in MESH_TYPES:
+        return MeshSpec(study.parts["moduli"].patch, one.mesh_type, one.mesh_size)
+    return next(mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size))
+
+
+def patch_name(one):
+    """File stem of the moduli of a patch."""
+    return f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
+
+
+def _members(study, costs):
+    """What is measured on each patch, and what that costs."""
+    seconds, patches = {}, {}
+    for one in study.parts["moduli"].measurements if study.parts["moduli"] else ():
+        name, mesh = patch_name(one), mesh_of(study, one)
+        patch = patches.setdefault(name, {"name": name, "mesh": mesh_source(mesh), "measurements": []})
+        measurement = {"key": moduli_key(study, one), "definition": one.definition, "poisson_ratio": one.poisson_ratio}
+        patch["measurements"].append(measurement)
+        each = costs.of("moduli", particles(mesh)) + costs.of(one.definition, particles(mesh))
+        seconds[name] = seconds.get(name, 0.0) + each
+    return {name: (seconds[name], patch) for name, patch in patches.items()}
+
+
+def _content(study, folder, patches):
+    return {"folder": str(folder / "moduli"), "patches": patches}
+
+
+def _products(content):
+    return [Path(content["folder"]) / f"{patch['name']}.h5" for patch in content["patches"]]
+
+
+STAGES = (
+    Stage(
+        "moduli",
+        "kinds.moduli.stage",
+        "Measuring effective moduli",
+        _content,
+        _products,
+        _members,
+        definitions=True,
+    ),
+)

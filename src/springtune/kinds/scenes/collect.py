@@ -1,0 +1,317 @@
+"""Scenes, references and curves, gathered in the root of a dataset and its groups."""
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import CubicSpline
+
+from ...jobs import atomic, store
+from ...mesh import read_mesh
+from ...output.dataset import STATUS, Filler
+from ...problem.boundary import FACE_POSITIONS
+from ...problem.compare import deformation_error
+from ...problem.loads import LOADS
+from ...reference.field import outline
+from ...reference.limits import objection
+from ...springs.lattice import predicted_stiffness
+from . import plan, stored_reference
+from .outputs import pressed
+from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
+
+COPIED = (
+    "displacement",
+    "stiffness",
+    "message",
+    "iterations",
+    "residual",
+    "negative_pivots",
+    "field_error",
+    "definition_seconds",
+    "definition_evaluations",
+    "spring_ratio",
+    "load_share",
+    "solver",
+)
+"""What of a scene's result goes into the dataset as it is."""
+
+
+SMALL_STRAIN = "small-strain-plane-stress"
+"""Name of the reference that all studies have."""
+
+FACE = {
+    "displacement": "face_displacement",
+    "face_mean": "face_mean_displacement",
+    "face_profile": "face_profile",
+    "last_displacement": "last_face_displacement",
+}
+"""Values of a pressed face by their names in a result."""
+
+
+def groups(study, folder):
+    """Groups of a dataset.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where the study's results are.
+
+    Returns
+    -------
+    dict of str to xarray.Dataset
+    """
+    axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
+    root = Filler(ROOT.empty(axes))
+    _meshes(study, folder, root)
+    displacements, objections = _references(study, folder, root)
+    block = _block(study, folder, axes) if pressed(study) else None
+    fields = _fields(study, folder, axes) if "deformed" in study.outputs else None
+    _scenes(study, folder, root, block, fields, objections)
+    _bodies(study, root)
+    _printed(study, root)
+    data = root.data
+    data["deformation_error"].values = deformation_error(
+        *xr.broadcast(data.displacement, data.reference_displacement.broadcast_like(data.displacement))
+    )
+    found = {ROOT.name: data}
+    if study.curves:
+        found[SENSITIVITY.name] = _sensitivity(study, folder, displacements, axes)
+    if study.further_references:
+        found[FINITE_STRAIN.name] = _finite_strain(study, folder, axes, data.displacement)
+    if block:
+        found[BLOCK.name] = _with_face_error(block.data)
+    if fields:
+        found[FIELDS.name] = fields.data
+    return found
+
+
+def _bodies(study, root):
+    """Materials and beams."""
+    for material in {scene.material for scene in study.scenes}:
+        values = {
+            "material_young_modulus": material.young_modulus,
+            "material_poisson_ratio": material.poisson_ratio,
+            "material_density": np.nan if material.density is None else material.density,
+        }
+        root.put(values, material=material.name)
+    for beam in {scene.mesh.beam for scene in study.scenes}:
+        root.put({"beam_length": beam.length, "beam_height": beam.height}, beam=beam.name)
+
+
+def _mesh_labels(mesh):
+    return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+
+
+def _calibration(folder):
+    """Calibrated stiffnesses by group; none where no scene is calibrated."""
+    path = plan.calibration_path(folder)
+    return atomic.read_json(path) if path.exists() else {}
+
+
+def _meshes(study, folder, root):
+    for mesh in study.meshes:
+        notes = atomic.read_json(folder / "meshes" / f"{mesh.name}.json")
+        del notes["key"]
+        root.put(notes, **_mesh_labels(mesh))
+
+
+def _references(study, folder, root):
+    """Displacement of each reference by (beam, material, load), and by these and kinematics objections to it."""
+    displacements, objections = {}, {}
+    for asked in study.references:
+        result = _reference(folder, asked)
+        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        place = tuple(labels.values())
+        for kinematics in study.axes["kinematics"]:
+            objections[*place, kinematics] = found = objection(result, asked.force, kinematics)
+            root.put({"reference_applies": not found}, kinematics=kinematics, **labels)
+        values = {
+            "force": asked.force,
+            "reference_seconds": result["seconds"],
+            "reference_message": objection(result, asked.force, "nonlinear"),
+        }
+        if "displacement" in result:
+            displacements[place] = asked.force * result["displacement"]
+            values |= {
+                "reference_displacement": displacements[place],
+                "reference_error_estimate": result["error_estimate"],
+                "reference_rotation": abs(asked.force) * result["rotation"],
+                "reference_strain": abs(asked.force) * result["strain"],
+            }
+        root.put(values, **labels)
+    return displacements, objections
+
+
+def _reference(folder, asked, fields=()):
+    reference = plan.reference_of(asked.beam, asked.material, asked.load)
+    return stored_reference.read(folder / "references", reference, fields)
+
+
+def _scenes(study, folder, root, block, fields, objections):
+    """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    calibration = _calibration(folder)
+    arrays = ["face_profile"] * (block is not None) + ["displacements"] * (fields is not None)
+    for mesh, scenes in plan.by_mesh(study.scenes).items():
+        names = [plan.solved_key(study, scene, calibration) for scene in scenes]
+        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), arrays)
+        for scene, name in zip(scenes, names):
+            result = results[name]
+            values = {"status": STATUS.index(result["status"]), "solve_seconds": result["seconds"]}
+            values |= {label: result[label] for label in COPIED if label in result}
+            why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]
+            if why and result["status"] in ("solved", "unstable"):
+                values["message"] = "; ".join(filter(None, (values.get("message"), why)))
+            labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
+            labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
+            root.put(values, **labels)
+            if LOADS[scene.load].kind == "face":
+                block.put({new: result[old] for old, new in FACE.items() if old in result}, **labels)
+            if "displacements" in result:
+                x, y = result["displacements"].T
+                fields.put_rows({"displacement_x": x, "displacement_y": y}, **labels)
+
+
+def _printed(study, root):
+    for cell in study.printed:
+        labels = {name: getattr(cell, name) for name in CELL}
+        try:
+            root.put(
+                {
+                    "paper_displacement": cell.displacement,
+                    "paper_reference_displacement": cell.reference_displacement,
+                    "paper_deformation_error": cell.deformation_error,
+                    "paper_stiffness": cell.stiffness,
+                    "paper_table": cell.table,
+                    "paper_remark": cell.remark,
+                },
+                **labels,
+            )
+        except KeyError:
+            continue  # a cell that this study does not ask for
+
+
+def _sensitivity(study, folder, displacements, axes):
+    curves = Filler(SENSITIVITY.empty(axes))
+    for mesh, members in plan.by_mesh(study.curves).items():
+        names = [plan.curve_key(study, curve) for curve in members]
+        results = store.read(folder / "curves" / f"{mesh.name}.h5", names, ["displacement", "stable"])
+        for curve, name in zip(members, names):
+            result, stiffness = results[name], np.array(plan.stiffnesses(study, curve))
+            displacement = result["displacement"]
+            reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
+            solved, unstable, missing = map(STATUS.index, ("solved", "unstable", "not_converged"))
+            status = np.where(np.isnan(displacement), missing, np.where(result["stable"], solved, unstable))
+            curves.put(
+                {
+                    "stiffness": stiffness,
+                    "displacement": displacement,
+                    "deformation_error": deformation_error(displacement, reference),
+                    "status": status,
+                    "message": result["message"],
+                    "best_stiffness": result["best_stiffness"],
+                    "best_stiffness_status": STATUS.index(result["best_status"]),
+                    "best_stiffness_message": result["best_message"],
+                    "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
+                    "curve_seconds": result["seconds"],
+                },
+                material=curve.material.name,
+                load=curve.load,
+                kinematics=curve.kinematics,
+                **_mesh_labels(mesh),
+            )
+    return curves.data
+
+
+def _block(study, folder, axes):
+    """Group of pressed faces with the references of all kinds; scenes are still to come."""
+    kinds = (SMALL_STRAIN, *study.further_references)
+    block = Filler(BLOCK.empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
+    for asked in study.references:
+        if LOADS[asked.load].kind != "face":
+            continue
+        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        for kind in kinds:
+            block.put(_face_reference(folder, asked, kind), reference=kind, **labels)
+    return block
+
+
+def _finite_strain(study, folder, axes, displacement):
+    """Group of references at finite strain, and the networks' errors against them."""
+    finite = Filler(FINITE_STRAIN.empty(axes | {"reference": study.further_references}))
+    for asked in study.references:
+        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        for kind in study.further_references:
+            result = _finite_reference(folder, asked, kind)
+            values = {"reference_message": result["message"]}
+            if "displacement" in result:
+                values["reference_displacement"] = result["displacement"]
+                values["reference_error_estimate"] = result["error_estimate"]
+            finite.put(values, reference=kind, **labels)
+    pairs = xr.broadcast(displacement, finite.data.reference_displacement)
+    error = finite.data["deformation_error"]
+    error.values = deformation_error(*(array.transpose(*error.dims) for array in pairs))
+    return finite.data
+
+
+def _finite_reference(folder, asked, kind, fields=()):
+    name = plan.finite_key(asked, kind)
+    return store.read(folder / "references" / f"{name}.h5", [name], fields)[name]
+
+
+def _with_face_error(data):
+    pairs = xr.broadcast(data.face_displacement, data.reference_face_displacement)
+    data["face_error"].values = deformation_error(*(array.transpose(*data.face_error.dims) for array in pairs))
+    return data
+
+
+def _face_reference(folder, asked, kind):
+    """Middle, mean and profile of a pressed face of a reference."""
+    if kind == SMALL_STRAIN:
+        result, scale = _reference(folder, asked, ["x", "displacements"]), asked.force
+        if "x" in result:
+            result |= {"positions": result["x"] / asked.beam.length, "profile": result["displacements"][:, -1, 1]}
+    else:
+        result, scale = _finite_reference(folder, asked, kind, ["positions", "profile"]), 1.0
+    values = {"reference_message": result["message"]}
+    if "displacement" in result:
+        values |= {
+            "reference_face_displacement": scale * result["displacement"],
+            "reference_face_mean_displacement": scale * result["mean_displacement"],
+            "reference_face_profile": scale * CubicSpline(result["positions"], result["profile"])(FACE_POSITIONS),
+            "reference_error_estimate": result["error_estimate"],
+        }
+    return values
+
+
+def _fields(study, folder, axes):
+    """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
+    shown = plan.shown_meshes(study)
+    meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
+    outlines = {asked: _outline(folder, asked) for asked in study.references}
+    lengths = {
+        "particle": max(len(mesh.points) for mesh in meshes.values()),
+        "spring": max(len(mesh.edges) for mesh in meshes.values()),
+        "outline_point": max(len(points) for points, _ in outlines.values()),
+    }
+    numbers = {name: tuple(range(length)) for name, length in lengths.items()}
+    fields = Filler(FIELDS.empty(axes | numbers))
+    for spec, mesh in meshes.items():
+        labels = _mesh_labels(spec)
+        fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
+        fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
+    for asked in study.references:
+        points, displacements = outlines[asked]
+        moved = asked.force * displacements
+        beam, load = {"beam": asked.beam.name}, {"material": asked.material.name, "load": asked.load}
+        fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
+        fields.put_rows(
+            {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
+        )
+    return fields
+
+
+def _outline(folder, asked):
+    """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
+    result = _reference(folder, asked, ["x", "y", "displacements"])
+    if "x" not in result:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    return outline(result["x"], result["y"], result["displacements"])

@@ -1,0 +1,363 @@
+"""Stages of scenes: what their jobs are to do, and the keys of what they store."""
+
+import hashlib
+from collections import defaultdict
+from functools import cache, lru_cache
+from pathlib import Path
+
+from ...jobs import store
+from ...jobs.dependencies import definition_digest
+from ...jobs.keys import beam_key, material_key, stage_key
+from ...problem.loads import LOADS
+from ...reference.similarity import unit_problem, unit_scales
+from ..base import Stage
+
+
+def particles(mesh):
+    """Number of particles of a mesh, about."""
+    return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
+
+
+def by_mesh(items):
+    """Scenes or curves by their mesh."""
+    groups = defaultdict(list)
+    for item in items:
+        groups[item.mesh].append(item)
+    return groups
+
+
+# -- keys --------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def mesh_key(mesh):
+    """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
+    packages = {"free": ["netgen-mesher"]}.get(mesh.mesh_type, []) if mesh.file is None else ["meshio"]
+    return store.key(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy", *packages))
+
+
+def mesh_source(mesh):
+    """What a mesh is made from."""
+    source = {"length": mesh.beam.length, "height": mesh.beam.height}
+    if mesh.file is None:
+        return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+    content = hashlib.sha256(mesh.file.read_bytes()).hexdigest()
+    return source | {"file": str(mesh.file), "unit": mesh.unit, "content": content}
+
+
+@cache
+def reference_of(beam, material, load):
+    """Reference of a beam, material and load, as `springtune.kinds.scenes.stored_reference.read` takes it.
+
+    Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
+    kind.
+    """
+    problem = beam, material, LOADS[load].kind
+    length, displacement = unit_scales(*problem)
+    key = store.key(
+        unit_problem(*problem), stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
+    )
+    return {"key": key, "length": length, "displacement": displacement}
+
+
+def finite_key(reference, kind):
+    """Key of a reference at finite strain, which no load scales."""
+    code = stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
+    return store.key(kind, _finite_problem(reference), code)
+
+
+def _problem(reference):
+    return reference.beam, reference.material, LOADS[reference.load].kind
+
+
+def _finite_problem(reference):
+    parameters = [
+        beam_key(reference.beam),
+        material_key(reference.material),
+        LOADS[reference.load].kind,
+        reference.force,
+    ]
+    return [*parameters, LOADS[reference.load].follower]
+
+
+def curve_key(study, curve):
+    """Key of a sensitivity curve."""
+    parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
+    parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
+    return store.key(parameters, stage_key("kinds.scenes.sensitivity", "numpy", "scipy", "cvxopt"))
+
+
+def scene_key(study, scene):
+    """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
+    reference = reference_of(scene.mesh.beam, scene.material, scene.load)
+    parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
+    parameters += [LOADS[scene.load].kind, _follows(scene), scene.force, scene.definition, scene.kinematics]
+    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
+    return store.key(
+        parameters, stage_key("kinds.scenes.solve", "numpy", "scipy", "cvxopt"), definition_digest(scene.definition)
+    )
+
+
+@lru_cache(maxsize=1)
+def _shown_meshes(meshes):
+    coarsest = {}
+    for mesh in sorted(meshes, key=lambda mesh: -mesh.mesh_size):
+        coarsest.setdefault((mesh.beam, mesh.mesh_type), mesh)
+    return frozenset(coarsest.values())
+
+
+def shown_meshes(study):
+    """Meshes whose whole fields are kept, the coarsest of each beam and mesh type; none where none are drawn."""
+    return _shown_meshes(study.meshes) if "deformed" in study.outputs else frozenset()
+
+
+def solved_key(study, scene, calibration):
+    """Key under which a scene's result is stored, given the calibrated stiffnesses by group."""
+    name = scene_key(study, scene)
+    if scene.definition == "calibrated":
+        return store.key(name, calibration[calibration_name(scene)]["stiffness"])
+    return name
+
+
+def stiffnesses(study, curve):
+    """Stiffnesses of a sensitivity curve [N/m], ascending."""
+    membrane = curve.material.young_modulus * curve.mesh.beam.thickness
+    return [ratio * membrane for ratio in study.stiffness_ratios]
+
+
+def _thickness_ratio(study, scene):
+    """Thickness over that of the beam that calibrates: stiffness is in proportion to it."""
+    if scene.definition != "calibrated":
+        return 1.0
+    calibrating = next(curve.mesh.beam for curve in study.curves if curve.mesh.beam.name == study.calibration[0])
+    return scene.mesh.beam.thickness / calibrating.thickness
+
+
+def calibration_name(scene):
+    """Name of the group of curves that calibrates a scene."""
+    return f"{scene.mesh.mesh_type}_{scene.material.name}_{scene.kinematics}"
+
+
+def _follows(scene):
+    """Whether the force follows what it acts on: linear kinematics know no other place than that at rest."""
+    return LOADS[scene.load].follower and scene.kinematics == "nonlinear"
+
+
+def _given_stiffness(study, scene):
+    return study.stiffness_table[scene.mesh.mesh_type, scene.material.name] if scene.definition == "paper" else None
+
+
+# -- stages ------------------------------------------------------------------------------------------------------------
+
+
+def _mesh_members(study, costs):
+    """Meshes, and what they and all their scenes and curves cost."""
+    seconds = {mesh.name: costs.of("mesh", particles(mesh)) for mesh in study.meshes}
+    for scene in study.scenes:
+        count = particles(scene.mesh)
+        seconds[scene.mesh.name] += costs.of(scene.kinematics, count)
+        seconds[scene.mesh.name] += costs.of(scene.definition, count)
+    for curve in study.curves:
+        seconds[curve.mesh.name] += costs.of("curve", particles(curve.mesh))
+    return {mesh.name: (seconds[mesh.name], mesh) for mesh in study.meshes}
+
+
+def _meshes(study, folder, meshes):
+    return {
+        "folder": str(folder / "meshes"),
+        "meshes": [{"name": mesh.name, "key": mesh_key(mesh)} | mesh_source(mesh) for mesh in meshes],
+    }
+
+
+def _mesh_products(content):
+    folder = Path(content["folder"])
+    return [folder / f"{mesh['name']}{ending}" for mesh in content["meshes"] for ending in (".vtu", ".json")]
+
+
+def _reference_members(study, costs):
+    """References in groups: unit problems that share elements and differ in Poisson's ratio; each at finite strain."""
+    groups = defaultdict(dict)
+    for reference in study.references:
+        aspect_ratio, nu, kind = unit_problem(*_problem(reference))
+        groups[store.key(aspect_ratio, kind)].setdefault(nu, (reference, None))
+    members = {
+        name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
+    }
+    for reference in study.references:
+        for kind in study.further_references:
+            name = store.key(kind, _finite_problem(reference))
+            members[name] = costs.of("finite"), [(reference, kind)]
+    return members
+
+
+def _references(study, folder, groups):
+    """References and their kinds at finite strain, nothing of a unit problem."""
+    references = [one for group in groups for one in group]
+    return {
+        "folder": str(folder / "references"),
+        "references": [
+            {"key": reference_of(one.beam, one.material, one.load)["key"], "problem": unit_problem(*_problem(one))}
+            for one, kind in references
+            if kind is None
+        ],
+        "finite": [
+            {
+                "key": finite_key(one, kind),
+                "beam": beam_key(one.beam),
+                "material": material_key(one.material),
+                "force": one.force,
+                "load": LOADS[one.load].kind,
+                "plane": kind.rpartition("-")[2],
+                "follower": LOADS[one.load].follower,
+            }
+            for one, kind in references
+            if kind is not None
+        ],
+    }
+
+
+def _reference_products(content):
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in (*content["references"], *content["finite"])]
+
+
+def _curve(study, curve):
+    return {
+        "key": curve_key(study, curve),
+        "kind": LOADS[curve.load].kind,
+        "force": curve.force,
+        "kinematics": curve.kinematics,
+        "stiffnesses": stiffnesses(study, curve),
+        "reference": reference_of(curve.mesh.beam, curve.material, curve.load),
+    }
+
+
+def _sensitivity(study, folder, meshes):
+    curves = by_mesh(study.curves)
+    families = [
+        {"name": mesh.name, "curves": [_curve(study, curve) for curve in curves[mesh]]}
+        for mesh in meshes
+        if curves[mesh]
+    ]
+    return families and {
+        "folder": str(folder / "curves"),
+        "meshes": str(folder / "meshes"),
+        "references": str(folder / "references"),
+        "families": families,
+    }
+
+
+def _solve(study, folder, meshes):
+    scenes = by_mesh(study.scenes)
+    families = [
+        {
+            "name": mesh.name,
+            "thickness": mesh.beam.thickness,
+            "keep_fields": mesh in shown_meshes(study),
+            "scenes": [_scene(study, scene) for scene in scenes[mesh]],
+        }
+        for mesh in meshes
+    ]
+    return {
+        "calibration": str(calibration_path(folder)) if _calibrated(study) else None,
+        "folder": str(folder / "solutions"),
+        "meshes": str(folder / "meshes"),
+        "references": str(folder / "references"),
+        "families": families,
+    }
+
+
+def _scene(study, scene):
+    task = {
+        "key": scene_key(study, scene),
+        "material": material_key(scene.material),
+        "kind": LOADS[scene.load].kind,
+        "follower": _follows(scene),
+        "force": scene.force,
+        "definition": scene.definition,
+        "kinematics": scene.kinematics,
+        "reference": reference_of(scene.mesh.beam, scene.material, scene.load),
+    }
+    stiffness = _given_stiffness(study, scene)
+    if stiffness is not None:
+        task["stiffness"] = stiffness
+    if scene.definition == "calibrated":
+        task["calibration"] = calibration_name(scene)
+        task["thickness_ratio"] = _thickness_ratio(study, scene)
+    return task
+
+
+def _family_products(content):
+    return [Path(content["folder"]) / f"{family['name']}.h5" for family in content["families"]]
+
+
+def _calibrated(study):
+    return [scene for scene in study.scenes if scene.definition == "calibrated"]
+
+
+def calibration_path(folder):
+    """Where the calibrated stiffnesses of a study are."""
+    return folder / "done" / "calibrate_0.json"
+
+
+def _calibrate_members(study, costs):
+    """Groups of scenes that share a calibrated stiffness, in one job."""
+    groups = {}
+    for scene in _calibrated(study):
+        groups[calibration_name(scene)] = scene.mesh.mesh_type, scene.material, scene.kinematics
+    return {"all": (0.0, sorted(groups.items()))} if groups else {}
+
+
+def _calibrate(study, folder, members):
+    tasks = []
+    for name, (mesh_type, material, kinematics) in (pair for groups in members for pair in groups):
+        curves = [
+            {"mesh": curve.mesh.name, "key": curve_key(study, curve), "load": curve.load, "force": curve.force}
+            for curve in study.curves
+            if (curve.mesh.beam.name, curve.load) == study.calibration
+            and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
+        ]
+        tasks.append({"name": name, "members": curves})
+    return {"curves": str(folder / "curves"), "groups": tasks}
+
+
+STAGES = (
+    Stage(
+        "reference",
+        "kinds.scenes.reference",
+        "Solving the finite-element references",
+        _references,
+        _reference_products,
+        _reference_members,
+    ),
+    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members),
+    Stage(
+        "sensitivity",
+        "kinds.scenes.sensitivity",
+        "Tracing the sensitivity curves",
+        _sensitivity,
+        _family_products,
+        like="mesh",
+        same=("mesh",),
+        every=("reference",),
+    ),
+    Stage(
+        "calibrate",
+        "kinds.scenes.calibrate",
+        "Calibrating the uniform stiffness",
+        _calibrate,
+        lambda content: [],
+        _calibrate_members,
+        every=("sensitivity",),
+    ),
+    Stage(
+        "solve",
+        "kinds.scenes.solve",
+        "Solving the networks",
+        _solve,
+        _family_products,
+        like="mesh",
+        same=("mesh",),
+        every=("reference", "calibrate"),
+        definitions=True,
+    ),
+)

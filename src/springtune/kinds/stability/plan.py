@@ -1,0 +1,42 @@
+"""Stage of the experiments: what its jobs are to do, and the keys of what they store."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from ...jobs import store
+from ...jobs.dependencies import definition_digest
+from ...jobs.keys import beam_key, material_key, stage_key
+from ..base import Stage
+
+
+def experiment_key(one):
+    """Key of an experiment on stability."""
+    parameters = asdict(one) | {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
+    code = stage_key("kinds.stability.stage", "numpy", "scipy", "cvxopt", "numba")
+    return store.key(parameters, code, definition_digest(one.definition))
+
+
+def _members(study, costs):
+    return {store.key(asdict(one)): (costs.of(one.name), one) for one in study.parts["stability"]}
+
+
+def _content(study, folder, experiments):
+    tasks = [{"key": experiment_key(one)} | asdict(one) for one in experiments]
+    return {"folder": str(folder / "stability"), "experiments": tasks}
+
+
+def _products(content):
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["experiments"]]
+
+
+STAGES = (
+    Stage(
+        "stability",
+        "kinds.stability.stage",
+        "Experiments on stability",
+        _content,
+        _products,
+        _members,
+        definitions=True,
+    ),
+)

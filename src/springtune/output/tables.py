@@ -1,0 +1,37 @@
+"""Rows of tables: cells of a dataset, CSV and Markdown."""
+
+import csv
+import io
+
+import numpy as np
+
+
+def cells_with_values(values, dimensions):
+    """Labels of the cells that have a value."""
+    stacked = values.transpose(*dimensions)
+    labels = [stacked[name].values.tolist() for name in dimensions]
+    for place in np.argwhere(np.isfinite(stacked.values)):
+        yield {name: label[i] for name, label, i in zip(dimensions, labels, place)}
+
+
+def csv_text(rows):
+    """Rows as CSV; a number that is not there is an empty field."""
+    text = io.StringIO()
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: _number(value) for name, value in row.items()})
+    return text.getvalue()
+
+
+def _number(value):
+    if not isinstance(value, float):
+        return value
+    return "" if np.isnan(value) else f"{value:.8g}"
+
+
+def markdown_table(heads, rows):
+    """Lines of a table: texts in the first column, numbers flush right in the others."""
+    lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
+    return [f"| {' | '.join(line)} |" for line in lines]
