@@ -4,10 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from springtune.campaign.plan import usual_costs
 from springtune.jobs import atomic, bundles
 from springtune.jobs.spent import Spent
 from springtune.kinds.stability.names import EXPERIMENTS
 from springtune.springs import DEFINITIONS
+
+USUAL = usual_costs()
 
 COSTS = st.dictionaries(st.integers(0, 60).map("task {}".format), st.floats(1e-3, 30.0), min_size=1, max_size=40)
 
@@ -50,20 +53,20 @@ def test_two_new_tasks_run_two_bundles_again():
 
 def test_costs_follow_what_the_machine_measures(tmp_path):
     path, done = tmp_path / "costs.json", tmp_path / "done_0.json"
-    assert bundles.Costs(path).of("reference") == bundles.COSTS["reference"][0]
+    assert bundles.Costs(path, USUAL).of("reference") == USUAL["reference"][0]
     spent = Spent()
     for _ in range(10):
-        spent.add("reference", 0, 3 * bundles.COSTS["reference"][0])
+        spent.add("reference", 0, 3 * USUAL["reference"][0])
         spent.add("a kind of no cost", 0, 1.0)
     atomic.write_json(done, spent.summary())
-    bundles.remember(path, [done])
-    assert bundles.Costs(path).of("reference") == pytest.approx(3 * bundles.COSTS["reference"][0])
-    assert bundles.Costs(path).start_up == spent.start_up + bundles.SPAWNED
+    bundles.remember(path, [done], USUAL)
+    assert bundles.Costs(path, USUAL).of("reference") == pytest.approx(3 * USUAL["reference"][0])
+    assert bundles.Costs(path, USUAL).start_up == spent.start_up + bundles.SPAWNED
     before = path.read_text()
-    bundles.remember(path, [done])  # the same jobs again say nothing new
+    bundles.remember(path, [done], USUAL)  # the same jobs again say nothing new
     assert path.read_text() == before
 
 
 def test_every_experiment_and_every_definition_that_searches_has_a_cost():
-    assert set(EXPERIMENTS) <= set(bundles.COSTS)
-    assert {name for name in ("adjoint", "annealed", "evolved") if name in DEFINITIONS} <= set(bundles.COSTS)
+    assert set(EXPERIMENTS) <= set(USUAL)
+    assert {name for name in ("adjoint", "annealed", "evolved") if name in DEFINITIONS} <= set(USUAL)

@@ -14,8 +14,9 @@ import yaml
 from click.testing import CliRunner
 
 from springtune.cli import BEGIN, END, MANUAL, SCHEMA, main, manual_text, schema_text
+from springtune.kinds import kinds, load_study
 from springtune.springs import DEFINITIONS
-from springtune.study import SECTIONS, load_study
+from springtune.study import sections, study_model
 
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `springtune schema --write`"
@@ -39,8 +40,8 @@ class TestBench:
 
     def test_ratios_of_two_benchmarks(self, tmp_path):
         dims, coordinates = (
-            ("scene", "method", "mesh_size"),
-            {"scene": ["a"], "method": ["x", "y", "z"], "mesh_size": [1.0]},
+            ("scene", "approach", "mesh_size"),
+            {"scene": ["a"], "approach": ["x", "y", "z"], "mesh_size": [1.0]},
         )
         for name, second in (("old", 0.1), ("new", 0.3)):
             seconds = [[[0.1], [second], [0.1]]]
@@ -167,13 +168,13 @@ class TestSchema:
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(yaml.safe_load(text.replace(old, new, 1)), json.loads(schema_text()))
 
-    @pytest.mark.parametrize("model", SECTIONS.values())
+    @pytest.mark.parametrize("model", sections(study_model(kinds())).values())
     def test_every_field_is_described(self, model):
         assert model.__doc__
         assert all(field.description for field in model.model_fields.values())
 
     def test_every_section_is_in_the_manual(self):
-        models = {model.__name__ for model in SECTIONS.values()}
+        models = {model.__name__ for model in sections(study_model(kinds())).values()}
         assert models == {*json.loads(schema_text())["$defs"], "StudyConfig"}
 
     def test_example_of_the_manual_is_a_study(self, tmp_path):

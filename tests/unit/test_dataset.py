@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output import dataset
 
 AXES = {
@@ -18,7 +19,7 @@ AXES = {
 
 
 def test_empty_dataset_is_all_holes_with_units():
-    data = dataset.empty(AXES, dataset.ROOT_VARIABLES)
+    data = ROOT.empty(AXES)
     assert data.sizes["mesh_size"] == 2
     assert (data.status == 0).all() and data.displacement.isnull().all()
     assert (data.message == "").all()
@@ -29,10 +30,10 @@ def test_empty_dataset_is_all_holes_with_units():
 
 def test_written_dataset_opens_as_a_tree(tmp_path):
     path = tmp_path / "dataset.nc"
-    root = dataset.empty(AXES, dataset.ROOT_VARIABLES)
+    root = ROOT.empty(AXES)
     root["displacement"].loc[{"beam": "b", "mesh_size": 2e-3}] = 1.5e-3
     root["message"].loc[{"beam": "a"}] = "why"
-    curves = dataset.empty(AXES, dataset.SENSITIVITY_VARIABLES)
+    curves = SENSITIVITY.empty(AXES)
     dataset.write(path, {"/": root, "/sensitivity": curves}, {"title": "t", "Conventions": "CF-1.11"})
     with xr.open_datatree(path, engine="h5netcdf") as tree:
         assert tree.attrs["title"] == "t"

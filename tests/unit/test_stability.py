@@ -8,14 +8,16 @@ import pytest
 from springtune.jobs import dependencies as code
 from springtune.jobs import store
 from springtune.jobs.atomic import write_json
+from springtune.kinds import load_study
 from springtune.kinds.stability import experiments as stability
 from springtune.kinds.stability.names import AXES, EXPERIMENTS, ONCE
 from springtune.kinds.stability.stage import run
+from springtune.kinds.stability.variables import STABILITY
 from springtune.mechanics.integrators import BEHAVIOURS
-from springtune.output.dataset import DIMENSIONS, FLAGS, STABILITY_VARIABLES, STATUS
+from springtune.output.dataset import DIMENSIONS, STATUS
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
-from springtune.study import StudyError, load_study
+from springtune.study import StudyError
 
 STUDY = """
 title: One experiment
@@ -41,9 +43,12 @@ def written(folder, text):
 
 def test_experiments_are_one_a_definition_or_one_in_all(tmp_path):
     found = load_study(written(tmp_path, STUDY))
-    names = [one.name for one in found.stability]
+    names = [one.name for one in found.parts["stability"]]
     assert all(names.count(name) == (1 if name in ONCE else 2) for name in EXPERIMENTS)
-    assert found.stability[0].mesh_sizes == (2.5e-3, 5e-3) and found.stability[0].material.density == 7850.0
+    assert (
+        found.parts["stability"][0].mesh_sizes == (2.5e-3, 5e-3)
+        and found.parts["stability"][0].material.density == 7850.0
+    )
     assert set(found.axes["definition"]) == {"uniform", "lattice", "delingette"}
 
 
@@ -72,10 +77,10 @@ def test_output_without_experiments_is_refused(tmp_path):
 
 
 def test_every_variable_has_its_dimensions_described():
-    own = {name for dimensions, *_ in STABILITY_VARIABLES.values() for name in dimensions}
-    assert own <= set(DIMENSIONS)
+    own = {name for dimensions, *_ in STABILITY.variables.values() for name in dimensions}
+    assert own <= set(DIMENSIONS) | set(STABILITY.dimensions)
     assert own - {"definition", "mesh_size", "experiment"} == set(AXES)
-    assert FLAGS["behaviour"] == BEHAVIOURS
+    assert STABILITY.flags["behaviour"] == BEHAVIOURS
     assert all(STATUS[flag] == name for name, flag in stability.STATUS.items())
 
 
@@ -85,7 +90,7 @@ def test_results_have_the_shapes_of_the_dataset(name):
         Beam("b", 0.06, 0.02, 1e-3), Material("steel", 210e9, 0.3, 7850.0), 2e4, "lattice", "structured", (5e-3,)
     )
     for variable, values in stability.run(name, setup).items():
-        dimensions = [one for one in STABILITY_VARIABLES[variable][0] if one not in ("definition", "mesh_size")]
+        dimensions = [one for one in STABILITY.variables[variable][0] if one not in ("definition", "mesh_size")]
         assert np.shape(values) == tuple(len(AXES[one]) for one in dimensions), variable
 
 

@@ -11,10 +11,13 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from springtune.campaign.plan import outputs
+from springtune.kinds import load_study
+from springtune.kinds.moduli.kind import Measurement
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.study import OUTPUTS, Curve, MeshSpec, Moduli, Reference, Scene, StudyError, load_study
+from springtune.study import Curve, MeshSpec, Reference, Scene, StudyError
 
 CONFIG = Path(__file__).parents[2] / "config"
 LATTICE = math.sqrt(3) / 2
@@ -132,9 +135,6 @@ class TestExpansion:
             "load": ("traction", "compression"),
             "definition": ("paper", "calibrated", "lattice"),
             "kinematics": ("nonlinear", "linear"),
-            "poisson_ratio": (),
-            "loading": (),
-            "friction": (),
         }
 
     def test_names(self, load):
@@ -330,7 +330,7 @@ def test_quick_is_small_but_has_everything():
     for dimension in ("mesh_type", "material", "load", "definition", "kinematics"):
         assert set(study.axes[dimension]) >= set(whole[dimension])
     assert study.axes["load"] == tuple(LOADS)
-    assert set(study.outputs) == set(OUTPUTS)
+    assert set(study.outputs) == {output.name for output in outputs()}
 
 
 class TestMeshFiles:
@@ -396,19 +396,20 @@ class TestDefinitions:
 
     def test_moduli_of_every_pair(self, load):
         study = load(SMALL.replace("grids:", "outputs: [definitions]\ngrids:") + self.GRID)
-        assert len(study.moduli) == 2 * 2 * 2 * 2
-        assert study.moduli[0] == Moduli("area", "structured", 0.002, 0.3)
+        assert len(study.parts["moduli"].measurements) == 2 * 2 * 2 * 2
+        assert study.parts["moduli"].measurements[0] == Measurement("area", "structured", 0.002, 0.3)
         assert study.axes["poisson_ratio"] == (0.3, 0.5)
-        assert (study.patch.length, study.patch.height) == (0.1, 0.02)
+        assert (study.parts["moduli"].patch.length, study.parts["moduli"].patch.height) == (0.1, 0.02)
         assert study.outputs == ("definitions",)
 
     def test_stated_stiffness_has_no_moduli(self, load):
         study = load(changed(("    kinematics: [nonlinear, linear]\n", "    moduli: true\n")))
-        assert {one.definition for one in study.moduli} == {"lattice"}
+        assert {one.definition for one in study.parts["moduli"].measurements} == {"lattice"}
 
     def test_no_moduli_without_asking(self, load):
         study = load(SMALL)
-        assert (study.moduli, study.patch, study.outputs) == ((), None, ("sensitivity", "size", "deformed", "tables"))
+        assert study.parts["moduli"] is None
+        assert study.outputs == ("sensitivity", "size", "deformed", "tables")
 
     @pytest.mark.parametrize(
         ("change", "expected"),
@@ -823,16 +824,16 @@ laying:
 
     def test_strips_and_their_references(self, load):
         study = load(SMALL.replace("grids:", f"{self.LAYING}grids:"))
-        assert len(study.laying) == 2 * 2 * 2
+        assert len(study.parts["laying"].strips) == 2 * 2 * 2
         # Each on three meshes, the finest first: their spread says how well the reference is known.
-        sizes = [one.mesh_size for one in study.laying_references if one.friction == 0.3]
-        assert sizes == pytest.approx([1e-3, 1.25e-3, 1.6e-3]) and len(study.laying_references) == 2 * 3
-        first = study.laying[0]
+        sizes = [one.mesh_size for one in study.parts["laying"].references if one.friction == 0.3]
+        assert sizes == pytest.approx([1e-3, 1.25e-3, 1.6e-3]) and len(study.parts["laying"].references) == 2 * 3
+        first = study.parts["laying"].strips[0]
         assert (first.definition, first.mesh_size, first.loading, first.friction) == ("uniform", 1e-3, "pressure", 0.0)
         assert first.strip.length == 0.1 and first.trapezoid.area == pytest.approx(585e-6)
         assert study.axes["friction"] == (0.0, 0.3)
         assert {0.001, 0.002} <= set(study.axes["mesh_size"]) and "uniform" in study.axes["definition"]
-        assert {one.definition for one in study.laying_references} == {"delingette"}
+        assert {one.definition for one in study.parts["laying"].references} == {"delingette"}
 
     @pytest.mark.parametrize(
         ("change", "expected"),
@@ -867,7 +868,7 @@ laying:
 
 # -- the benchmark -----------------------------------------------------------------------------------------------------
 
-RACED = SMALL.replace("poisson_ratio: 0.3}", "poisson_ratio: 0.3, density: 7850 kg/m^3}").replace(
+TIMED = SMALL.replace("poisson_ratio: 0.3}", "poisson_ratio: 0.3, density: 7850 kg/m^3}").replace(
     "grids:",
     """\
 benchmark:
@@ -883,9 +884,9 @@ grids:""",
 
 class TestBenchmark:
     def test_second_beam_goes_with_every_scene(self, load):
-        race = load(RACED).benchmark[0]
-        assert (race.beam.name, race.second_beam.name, race.second_beam.height) == ("long", "short", 0.02)
-        assert load(RACED.replace("  second_beam: short\n", "")).benchmark[0].second_beam is None
+        case = load(TIMED).parts["benchmark"][0]
+        assert (case.beam.name, case.second_beam.name, case.second_beam.height) == ("long", "short", 0.02)
+        assert load(TIMED.replace("  second_beam: short\n", "")).parts["benchmark"][0].second_beam is None
 
     @pytest.mark.parametrize(
         ("old", "new", "message"),
@@ -895,4 +896,4 @@ class TestBenchmark:
         ],
     )
     def test_unfit_second_beams_are_refused(self, refusal, old, new, message):
-        assert old in RACED and message in refusal(RACED.replace(old, new))
+        assert old in TIMED and message in refusal(TIMED.replace(old, new))

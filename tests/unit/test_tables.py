@@ -5,9 +5,12 @@ import pytest
 import xarray as xr
 
 from springtune.kinds.benchmark import tables as benchmark
+from springtune.kinds.benchmark.variables import BENCHMARK
 from springtune.kinds.moduli import tables as definitions
+from springtune.kinds.moduli.variables import MODULI
+from springtune.kinds.scenes.variables import ROOT
 from springtune.kinds.stability import tables as stability
-from springtune.output import dataset
+from springtune.kinds.stability.variables import STABILITY
 from springtune.problem.compare import assured
 
 
@@ -42,7 +45,7 @@ def compared():
         "load": ("traction", "bending", "shear"), "definition": ("area", "adjoint"), "kinematics": ("linear",),
         "poisson_ratio": (0.3, 0.5),
     }  # fmt: skip
-    root = dataset.empty(axes, dataset.ROOT_VARIABLES)
+    root = ROOT.empty(axes)
     root["material_poisson_ratio"].values[:] = 0.3, 0.5
     root["beam_height"].values[:] = tuple(BEAMS.values())
     root["beam_length"].values[:] = 0.1, 0.2
@@ -55,7 +58,7 @@ def compared():
     root["deformation_error"].loc[place], root["status"].loc[place] = 0.5, 1
     # More scenes of the first beam, so that its tables are printed.
     root["status"].loc[{"beam": "100x20", "mesh_type": "structured", "definition": "area"}] = 1
-    moduli = dataset.empty(axes, dataset.MODULI_VARIABLES)
+    moduli = MODULI.empty(axes)
     for size in SIZES:
         place = {"definition": "area", "mesh_size": size}
         moduli["young_modulus_error"].loc[place] = size / 1e-3 / 100  # 1 % at 1 mm
@@ -127,14 +130,14 @@ def test_a_load_that_was_not_asked_on_all_meshes_says_on_how_many():
 
 # -- the benchmark -----------------------------------------------------------------------------------------------------
 
-RACED = (1e-3, 2e-3, 5e-3, 1e-2)
+SIZES_RUN = (1e-3, 2e-3, 5e-3, 1e-2)
 
 
-def race(errors, second, seconds=(0.08, 0.02, 0.004, 0.001)):
-    """Group of a benchmark of made-up errors, from the finest mesh size to the coarsest, method by method."""
-    axes = {"scene": ("traction",), "method": tuple(errors), "mesh_size": RACED, "linear_solver": ("SuperLU",),
+def timed(errors, second, seconds=(0.08, 0.02, 0.004, 0.001)):
+    """Group of a benchmark of made-up errors, from the finest mesh size to the coarsest, approach by approach."""
+    axes = {"scene": ("traction",), "approach": tuple(errors), "mesh_size": SIZES_RUN, "linear_solver": ("SuperLU",),
             "curve_count": (1,)}  # fmt: skip
-    data = dataset.empty(axes, dataset.BENCHMARK_VARIABLES)
+    data = BENCHMARK.empty(axes)
     data["machine_load"].values[:] = 0.0
     data["error"].values[0], data["second_error"].values[0] = list(errors.values()), list(second.values())
     data["seconds"].values[:] = np.where(np.isfinite(data.error), seconds, np.nan)
@@ -145,8 +148,8 @@ def race(errors, second, seconds=(0.08, 0.02, 0.004, 0.001)):
 
 
 def quickest(errors, second):
-    """Winners of each error: method and mesh size."""
-    rows = tables(benchmark.page(race(errors, second)))["traction: the quickest ways to an error"]
+    """Winners of each error: approach and mesh size."""
+    rows = tables(benchmark.page(timed(errors, second)))["traction: the quickest ways to an error"]
     return {row["error"]: [row[place].split(":")[0] for place in ("first", "second", "third") if row[place]]
             for row in rows}  # fmt: skip
 
@@ -181,12 +184,12 @@ def test_signs_do_not_matter_and_failures_do():
 
 def test_without_a_second_beam_nothing_is_called_the_quickest():
     errors = {"steady": STEADY}
-    text = benchmark.page(race(errors, {"steady": [np.nan] * 4}))
+    text = benchmark.page(timed(errors, {"steady": [np.nan] * 4}))
     assert "no second beam" in text and "the quickest ways to an error" not in text
 
 
 def test_the_page_states_the_rule():
-    text = benchmark.page(race({"steady": STEADY}, {"steady": STEADY}))
+    text = benchmark.page(timed({"steady": STEADY}, {"steady": STEADY}))
     assert "all finer ones" in text and "120x30" in text
 
 
@@ -200,11 +203,11 @@ def stressed():
         "load": ("compression",), "definition": ("lattice", "area"), "kinematics": ("nonlinear",),
         "experiment": ("strains",), "strain_load": ("axial", "follower-pressure"), "strain": (-0.1, 0.1),
     }  # fmt: skip
-    root = dataset.empty(axes, dataset.ROOT_VARIABLES)
+    root = ROOT.empty(axes)
     root["status"].loc[{"definition": "lattice"}], root["message"].loc[{"definition": "lattice"}] = 4, "why not"
     root["status"].loc[{"definition": "area"}] = 1
-    used = [name for name, one in dataset.STABILITY_VARIABLES.items() if set(one[0]) <= set(axes)]
-    strains = dataset.empty(axes, {name: dataset.STABILITY_VARIABLES[name] for name in used})
+    used = [name for name, one in STABILITY.variables.items() if set(one[0]) <= set(axes)]
+    strains = STABILITY.empty(axes, used)
     strains["strain_status"].values[:], strains["strain_load_share"].values[:] = 1, 1.0
     strains["negative_pivots"].values[:] = 0.0
     place = {"definition": "area", "strain_load": "follower-pressure", "strain": 0.1}

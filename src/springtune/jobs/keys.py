@@ -1,15 +1,24 @@
-"""What the keys of results are made of: parameters, code and libraries."""
+"""Keys of results: hashes of all that they depend on, code and libraries included."""
 
+import hashlib
+import json
 import os
 from dataclasses import asdict
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 
 from .dependencies import digest
 
 
+def hash_of(*parts):
+    """Hash of what a result depends on: nested dicts, lists, texts and numbers."""
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
 def installed(package):
     """Version of a package; "none" where it is an extra that is not there, or not wanted."""
+    from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
+
     unused = package == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"
     try:
         return "none" if unused else version(package)

@@ -5,7 +5,6 @@ it; arrays are datasets. A stage computes only the results that the file does no
 stays, so going back to it computes nothing. Nothing but the dataset is meant for users.
 """
 
-import hashlib
 import json
 import os
 from pathlib import Path
@@ -15,12 +14,6 @@ import numpy as np
 
 SCALARS = "scalars"
 """Dataset of what is not an array."""
-
-
-def key(*parts):
-    """Hash of what a result depends on: nested dicts, lists, texts and numbers."""
-    text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def stored(path):

@@ -291,12 +291,18 @@ def sections(model, place=""):
     """
     found = {place: model}
     for name, field in model.model_fields.items():
-        here = f"{place}.{name}".lstrip(".")
-        for part in (field.annotation, *get_args(field.annotation)):
-            if isinstance(part, type) and issubclass(part, Section):
-                ending = {dict: ".<name>", list: "[]"}.get(get_origin(field.annotation), "")
-                found |= sections(part, here + ending)
+        for inside, ending in _models(field.annotation):
+            found |= sections(inside, f"{place}.{name}".lstrip(".") + ending)
     return found
+
+
+def _models(annotation, ending=""):
+    """Sections inside an annotation, and what follows the key to lead to them."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield annotation, ending
+    ending += {dict: ".<name>", list: "[]"}.get(get_origin(annotation), "")
+    for part in get_args(annotation):
+        yield from _models(part, ending)
 
 
 def json_schema(model):

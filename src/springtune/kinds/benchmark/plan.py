@@ -3,9 +3,8 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from ...jobs import store
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, material_key, stage_key
+from ...jobs.keys import beam_key, hash_of, material_key, stage_key
 from ..base import Stage
 
 
@@ -16,7 +15,7 @@ def case_key(case):
     packages = "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "netgen-mesher", "pyamg"
     code = stage_key("kinds.benchmark.stage", *packages)
     definitions = sorted({approach.partition("/")[0] for approach in case.approaches if "/" in approach})
-    return store.key(parameters, code, [definition_digest(name) for name in definitions])
+    return hash_of(parameters, code, [definition_digest(name) for name in definitions])
 
 
 def _members(study, costs):

@@ -164,7 +164,9 @@ def comparison(old, new):
     ratio = (new.seconds / old.seconds).transpose("approach", "scene", "mesh_size").values
     if not np.isfinite(ratio).any():
         return ["The two datasets have no case in common."], 0
-    spread = [(one.seconds_spread / one.seconds).transpose("approach", "scene", "mesh_size").values for one in (old, new)]
+    spread = [
+        (one.seconds_spread / one.seconds).transpose("approach", "scene", "mesh_size").values for one in (old, new)
+    ]
     middle = float(np.nanmedian(ratio))
     lines = [f"{int(np.isfinite(ratio).sum())} cases in common, median ratio new / old {middle:.2f}."]
     flagged = 0

@@ -3,23 +3,22 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from ...jobs import store
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import stage_key
+from ...jobs.keys import hash_of, stage_key
 from ..base import Stage
 from .cost import cost_units
 
 
 def laying_key(one):
     """Key of a laid strip."""
-    return store.key(
+    return hash_of(
         asdict(one), stage_key("kinds.laying.stage", "numpy", "scipy", "cvxopt"), definition_digest(one.definition)
     )
 
 
 def _members(study, costs):
     laying = study.parts["laying"]
-    strips = {store.key(asdict(one)): one for one in (*laying.strips, *laying.references)} if laying else {}
+    strips = {hash_of(asdict(one)): one for one in (*laying.strips, *laying.references)} if laying else {}
     return {name: (costs.of("laying", cost_units(one.mesh_size)), one) for name, one in strips.items()}
 
 

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from ...jobs import store
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import stage_key
+from ...jobs.keys import hash_of, stage_key
 from ...mesh import MESH_TYPES
 from ...study.model import MeshSpec
 from ..base import Stage
@@ -19,7 +18,7 @@ def moduli_key(study, one):
         stage_key("kinds.moduli.stage", "numpy", "scipy", "cvxopt", "netgen-mesher"),
         definition_digest(one.definition),
     )
-    return store.key(parameters, *code)
+    return hash_of(parameters, *code)
 
 
 def mesh_of(study, one):

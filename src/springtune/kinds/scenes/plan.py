@@ -5,9 +5,8 @@ from collections import defaultdict
 from functools import cache, lru_cache
 from pathlib import Path
 
-from ...jobs import store
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, material_key, stage_key
+from ...jobs.keys import beam_key, hash_of, material_key, stage_key
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
@@ -33,7 +32,7 @@ def by_mesh(items):
 def mesh_key(mesh):
     """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
     packages = {"free": ["netgen-mesher"]}.get(mesh.mesh_type, []) if mesh.file is None else ["meshio"]
-    return store.key(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy", *packages))
+    return hash_of(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy", *packages))
 
 
 def mesh_source(mesh):
@@ -54,16 +53,14 @@ def reference_of(beam, material, load):
     """
     problem = beam, material, LOADS[load].kind
     length, displacement = unit_scales(*problem)
-    key = store.key(
-        unit_problem(*problem), stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
-    )
+    key = hash_of(unit_problem(*problem), stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem"))
     return {"key": key, "length": length, "displacement": displacement}
 
 
 def finite_key(reference, kind):
     """Key of a reference at finite strain, which no load scales."""
     code = stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
-    return store.key(kind, _finite_problem(reference), code)
+    return hash_of(kind, _finite_problem(reference), code)
 
 
 def _problem(reference):
@@ -84,7 +81,7 @@ def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
     parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
-    return store.key(parameters, stage_key("kinds.scenes.sensitivity", "numpy", "scipy", "cvxopt"))
+    return hash_of(parameters, stage_key("kinds.scenes.sensitivity", "numpy", "scipy", "cvxopt"))
 
 
 def scene_key(study, scene):
@@ -93,7 +90,7 @@ def scene_key(study, scene):
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
     parameters += [LOADS[scene.load].kind, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
-    return store.key(
+    return hash_of(
         parameters, stage_key("kinds.scenes.solve", "numpy", "scipy", "cvxopt"), definition_digest(scene.definition)
     )
 
@@ -115,7 +112,7 @@ def solved_key(study, scene, calibration):
     """Key under which a scene's result is stored, given the calibrated stiffnesses by group."""
     name = scene_key(study, scene)
     if scene.definition == "calibrated":
-        return store.key(name, calibration[calibration_name(scene)]["stiffness"])
+        return hash_of(name, calibration[calibration_name(scene)]["stiffness"])
     return name
 
 
@@ -179,13 +176,13 @@ def _reference_members(study, costs):
     groups = defaultdict(dict)
     for reference in study.references:
         aspect_ratio, nu, kind = unit_problem(*_problem(reference))
-        groups[store.key(aspect_ratio, kind)].setdefault(nu, (reference, None))
+        groups[hash_of(aspect_ratio, kind)].setdefault(nu, (reference, None))
     members = {
         name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
     }
     for reference in study.references:
         for kind in study.further_references:
-            name = store.key(kind, _finite_problem(reference))
+            name = hash_of(kind, _finite_problem(reference))
             members[name] = costs.of("finite"), [(reference, kind)]
     return members
 

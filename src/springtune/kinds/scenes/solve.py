@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import atomic, store
+from ...jobs.keys import hash_of
 from ...jobs.spent import Spent
 from ...mechanics.moduli import lateral_forces
 from ...mechanics.network import Network
@@ -67,7 +68,7 @@ def run(tasks, done):
 def _stored_key(scene, calibration):
     """Key of a scene's result; as `springtune.campaign.plan.solved_key`, from the task."""
     group = scene.get("calibration")
-    return store.key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
+    return hash_of(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
 
 def _turn(scene):

@@ -3,9 +3,8 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from ...jobs import store
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, material_key, stage_key
+from ...jobs.keys import beam_key, hash_of, material_key, stage_key
 from ..base import Stage
 
 
@@ -13,11 +12,11 @@ def experiment_key(one):
     """Key of an experiment on stability."""
     parameters = asdict(one) | {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
     code = stage_key("kinds.stability.stage", "numpy", "scipy", "cvxopt", "numba")
-    return store.key(parameters, code, definition_digest(one.definition))
+    return hash_of(parameters, code, definition_digest(one.definition))
 
 
 def _members(study, costs):
-    return {store.key(asdict(one)): (costs.of(one.name), one) for one in study.parts["stability"]}
+    return {hash_of(asdict(one)): (costs.of(one.name), one) for one in study.parts["stability"]}
 
 
 def _content(study, folder, experiments):
