@@ -86,13 +86,13 @@ def test_benchmark_has_the_names_of_the_contract(tree):
     """Ratios within one run; seconds themselves are no business of a test."""
     data = tree["benchmark"].to_dataset()
     for name in ("error", "seconds", "peak_memory"):
-        assert data[name].dims == ("scene", "method", "mesh_size"), name
+        assert data[name].dims == ("scene", "approach", "mesh_size"), name
     race = data.sel(scene="traction")
-    ours, theirs = (race.error.sel({"method": name}) for name in ("delingette/structured", "linear-triangles"))
+    ours, theirs = (race.error.sel({"approach": name}) for name in ("delingette/structured", "linear-triangles"))
     assert abs(ours - theirs).max() <= 1e-9
-    assert (race.solving_seconds.sel({"method": "condensation"}) < race.factorising_seconds.sel(
-        {"method": "condensation"})).all()  # fmt: skip
-    assert (race.pareto.max("method") == 1).all() and (data.reference_error_estimate < 1e-4).all()
+    assert (race.solving_seconds.sel({"approach": "condensation"}) < race.factorising_seconds.sel(
+        {"approach": "condensation"})).all()  # fmt: skip
+    assert (race.pareto.max("approach") == 1).all() and (data.reference_error_estimate < 1e-4).all()
     # One path is many solves' worth.
     assert data.curve_seconds.sel(curve_count=201) < 0.5 * data.separate_seconds.sel(curve_count=201)
 
