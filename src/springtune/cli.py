@@ -389,10 +389,10 @@ def _networks(study):
     """Number of distinct tangents at rest, at most: uniform networks of a mesh differ by a factor only."""
     from .springs import DEFINITIONS
 
-    found = {(curve.mesh, LOADS[curve.load].kind == "shear", "uniform") for curve in study.curves}
+    found = {(curve.mesh, LOADS[curve.load].kind.held, "uniform") for curve in study.curves}
     for scene in study.scenes:
         uniform = DEFINITIONS[scene.definition].uniform
-        held = LOADS[scene.load].kind == "shear"
+        held = LOADS[scene.load].kind.held
         found.add((scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.poisson_ratio)))
     return len(found)
 

@@ -103,11 +103,13 @@ def draw(seed, number):
     mesh_type = str(rng.choice(list(MESH_TYPES)))
     corners = 4 if mesh_type == "braced" else 3
     load = str(rng.choice(list(LOADS)))
-    kind = LOADS[load].kind
+    kind = LOADS[load].kind.name
     names = [
         name
         for name, definition in DEFINITIONS.items()
-        if corners in definition.cells and kind in definition.kinds and definition.needs in ("", "stiffness")
+        if corners in definition.cells
+        and (LOADS[load].kind.uniaxial or not definition.uniaxial)
+        and definition.needs in ("", "stiffness")
     ]
     if mesh_type not in ("isosceles-0.3", "isosceles-0.5", "braced"):
         names.remove("axis-exact")  # it lives on these alone
@@ -144,7 +146,7 @@ def draw(seed, number):
 
 def unit_force(scene):
     """Force whose mean stress is E; in bending that of F L^2 = E I. Of the sign of the load."""
-    kind, side = LOADS[scene.load].kind, scene.height
+    kind, side = LOADS[scene.load].kind.name, scene.height
     if kind == "bending":
         size = scene.height**3 / (12 * scene.length**2)
     else:
@@ -154,7 +156,7 @@ def unit_force(scene):
 
 def column(scene):
     """Euler's load of a column that leans, of the sign of the load, less what shear takes."""
-    kind = LOADS[scene.load].kind
+    kind = LOADS[scene.load].kind.name
     along, across = (scene.height, scene.length) if kind == "face" else (scene.length, scene.height)
     euler = math.pi**2 / 48 * (across / along) ** 2
     return unit_force(scene) * euler / (1 + 3.2 * euler)
@@ -163,7 +165,7 @@ def column(scene):
 def body_of(scene, mesh, springs):
     """The scene's body in the mechanics of the audit: energies from the definitions' formulas."""
     x, height, length = mesh.points, scene.height, scene.length
-    kind, t, young, nu = LOADS[scene.load].kind, scene.thickness, scene.young_modulus, scene.poisson_ratio
+    kind, t, young, nu = LOADS[scene.load].kind.name, scene.thickness, scene.young_modulus, scene.poisson_ratio
     left, right = np.abs(x[:, 0]) < 1e-9 * length, np.abs(x[:, 0] - length) < 1e-9 * length
     bottom, top = np.abs(x[:, 1]) < 1e-9 * height, np.abs(x[:, 1] - height) < 1e-9 * height
     held = np.zeros(x.shape, bool)
@@ -262,7 +264,7 @@ def solve(scene, mesh, force, stiffness):
     """The scene's result by the recipe of a study's jobs."""
     task = {
         "material": asdict(scene.material),
-        "kind": LOADS[scene.load].kind,
+        "kind": LOADS[scene.load].kind.name,
         "follower": LOADS[scene.load].follower,
         "force": force,
         "definition": scene.definition,

@@ -6,10 +6,11 @@ from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, lattice
 from springtune.problem.boundary import held, weights
+from springtune.problem.loads import AXIAL
 from springtune.springs.lattice import uniform
 
 
-def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind="axial"):
+def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind=AXIAL):
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
     pattern = weights(mesh, kind)

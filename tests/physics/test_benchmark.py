@@ -20,6 +20,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.output.dataset import BENCHMARK_VARIABLES
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
+from springtune.problem.loads import AXIAL
 from springtune.problem.materials import Material
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
@@ -146,7 +147,7 @@ def test_nested_dissection_is_an_order_and_fills_in_less(mesh_type, monkeypatch)
     mesh = MESH_TYPES[mesh_type](0.2, 0.04, 2e-3)
     order = nested_dissection(mesh.points, mesh.edges)
     assert sorted(order.tolist()) == list(range(len(mesh.points)))
-    network = Network(mesh, held(mesh, "axial"), np.ones(len(mesh.edges)))
+    network = Network(mesh, held(mesh, AXIAL), np.ones(len(mesh.edges)))
     dense = network.rest_factor._lu.L.nnz
     rows = network.unknowns**1.5  # what an order along the beam fills in is unknowns times the band
     assert dense < rows
@@ -155,11 +156,11 @@ def test_nested_dissection_is_an_order_and_fills_in_less(mesh_type, monkeypatch)
 def test_multigrid_gives_what_the_factorisation_gives(monkeypatch):
     monkeypatch.setattr(factors, "CHOLESKY", False)
     mesh = MESH_TYPES["structured"](0.2, 0.04, 2e-3)
-    pattern = weights(mesh, "axial")
+    pattern = weights(mesh, AXIAL)
     answers = []
     for largest in (10**9, 10):
         monkeypatch.setattr(network_module, "LARGE", largest)
-        problem = StaticProblem(Network(mesh, held(mesh, "axial"), half_weight(mesh)), pattern)
+        problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh)), pattern)
         found = problem.linear(1e-3)
         assert found.converged and problem.judge(1e-3, found)[0] == "solved"
         answers.append((found.factor.name, float(np.tensordot(found.displacements, pattern, axes=2))))
@@ -169,7 +170,7 @@ def test_multigrid_gives_what_the_factorisation_gives(monkeypatch):
 
 def test_multigrid_refuses_a_network_beyond_its_buckling_load(monkeypatch):
     mesh = MESH_TYPES["structured"](0.2, 0.01, 2e-3)
-    problem = StaticProblem(Network(mesh, held(mesh, "axial"), half_weight(mesh)), weights(mesh, "axial"))
+    problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh)), weights(mesh, AXIAL))
     bent = 5e-3 * problem.slope / np.abs(problem.slope).max() * -1
     assert problem.network.factorize(bent).negative_pivots > 0
     monkeypatch.setattr(network_module, "LARGE", 10)

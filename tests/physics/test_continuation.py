@@ -10,6 +10,7 @@ from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.boundary import held, weights
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.reference.limits import elastica
 from springtune.springs import DEFINITIONS
@@ -32,7 +33,7 @@ def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
     mesh = MESH_TYPES[mesh_type](length, HEIGHT, HEIGHT / rows)
     springs = DEFINITIONS[definition].springs(mesh, Material("sheet", 1e6, nu), 1e-3)
     network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
-    side = {"axial": HEIGHT, "bending": HEIGHT**2 / length / 6, "face": length, "shear": length}[kind]
+    side = {AXIAL: HEIGHT, BENDING: HEIGHT**2 / length / 6, FACE: length, SHEAR: length}[kind]
     return StaticProblem(network, weights(mesh, kind)), strain * 1e6 * 1e-3 * side / springs.reference
 
 
@@ -61,22 +62,22 @@ def test_a_slender_column_buckles_at_eulers_load(definition):
     """Clamped-free, 200 x 10 mm in ten rows: linear triangles are 1 % too stiff in bending."""
     mesh = MESH_TYPES["structured"](0.2, 0.01, 1e-3)
     springs = DEFINITIONS[definition].springs(mesh, Material("steel", 210e9, 0.3), 1e-3)
-    network = Network(mesh, held(mesh, "axial"), springs.relative, springs.energies)
+    network = Network(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.01**3 / 12 / (4 * 0.2**2)
-    found = buckling_load(StaticProblem(network, weights(mesh, "axial")), -euler / springs.reference)
+    found = buckling_load(StaticProblem(network, weights(mesh, AXIAL)), -euler / springs.reference)
     assert found * springs.reference == pytest.approx(-euler, rel=0.02)
 
 
 def test_what_is_only_pulled_does_not_buckle():
-    problem, s = scene("lattice", "axial", "structured", 3.0, 0.01, 0.3, 4)
+    problem, s = scene("lattice", AXIAL, "structured", 3.0, 0.01, 0.3, 4)
     assert np.isnan(buckling_load(problem, s))
 
 
 SNAPPED = [
     # found by the search below: stable equilibria behind a stretch of the path that is not
-    ("delingette", "shear", "structured", 14.79, 0.38, 0.49, 3),
-    ("delingette", "shear", "right", 4.02, 1.34, 0.3, 4),
-    ("lattice", "axial", "structured", 6.32, 1.65, 0.3, 4),
+    ("delingette", SHEAR, "structured", 14.79, 0.38, 0.49, 3),
+    ("delingette", SHEAR, "right", 4.02, 1.34, 0.3, 4),
+    ("lattice", AXIAL, "structured", 6.32, 1.65, 0.3, 4),
 ]
 
 
@@ -92,7 +93,7 @@ def test_an_equilibrium_behind_a_snap_is_not_called_solved(case):
 @settings(deadline=None, max_examples=60)
 @given(
     st.sampled_from(["uniform", "lattice", "area", "delingette"]),
-    st.sampled_from(["axial", "bending", "face", "shear"]),
+    st.sampled_from([AXIAL, BENDING, FACE, SHEAR]),
     st.sampled_from(["structured", "free", "right", "alternating"]),
     st.floats(1.0, 12.0),
     st.floats(-2.0, 0.5).flatmap(lambda size: st.sampled_from([-(10**size), 10**size])),
@@ -119,7 +120,7 @@ def test_what_is_solved_lies_on_the_stable_path_from_rest(definition, kind, mesh
         assert np.linalg.norm(near.displacements - found.displacements) <= 1e-6 * size
 
 
-@pytest.mark.parametrize("length, kind", [(20.0, "axial"), (20.0, "bending"), (4.0, "bending")])
+@pytest.mark.parametrize("length, kind", [(20.0, AXIAL), (20.0, BENDING), (4.0, BENDING)])
 def test_a_small_residual_of_an_ill_conditioned_network_is_not_taken_for_a_small_error(length, kind):
     """Beams 200 and 1000 times as long as high: in the first of them a residual of 1e-10 goes with an error of 3e-5."""
     mesh = MESH_TYPES["structured"](length, 0.02, 5e-3)
@@ -130,7 +131,7 @@ def test_a_small_residual_of_an_ill_conditioned_network_is_not_taken_for_a_small
 
 
 @pytest.mark.parametrize("contrast", [1e3, 1e6, 1e9, 1e12, 1e15])
-@pytest.mark.parametrize("kind", ["axial", "bending"])
+@pytest.mark.parametrize("kind", [AXIAL, BENDING])
 def test_stiffness_contrast_is_solved_or_reported(contrast, kind):
     """Up to 1e12: nearly the digits that a number has are left then."""
     mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
@@ -175,7 +176,7 @@ def exact(problem, s, displacements):
 
 def test_inertia_is_of_the_solution_not_of_an_iterate():
     """A tangent kept from an iterate on the far side of the buckling load would answer for the wrong place."""
-    problem, s = scene("lattice", "axial", "structured", 10.0, -0.02, 0.3, 4)
+    problem, s = scene("lattice", AXIAL, "structured", 10.0, -0.02, 0.3, 4)
     found = problem.nonlinear(s)
     fresh = problem.network.factorize(found.displacements).negative_pivots
     assert problem.negative_pivots(s, found) == fresh
@@ -185,7 +186,7 @@ def test_inertia_is_of_the_solution_not_of_an_iterate():
 @pytest.mark.parametrize("above", [1e-5, 1e-4, 5e-4])
 def test_just_above_the_critical_load_nothing_is_solved_that_is_unstable(mesh_type, aspect, above):
     """Symmetric columns; the critical load by bisection on the smallest eigenvalue."""
-    problem, s = scene("lattice", "axial", mesh_type, aspect, -0.01, 0.3, 4)
+    problem, s = scene("lattice", AXIAL, mesh_type, aspect, -0.01, 0.3, 4)
 
     def smallest(load, start):
         found = problem.newton(load, start)
@@ -217,8 +218,8 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     length = slenderness * height
     mesh = MESH_TYPES["structured"](length, height, height / 4)
     springs = DEFINITIONS[definition].springs(mesh, Material("sheet", 1e6, 0.3), 1e-3)
-    pattern = weights(mesh, "bending")
-    problem = StaticProblem(Network(mesh, held(mesh, "bending"), springs.relative, springs.energies), pattern)
+    pattern = weights(mesh, BENDING)
+    problem = StaticProblem(Network(mesh, held(mesh, BENDING), springs.relative, springs.energies), pattern)
     linear = float(np.tensordot(problem.slope, pattern, axes=2))
     s = ratio * length / (3 * linear)  # deflection F L^3 / 3 EI
     found = problem.nonlinear(s)

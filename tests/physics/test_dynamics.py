@@ -15,6 +15,7 @@ from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh, lattice
 from springtune.problem.boundary import held, weights
+from springtune.problem.loads import AXIAL, BENDING
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import uniform
@@ -28,9 +29,9 @@ def beam(definition="lattice", force=20e3, size=5e-3, mesh_type="structured", le
     """A clamped beam of steel, pulled at its end, with its true masses."""
     mesh = MESH_TYPES[mesh_type](length, 0.02, size)
     springs = DEFINITIONS[definition].springs(mesh, STEEL, THICKNESS)
-    network = Network(mesh, held(mesh, "axial"), springs.relative, springs.energies)
+    network = Network(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
     inertia = masses(mesh, DENSITY, THICKNESS) / springs.reference
-    return Motion(network, inertia, force / springs.reference * weights(mesh, "axial"), **options)
+    return Motion(network, inertia, force / springs.reference * weights(mesh, AXIAL), **options)
 
 
 def with_(motion, **options):
@@ -203,7 +204,7 @@ def test_lowest_loaded_mode_is_the_bars():
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_static_limit_is_the_static_solution(integrator, linear):
     motion = with_(beam(linear=linear)).critical()
-    problem = StaticProblem(motion.network, weights(motion.network.mesh, "axial"))
+    problem = StaticProblem(motion.network, weights(motion.network.mesh, AXIAL))
     s = motion.load.sum()
     static = (problem.linear(s) if linear else problem.nonlinear(s)).displacements
     step = 0.8 * motion.step_limit("symplectic-euler") if integrator in EXPLICIT else 1 / motion.loaded_frequency
@@ -216,7 +217,7 @@ def test_static_limit_is_the_static_solution(integrator, linear):
 @pytest.mark.parametrize("linear", [True, False])
 def test_dynamic_relaxation_ends_in_the_static_solution(definition, linear):
     motion = beam(definition)
-    problem = StaticProblem(motion.network, weights(motion.network.mesh, "axial"))
+    problem = StaticProblem(motion.network, weights(motion.network.mesh, AXIAL))
     s = motion.load.sum()
     static = (problem.linear(s) if linear else problem.nonlinear(s)).displacements
     found = relax(motion.network, motion.load, linear=linear)
@@ -333,7 +334,7 @@ def test_dampers_turn_with_their_springs(integrator):
 def test_symplectic_schemes_conserve_energy(integrator):
     """Half the limit, 1e5 explicit steps: the mean energy of the last tenth is that of the first to 1e-3."""
     motion = beam(size=0.01)
-    start = StaticProblem(motion.network, weights(motion.network.mesh, "axial")).nonlinear(motion.load.sum())
+    start = StaticProblem(motion.network, weights(motion.network.mesh, AXIAL)).nonlinear(motion.load.sum())
     free = with_(motion, load=None)
     step = 0.5 * free.step_limit("central-difference")
     steps = 100_000 if integrator in EXPLICIT else 3_000
@@ -425,9 +426,9 @@ def column(share, sideways=0.0, linear=False):
     """
     mesh = MESH_TYPES["braced"](0.1, 0.01, 5e-3)
     springs = DEFINITIONS["lattice"].springs(mesh, STEEL, THICKNESS)
-    network = Network(mesh, held(mesh, "axial"), springs.relative)
+    network = Network(mesh, held(mesh, AXIAL), springs.relative)
     euler = np.pi**2 * STEEL.young_modulus * THICKNESS * 0.01**3 / 12 / (4 * 0.1**2)
-    along, across = weights(mesh, "axial"), weights(mesh, "bending")
+    along, across = weights(mesh, AXIAL), weights(mesh, BENDING)
     critical = buckling_load(StaticProblem(network, along), -euler / springs.reference)
     load = share * critical * (along + sideways * across)
     return Motion(network, masses(mesh, DENSITY, THICKNESS) / springs.reference, load, linear=linear)

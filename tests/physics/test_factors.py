@@ -11,6 +11,7 @@ from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, measured, weights
+from springtune.problem.loads import AXIAL
 from springtune.springs.lattice import half_weight
 
 FORCE_OVER_STIFFNESS = 2e-4
@@ -18,7 +19,7 @@ FORCE_OVER_STIFFNESS = 2e-4
 
 def problem_on(mesh, stiffness=None):
     stiffness = half_weight(mesh) if stiffness is None else stiffness
-    return StaticProblem(Network(mesh, held(mesh, "axial"), stiffness), weights(mesh, "axial"))
+    return StaticProblem(Network(mesh, held(mesh, AXIAL), stiffness), weights(mesh, AXIAL))
 
 
 @pytest.fixture
@@ -56,7 +57,7 @@ def test_scenes_have_the_same_answer(both, mesh_type):
 def test_curves_have_the_same_answer(both):
     mesh = MESH_TYPES["structured"](0.1, 0.02, 4e-3)
     targets = FORCE_OVER_STIFFNESS / np.linspace(0.4, 1.6, 31)
-    ours, theirs = both(lambda: trace(problem_on(mesh), measured(mesh, "axial"), targets)[0])
+    ours, theirs = both(lambda: trace(problem_on(mesh), measured(mesh, AXIAL), targets)[0])
     assert np.abs(ours / theirs - 1).max() <= 1e-8  # the curves' own tolerance is 1e-7
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 from springtune.problem.geometry import Beam
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.reference.finite_strain import FiniteStrainError, NeoHooke, solve_neo_hooke
 from springtune.reference.limits import elastica
@@ -70,7 +71,7 @@ def test_stress_and_tangent_are_derivatives(nu, plane, f, d):
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
 def test_small_strain_is_the_limit(nu):
     material = Material("any", 1e6, nu)
-    for kind, force in (("face", -2e-3), ("axial", 4e-5), ("axial", -4e-5), ("bending", 4e-6), ("shear", 2e-3)):
+    for kind, force in ((FACE, -2e-3), (AXIAL, 4e-5), (AXIAL, -4e-5), (BENDING, 4e-6), (SHEAR, 2e-3)):
         finite = solve_neo_hooke(BLOCK, material, force, kind=kind)
         small = solve_small_strain(BLOCK, material, force, kind=kind)
         # Strains of 1e-5 and the coarse elements' error at the corners.
@@ -78,7 +79,7 @@ def test_small_strain_is_the_limit(nu):
 
 
 def test_traction_of_calculix():
-    found = solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), 0.4, kind="axial")
+    found = solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), 0.4, kind=AXIAL)
     # CPS8 of 2 mm, neo-Hooke, NLGEOM: 2.00747 mm, 1e-4 too stiff at the corners as in small strain.
     assert found.displacement == pytest.approx(2.00747e-3, rel=2e-4)
     assert found.error_estimate <= 1e-4
@@ -89,15 +90,15 @@ def test_incompressible_bar_stretches_as_by_hand():
     bar = Beam("bar", 0.08, 0.01, 1e-3)
     stretch = 1.5
     force = 1e6 / 3 * (stretch - stretch**-2) * bar.height * bar.thickness
-    found = solve_neo_hooke(bar, Material("rubber", 1e6, 0.5), force, kind="axial")
+    found = solve_neo_hooke(bar, Material("rubber", 1e6, 0.5), force, kind=AXIAL)
     assert found.displacement == pytest.approx(0.5 * bar.length, rel=0.02)
 
 
-@pytest.mark.parametrize(("kind", "stress"), [("axial", 4e-6), ("bending", 1e-9), ("shear", 1e-6)])
+@pytest.mark.parametrize(("kind", "stress"), [(AXIAL, 4e-6), (BENDING, 1e-9), (SHEAR, 1e-6)])
 @pytest.mark.parametrize("aspect_ratio", [1, 30])
 def test_small_strain_is_the_limit_of_any_shape(kind, stress, aspect_ratio):
     beam = Beam("any", aspect_ratio * 0.01, 0.01, 1e-3)
-    force = stress * 1e6 * beam.thickness * (beam.length if kind == "shear" else beam.height)
+    force = stress * 1e6 * beam.thickness * (beam.length if kind == SHEAR else beam.height)
     finite = solve_neo_hooke(beam, Material("any", 1e6, 0.3), force, kind=kind)
     small = solve_small_strain(beam, Material("any", 1e6, 0.3), force, kind=kind)
     assert finite.displacement == pytest.approx(small.displacement, rel=1e-4)
@@ -112,8 +113,8 @@ def test_slender_cantilevers_are_elasticas(nu, load):
     for slenderness in (25, 50):
         beam, material = Beam("b", slenderness * 0.01, 0.01, 1e-3), Material("any", 1e9, nu)
         force = load * material.young_modulus * beam.thickness * beam.height**3 / 12 / beam.length**2
-        finite = solve_neo_hooke(beam, material, force, kind="bending")
-        small = solve_small_strain(beam, material, force, kind="bending")
+        finite = solve_neo_hooke(beam, material, force, kind=BENDING)
+        small = solve_small_strain(beam, material, force, kind=BENDING)
         assert finite.error_estimate <= 5e-5
         shortened = load * (3 * small.displacement / (load * beam.length)) ** (2 / 3)
         apart.append(finite.displacement / small.displacement / (3 * elastica(shortened) / shortened) - 1)
@@ -123,7 +124,7 @@ def test_slender_cantilevers_are_elasticas(nu, load):
 
 
 def test_bending_is_odd_in_the_force():
-    up, down = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.45), force, kind="bending") for force in (0.02, -0.02))
+    up, down = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.45), force, kind=BENDING) for force in (0.02, -0.02))
     assert up.displacement == pytest.approx(-down.displacement, rel=1e-8)
     assert up.positions[[0, -1]].tolist() == [0, 1] and len(up.profile) == len(up.positions)
 
@@ -132,13 +133,13 @@ def test_a_wide_block_is_in_simple_shear():
     """Neo-Hooke's shear stress is linear in the shear: what is left of a tenth is its square, where the ends are."""
     wide, material = Beam("wide", 0.1, 0.01, 1e-3), Material("any", 1e6, 0.3)
     force = 0.1 * 1e6 / 2.6 * wide.length * wide.thickness
-    finite, small = (solve(wide, material, force, kind="shear") for solve in (solve_neo_hooke, solve_small_strain))
+    finite, small = (solve(wide, material, force, kind=SHEAR) for solve in (solve_neo_hooke, solve_small_strain))
     assert finite.displacement == pytest.approx(0.1 * wide.height, rel=0.06)
     assert 1e-4 < abs(finite.displacement / small.displacement - 1) < 0.1**2
 
 
 def test_compression_shortens_more_than_it_stretches():
-    pulled, pushed = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.5), f, kind="axial") for f in (1.0, -1.0))
+    pulled, pushed = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.5), f, kind=AXIAL) for f in (1.0, -1.0))
     # P = E/3 (l - 1/l^2) = E (e - e^2 + ...): the even part of e(P) is + P^2 in tension, so -P is shorter by less.
     stress = 1.0 / (1e6 * 0.04e-3)
     even = (pulled.displacement + pushed.displacement) / 2 / BLOCK.length
@@ -157,4 +158,4 @@ def test_what_cannot_be_solved_says_so():
     with pytest.raises(ValueError, match="plane strain of 'rubber' needs a Poisson's ratio below 0.5"):
         solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.5), -20.0, plane="strain")
     with pytest.raises(FiniteStrainError, match=r"200x40, rubber: no equilibrium beyond .* % of the load"):
-        solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), 1e5, kind="axial")
+        solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), 1e5, kind=AXIAL)

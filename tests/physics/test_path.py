@@ -13,6 +13,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, measured, weights
 from springtune.problem.compare import best_stiffness
 from springtune.problem.geometry import Beam
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import COEFFICIENT, uniform
@@ -79,13 +80,13 @@ def random_curve(seed):
             mesh = MESH_TYPES[mesh_type](length, height, size)
             if len(mesh.points) <= 400:
                 break
-    kind = random.choice(["axial", "axial", "axial", "bending", "shear", "face"])
+    kind = random.choice([AXIAL, AXIAL, AXIAL, BENDING, SHEAR, FACE])
     problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
     sign, s = random.choice([-1, 1]), height * 10 ** random.uniform(-2, 0.3)
-    if kind != "axial" or sign < 0:
+    if kind != AXIAL or sign < 0:
         small = 1e-6 * sign * height
         critical = smallest_share(problem.network, None, small * problem.slope, problem.rest_factor) * abs(small)
-        s = critical * random.uniform(0.3, 1.8) if kind == "axial" else min(0.3 * s, critical)
+        s = critical * random.uniform(0.3, 1.8) if kind == AXIAL else min(0.3 * s, critical)
     return problem, measured(mesh, kind), sign * min(s, 2 * height) / RATIOS
 
 

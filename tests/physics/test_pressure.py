@@ -10,6 +10,7 @@ from springtune.mechanics.statics import MODES, FollowerPressure, StaticProblem
 from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, loaded_edges, measured, weights
 from springtune.problem.geometry import Beam
+from springtune.problem.loads import FACE
 from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs import DEFINITIONS
@@ -21,9 +22,9 @@ FORCE = -20.0  # .1 MPa on 200 x 1 mm
 def block(definition, nu=0.5, size=2e-3, stiffness=None, mesh_type="structured", follower=False):
     mesh = MESH_TYPES[mesh_type](0.2, 0.04, size)
     springs = DEFINITIONS[definition].springs(mesh, Material("rubber", 1e6, nu), 1e-3, stiffness)
-    network = Network(mesh, held(mesh, "face"), springs.relative, springs.energies)
-    turning = FollowerPressure(mesh, *loaded_edges(mesh, "face")) if follower else None
-    return StaticProblem(network, weights(mesh, "face"), turning), FORCE / springs.reference, measured(mesh, "face")
+    network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
+    turning = FollowerPressure(mesh, *loaded_edges(mesh, FACE)) if follower else None
+    return StaticProblem(network, weights(mesh, FACE), turning), FORCE / springs.reference, measured(mesh, FACE)
 
 
 def middle(found, field):
@@ -31,7 +32,7 @@ def middle(found, field):
 
 
 def test_reference_of_the_block():
-    solution = solve_small_strain(BLOCK, Material("rubber", 1e6, 0.5), FORCE, kind="face")
+    solution = solve_small_strain(BLOCK, Material("rubber", 1e6, 0.5), FORCE, kind=FACE)
     # CalculiX and the paper: 3.144 and 3.14 mm at the middle, 3.31 mm sideways at the upper corners.
     assert solution.displacement == pytest.approx(-3.144e-3, rel=1e-4)
     assert np.abs(solution.displacements[..., 0]).max() == pytest.approx(3.31e-3, rel=3e-3)
@@ -42,7 +43,7 @@ def test_reference_of_the_block():
 @pytest.mark.parametrize("definition", ["area", "delingette"])
 def test_one_set_of_parameters_serves_the_block_too(definition, nu):
     problem, s, field = block(definition, nu)
-    reference = solve_small_strain(BLOCK, Material("rubber", 1e6, nu), FORCE, kind="face")
+    reference = solve_small_strain(BLOCK, Material("rubber", 1e6, nu), FORCE, kind=FACE)
     assert middle(problem.linear(s), field) == pytest.approx(reference.displacement, rel=0.01)
 
 
@@ -109,9 +110,9 @@ def column(definition, length, height, size, follower, mesh_type="structured"):
     """A sheet that stands on its lower side, and the force over stiffness that would strain it by 1."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
     springs = DEFINITIONS[definition].springs(mesh, Material("rubber", 1e6, 0.3), 1e-3)
-    network = Network(mesh, held(mesh, "face"), springs.relative, springs.energies)
-    turning = FollowerPressure(mesh, *loaded_edges(mesh, "face")) if follower else None
-    return StaticProblem(network, weights(mesh, "face"), turning), -1e6 * 1e-3 * length / springs.reference
+    network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
+    turning = FollowerPressure(mesh, *loaded_edges(mesh, FACE)) if follower else None
+    return StaticProblem(network, weights(mesh, FACE), turning), -1e6 * 1e-3 * length / springs.reference
 
 
 def frequencies(problem, s, displacements):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from springtune.problem.geometry import Beam
+from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.reference import calculix
 from springtune.reference.finite_strain import solve_neo_hooke
@@ -15,20 +16,20 @@ pytestmark = [
 ]
 
 
-def theirs_of(beam, material, force, size, kind="axial", finite=False):
+def theirs_of(beam, material, force, size, kind=AXIAL, finite=False):
     """Displacement of the loaded side [m] by serendipity quadrilaterals (CPS8) of even size [m]."""
     points, elements = calculix.quadratic_mesh(beam.length, beam.height, size)
-    upper = kind in ("shear", "face")
-    along, axis = int(upper), 1 if kind in ("bending", "face") else 0
+    upper = kind in (SHEAR, FACE)
+    along, axis = int(upper), 1 if kind in (BENDING, FACE) else 0
     value = beam.height if upper else beam.length
     shares = calculix.side_weights(points, along, 1 - along, value, quadratic=True)
     load, held = np.zeros(points.shape), np.zeros(points.shape, dtype=bool)
     load[:, axis] = force * shares
     held[points[:, along] == 0.0] = True
-    if kind == "shear":  # the upper side stays level
+    if kind == SHEAR:  # the upper side stays level
         held[np.flatnonzero(shares), 1] = True
     found = calculix.solve(points, elements, "CPS8", material, beam.thickness, load, held, finite)[:, axis]
-    if kind == "face":  # its middle
+    if kind == FACE:  # its middle
         side = np.flatnonzero(shares)
         return float(np.interp(beam.length / 2, points[side, 0], found[side]))
     return float(shares @ found)
@@ -58,7 +59,7 @@ def test_nearly_incompressible_rubber():
     assert theirs < ours.displacement
 
 
-@pytest.mark.parametrize("kind", ["bending", "shear"])
+@pytest.mark.parametrize("kind", [BENDING, SHEAR])
 @pytest.mark.parametrize(("nu", "close"), [(0.3, 3e-4), (0.4999, 1e-3)])
 def test_transverse_loads(kind, nu, close):
     material = Material("any", 210e9, nu)
@@ -71,19 +72,19 @@ def test_transverse_loads(kind, nu, close):
 
 def test_pressed_block():
     material = Material("rubber", 1e6, 0.49)
-    theirs = theirs_of(BEAM, material, -20.0, 2.5e-3, "face")
-    ours = solve_small_strain(BEAM, material, -20.0, kind="face")
+    theirs = theirs_of(BEAM, material, -20.0, 2.5e-3, FACE)
+    ours = solve_small_strain(BEAM, material, -20.0, kind=FACE)
     assert theirs == pytest.approx(ours.displacement, rel=3e-4)
 
 
 @pytest.mark.parametrize(
     ("kind", "force", "length", "size"),
     [
-        ("axial", 2.0, 0.2, 2.5e-3),
-        ("axial", -2.0, 0.2, 2.5e-3),
-        ("shear", 7.0, 0.2, 2.5e-3),
-        ("bending", 0.1333, 0.2, 2.5e-3),  # F L^2 / (E I) = 1
-        ("bending", 0.0427, 0.5, 5e-3),  # 2
+        (AXIAL, 2.0, 0.2, 2.5e-3),
+        (AXIAL, -2.0, 0.2, 2.5e-3),
+        (SHEAR, 7.0, 0.2, 2.5e-3),
+        (BENDING, 0.1333, 0.2, 2.5e-3),  # F L^2 / (E I) = 1
+        (BENDING, 0.0427, 0.5, 5e-3),  # 2
     ],
 )
 def test_finite_strain(kind, force, length, size):
@@ -91,5 +92,5 @@ def test_finite_strain(kind, force, length, size):
     theirs = theirs_of(beam, material, force, size, kind, finite=True)
     ours = solve_neo_hooke(beam, material, force, kind=kind)
     # Even elements, too stiff at the corners: 5e-5 to 3e-4 as measured, in shear at five times the length of a clamp.
-    assert theirs == pytest.approx(ours.displacement, rel=1e-3 if kind == "shear" else 5e-4)
+    assert theirs == pytest.approx(ours.displacement, rel=1e-3 if kind == SHEAR else 5e-4)
     assert abs(theirs) < abs(ours.displacement)

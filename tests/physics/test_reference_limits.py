@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from springtune.problem.geometry import Beam
+from springtune.problem.loads import BENDING
 from springtune.problem.materials import Material
 from springtune.reference.limits import beyond_linear, elastica, rotation_and_strain, rotation_effect
 from springtune.reference.small_strain import solve_small_strain
@@ -17,7 +18,7 @@ def bent(load, slenderness=20.0, nu=0.3):
     beam = Beam("b", slenderness * 0.01, 0.01, 1e-3)
     material = Material("any", 1e9, nu)
     force = load * material.young_modulus * beam.thickness * beam.height**3 / 12 / beam.length**2
-    return solve_small_strain(beam, material, force, kind="bending")
+    return solve_small_strain(beam, material, force, kind=BENDING)
 
 
 @pytest.mark.parametrize("load", [1e-5, 0.1, 0.5, 1.0, 2.0, 10.0])

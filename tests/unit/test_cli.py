@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 from springtune.cli import BEGIN, END, MANUAL, SCHEMA, main, manual_text, schema_text
 from springtune.kinds import kinds, load_study
+from springtune.problem.loads import BENDING
 from springtune.springs import DEFINITIONS
 from springtune.study import sections, study_model
 
@@ -214,7 +215,7 @@ class TestPredict:
         from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 
         def none_in_bending(*arguments, kind):
-            if kind == "bending":
+            if kind == BENDING:
                 raise ReferenceNotConvergedError("its error estimate is 1")
             return solve_small_strain(*arguments, kind=kind)
 

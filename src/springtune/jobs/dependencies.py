@@ -79,12 +79,22 @@ def _source(path):
     return Path(path).read_bytes()
 
 
+def _executed(tree):
+    """Nodes of a module, without what type checkers alone read."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
+            waiting += ast.iter_child_nodes(node)
+            yield node
+
+
 @cache
 def _imported(path):
     relative = path.relative_to(PACKAGE.parent).with_suffix("")
     package = ".".join(relative.parts[:-1])
     names = set()
-    for node in ast.walk(ast.parse(_source(path))):
+    for node in _executed(ast.parse(_source(path))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

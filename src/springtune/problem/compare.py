@@ -1,8 +1,10 @@
 """Comparing networks with references: errors, and the stiffness at which a sensitivity curve has none."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 ROOT = 1e-10
@@ -12,7 +14,7 @@ HALVINGS = 12
 """Of the way to where a curve ends, in search of its best stiffness there."""
 
 
-def deformation_error(displacement, reference):
+def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:
     """Signed deformation error ``(network - reference) / |reference|`` [1].
 
     Positive where the end has moved further along +x than the reference's: in tension a network that is too soft, in
@@ -51,7 +53,13 @@ class Best:
     message: str = ""
 
 
-def best_stiffness(stiffness, displacement, stable, reference, solve):
+def best_stiffness(
+    stiffness: np.ndarray,
+    displacement: np.ndarray,
+    stable: np.ndarray,
+    reference: float,
+    solve: Callable[[float], float],
+) -> Best:
     """Stiffness at which the stable part of a sensitivity curve meets the reference.
 
     Between two stable points on either side of the reference the equation ``solve(k) = reference`` is solved for
@@ -102,8 +110,8 @@ def best_stiffness(stiffness, displacement, stable, reference, solve):
     across = [pair for pair in zip(known[:-1], known[1:]) if error[pair[0]] * error[pair[1]] <= 0]
     if not len(known) or across or len(known) < len(error) and known[-1] < len(error) - 1:
         first, last = across[0] if across else (known[-1] if len(known) else 0, len(error) - 1)
-        gap = f"between {1 / softness[last]:.6g} and {1 / softness[first]:.6g} N/m"
-        return Best(np.nan, "not_converged", f"the curve may meet the reference in its gap {gap}")
+        between = f"between {1 / softness[last]:.6g} and {1 / softness[first]:.6g} N/m"
+        return Best(np.nan, "not_converged", f"the curve may meet the reference in its gap {between}")
     asked = f"from {stiffness[0]:.6g} to {stiffness[-1]:.6g} N/m"
     return Best(np.nan, "failed", f"the curve does not meet the reference {asked}; widen `sensitivity`")
 
@@ -134,7 +142,7 @@ def _last_root(solve, reference, softness, unsolved, error):
     return None
 
 
-def assured(errors, second):
+def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Largest error of each mesh size and all finer ones that were run, on both beams [1].
 
     An error that happens to cross zero at one mesh size, or on one beam, promises nothing: what is finer, or another
@@ -159,15 +167,28 @@ def assured(errors, second):
     return found
 
 
-def unbeaten(errors, seconds):
-    """Whether no other case has a smaller error in no more time; not where an error is NaN."""
+def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+    """Whether no other case has a smaller error in no more time.
+
+    Parameters
+    ----------
+    errors : ndarray of float
+        Errors of all cases [1]; NaN where one has none.
+    seconds : ndarray of float
+        Times of all cases [s], in the same shape.
+
+    Returns
+    -------
+    ndarray of bool
+        In the same shape; not where an error is NaN.
+    """
     best = np.zeros(errors.shape, dtype=bool)
     for place in map(tuple, np.argwhere(np.isfinite(errors))):
         best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
     return best
 
 
-def band(values):
+def band(values: Sequence[float]) -> float:
     """Band in which a value is known that scatters from mesh to mesh: twice the largest difference of some meshes'.
 
     The elongation of a laid strip does not converge in order: a corner of what it lies on catches between two of its

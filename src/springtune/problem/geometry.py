@@ -23,7 +23,13 @@ class Beam:
 
 @dataclass(frozen=True)
 class Strip:
-    """A strip: length along x, height along y and thickness out of the plane [m]."""
+    """A strip that is laid.
+
+    Attributes
+    ----------
+    length, height, thickness : float
+        Extent along x, along y and out of the plane [m].
+    """
 
     length: float
     height: float
@@ -32,19 +38,25 @@ class Strip:
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """A symmetric trapezoid: its bases and height [m]."""
+    """A symmetric trapezoid, upright on its lower base.
+
+    Attributes
+    ----------
+    lower_base, upper_base, height : float
+        Lengths of its bases and their distance [m].
+    """
 
     lower_base: float
     upper_base: float
     height: float
 
     @property
-    def area(self):
+    def area(self) -> float:
         """Area [m2]."""
         return 0.5 * (self.lower_base + self.upper_base) * self.height
 
     @property
-    def corners(self):
+    def corners(self) -> list[tuple[float, float]]:
         """Corners, counter-clockwise, the axis at x = 0: pairs of x and y [m]."""
         low, high = 0.5 * self.lower_base, 0.5 * self.upper_base
         return [(-low, 0.0), (low, 0.0), (high, self.height), (-high, self.height)]

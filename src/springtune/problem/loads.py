@@ -17,9 +17,141 @@
     ////// clamped
 
 A load's displacement is the mean one of the loaded side, along the force; under pressure, that of the side's middle.
+
+A new load is a row of `LOADS`, and a `LoadKind` where none of those here has its supports, its side and its direction.
 """
 
 from dataclasses import dataclass
+
+from .geometry import Beam
+
+
+@dataclass(frozen=True, order=True)
+class Side:
+    """A side of a rectangle whose lower left corner is the origin.
+
+    Attributes
+    ----------
+    axis : int
+        Axis across the side: 0 for x, 1 for y.
+    far : bool
+        Whether it is the side of the larger coordinate.
+    """
+
+    axis: int
+    far: bool
+
+    @property
+    def opposite(self) -> "Side":
+        """The side across the rectangle."""
+        return Side(self.axis, not self.far)
+
+    def place(self, length: float, height: float) -> float:
+        """Coordinate along `axis` of the side of a rectangle, in the unit of its length and height."""
+        return (length, height)[self.axis] if self.far else 0.0
+
+
+LEFT, RIGHT, BOTTOM, TOP = Side(0, False), Side(0, True), Side(1, False), Side(1, True)
+
+BOTH = (0, 1)
+"""Directions that a clamp holds."""
+
+
+@dataclass(frozen=True)
+class LoadKind:
+    """What loads that differ by a factor have in common: supports, the loaded side and the direction of the force.
+
+    Attributes
+    ----------
+    name : str
+        Label in tasks and in the keys of stored results.
+    loaded : Side
+        Side over which the force is spread evenly.
+    axis : int
+        Axis of the force: 0 for x, 1 for y.
+    held : tuple of (Side, tuple of int)
+        Sides that are held, and along which axes: ``(0, 1)`` is a clamp, ``(1,)`` are rollers on a horizontal side.
+    pressed : bool
+        Whether the displacement of the load is that of the loaded side's middle, rather than the mean one.
+
+    Examples
+    --------
+    A plate between two walls, under a pressure:
+
+    >>> built_in = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
+    >>> built_in.symmetric, built_in.clamped
+    (True, False)
+    """
+
+    name: str
+    loaded: Side
+    axis: int
+    held: tuple[tuple[Side, tuple[int, ...]], ...]
+    pressed: bool = False
+
+    def __str__(self) -> str:
+        """The name."""
+        return self.name
+
+    @property
+    def normal(self) -> int:
+        """Axis across the loaded side."""
+        return self.loaded.axis
+
+    @property
+    def along(self) -> int:
+        """Axis along the loaded side."""
+        return 1 - self.normal
+
+    @property
+    def direct(self) -> bool:
+        """Whether the force acts across the loaded side, in tension or compression, rather than along it."""
+        return self.axis == self.normal
+
+    @property
+    def uniaxial(self) -> bool:
+        """Whether the force stretches a beam along its length."""
+        return self.direct and self.normal == 0
+
+    @property
+    def clamped(self) -> bool:
+        """Whether the side opposite to the loaded one is clamped and nothing else is held."""
+        return self.held == ((self.loaded.opposite, BOTH),)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the supports are their own mirror image across the middle of the loaded side.
+
+        The displacements along the force are then even across it in small strain, those across the force odd.
+        """
+        held = {(side, *directions) for side, directions in self.held}
+        across = ((side.opposite if side.axis == self.along else side, *axes) for side, axes in self.held)
+        return held == set(across)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the beam under load is its own mirror image, and stays it in large displacements."""
+        return self.direct and self.mirrored
+
+    @property
+    def cut(self) -> Side:
+        """Side of the half model that lies on the axis of symmetry: of the upper half, or of the left one."""
+        return BOTTOM if self.along == 1 else RIGHT
+
+    @property
+    def half_held(self) -> tuple[tuple[Side, tuple[int, ...]], ...]:
+        """Supports of the half model, as `held`: on the axis of symmetry nothing moves across the force."""
+        return (*((side, axes) for side, axes in self.held if side != self.cut), (self.cut, (1 - self.axis,)))
+
+    def side_length(self, beam: Beam) -> float:
+        """Length of the loaded side [m]."""
+        return (beam.length, beam.height)[self.along]
+
+
+AXIAL = LoadKind("axial", loaded=RIGHT, axis=0, held=((LEFT, BOTH),))
+BENDING = LoadKind("bending", loaded=RIGHT, axis=1, held=((LEFT, BOTH),))
+SHEAR = LoadKind("shear", loaded=TOP, axis=0, held=((BOTTOM, BOTH), (TOP, (1,))))
+FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, BOTH),), pressed=True)
 
 
 @dataclass(frozen=True)
@@ -28,28 +160,29 @@ class Load:
 
     Attributes
     ----------
-    kind : str
-        What is held, and where and along what the force acts: one of `KINDS`.
+    kind : LoadKind
+        What is held, and where and along what the force acts.
     sign : float
         Sign of the force of a load [1]; tension is positive.
     follower : bool
-        Whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
+        Whether the force turns and grows with the side that it acts on, in nonlinear kinematics; the force of its kind
+        acts across the side.
     """
 
-    kind: str
+    kind: LoadKind
     sign: float
     follower: bool = False
 
 
 LOADS = {
-    "traction": Load("axial", 1.0),
-    "compression": Load("axial", -1.0),
-    "bending": Load("bending", 1.0),
-    "shear": Load("shear", 1.0),
-    "pressure": Load("face", -1.0),
-    "follower-pressure": Load("face", -1.0, follower=True),
+    "traction": Load(AXIAL, 1.0),
+    "compression": Load(AXIAL, -1.0),
+    "bending": Load(BENDING, 1.0),
+    "shear": Load(SHEAR, 1.0),
+    "pressure": Load(FACE, -1.0),
+    "follower-pressure": Load(FACE, -1.0, follower=True),
 }
 """Loads by name."""
 
-KINDS = ("axial", "bending", "shear", "face")
-"""Kinds of load; loads of one kind differ by a factor."""
+LOAD_KINDS = {load.kind.name: load.kind for load in LOADS.values()}
+"""Kinds of load by name."""

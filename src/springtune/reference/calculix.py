@@ -1,4 +1,4 @@
-"""CalculiX as a second opinion and as a rival: its input, its run and its answer.
+"""CalculiX as a second opinion and as an approach of the benchmark: its input, its run and its answer.
 
 Beams and loads are those of `springtune.problem.loads`; the program is `ccx` (Debian package calculix-ccx), run as its
 users run it, in a folder of its own.
@@ -12,20 +12,30 @@ from pathlib import Path
 
 import numpy as np
 
+from ..problem.materials import Material
+
 PROGRAM = "ccx"
 
 
-def installed():
+def installed() -> bool:
     """Whether the program is on the machine."""
     return shutil.which(PROGRAM) is not None
 
 
-def quadratic_mesh(length, height, size):
+def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Serendipity quadrilaterals of even size.
+
+    Parameters
+    ----------
+    length, height : float
+        Extent of the beam [m].
+    size : float
+        Length of a side of the elements, about [m].
 
     Returns
     -------
     points : ndarray of float, shape (n_points, 2)
+        [m]
     elements : ndarray of int, shape (n_elements, 8)
         Corners counter-clockwise, then the middles of the sides from the first corner on.
     """
@@ -41,12 +51,29 @@ def quadratic_mesh(length, height, size):
     return points, np.stack([number[first + di * count + dj] for di, dj in steps], axis=1)
 
 
-def side_weights(points, along, across, value, quadratic):
-    """Shares of an even load on the side where ``points[:, along] == value``, shape (n_points,), sum 1."""
-    tolerance = 1e-9 * np.ptp(points[:, along])
-    side = np.flatnonzero(np.abs(points[:, along] - value) <= tolerance)
-    side = side[np.argsort(points[side, across])]
-    weights, lengths = np.zeros(len(points)), np.diff(points[side, across])
+def side_weights(points: np.ndarray, normal: int, along: int, value: float, quadratic: bool) -> np.ndarray:
+    """Shares of the points in an even load on the side where ``points[:, normal] == value``.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        [m]
+    normal, along : int
+        Axes across and along the side.
+    value : float
+        Coordinate of the side [m].
+    quadratic : bool
+        Whether the elements are quadratic, so that middles carry four times the share of corners.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points,)
+        Sum 1; zero off the side.
+    """
+    tolerance = 1e-9 * np.ptp(points[:, normal])
+    side = np.flatnonzero(np.abs(points[:, normal] - value) <= tolerance)
+    side = side[np.argsort(points[side, along])]
+    weights, lengths = np.zeros(len(points)), np.diff(points[side, along])
     if quadratic:
         whole = lengths[::2] + lengths[1::2]
         for place, share in ((slice(0, -1, 2), 1 / 6), (slice(1, None, 2), 4 / 6), (slice(2, None, 2), 1 / 6)):
@@ -57,33 +84,8 @@ def side_weights(points, along, across, value, quadratic):
     return weights / weights.sum()
 
 
-def solve(points, elements, kind, material, thickness, load, held, finite=False):
-    """Displacements by plane stress at small strain, or neo-Hookean ones at finite strain.
-
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-    elements : ndarray of int, shape (n_elements, 3 or 8)
-    kind : str
-        CalculiX's name of the elements: ``"CPS3"`` or ``"CPS8"``.
-    material : Material
-    thickness : float
-        [m]
-    load : ndarray of float, shape (n_points, 2)
-        Forces [N].
-    held : ndarray of bool, shape (n_points, 2)
-    finite : bool
-        Whether strains are finite.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-
-    Raises
-    ------
-    RuntimeError
-        If the program fails.
-    """
+def _deck(points, elements, kind, material, thickness, load, held, finite):
+    """Input of the program, see `solve`."""
 
     def lines(rows):
         return "\n".join(", ".join(map(str, row)) for row in rows)
@@ -95,7 +97,7 @@ def solve(points, elements, kind, material, thickness, load, held, finite=False)
         law = f"*HYPERELASTIC, NEO HOOKE\n{modulus / (4 * (1 + nu)):.12e}, {6 * (1 - 2 * nu) / modulus:.12e}"
     increments = "0.1, 1.\n" if finite else ""
     clamps = [(n + 1, axis + 1, axis + 1) for n, axis in np.argwhere(held)]
-    deck = f"""*NODE, NSET=ALL
+    return f"""*NODE, NSET=ALL
 {lines((n + 1, repr(float(x)), repr(float(y)), 0.0) for n, (x, y) in enumerate(points))}
 *ELEMENT, TYPE={kind}, ELSET=SHEET
 {lines((e + 1, *(nodes + 1).tolist()) for e, nodes in enumerate(elements))}
@@ -113,7 +115,50 @@ def solve(points, elements, kind, material, thickness, load, held, finite=False)
 U
 *END STEP
 """
+
+
+def solve(
+    points: np.ndarray,
+    elements: np.ndarray,
+    kind: str,
+    material: Material,
+    thickness: float,
+    load: np.ndarray,
+    held: np.ndarray,
+    finite: bool = False,
+) -> np.ndarray:
+    """Displacements by plane stress at small strain, or neo-Hookean ones at finite strain.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        [m]
+    elements : ndarray of int, shape (n_elements, 3 or 8)
+        Numbers of points.
+    kind : str
+        CalculiX's name of the elements: ``"CPS3"`` or ``"CPS8"``.
+    material : Material
+    thickness : float
+        [m]
+    load : ndarray of float, shape (n_points, 2)
+        Forces [N].
+    held : ndarray of bool, shape (n_points, 2)
+        Directions that are held.
+    finite : bool
+        Whether strains are finite.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+        [m]
+
+    Raises
+    ------
+    RuntimeError
+        If the program fails.
+    """
     with tempfile.TemporaryDirectory() as folder:
+        deck = _deck(points, elements, kind, material, thickness, load, held, finite)
         Path(folder, "job.inp").write_text(deck)
         done = subprocess.run([PROGRAM, "job"], cwd=folder, capture_output=True, text=True)
         answer = Path(folder, "job.dat")

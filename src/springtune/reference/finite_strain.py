@@ -7,19 +7,22 @@ The strain energy is that of CalculiX and Abaqus,
 with the shear modulus mu and the bulk modulus K of the material at small strain. In plane stress the stretch across
 the sheet is eliminated in every point; an incompressible material, nu = 0.5, has there
 :math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane. Kinds of load are those of
-`springtune.problem.loads`: under an axial load and one on a face half of the beam is solved, which does not buckle; in
-bending and shear, whose
-symmetry large rotations break, the whole. Elements shrink towards the corners, and the load grows in steps where it
-must.
+`springtune.problem.loads`: where the force acts across the loaded side, half of the beam is solved, which does not
+buckle; where it acts along it, as in bending and shear, the whole, since large rotations break the symmetry. Elements
+shrink towards the corners, and the load grows in steps where it must.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
 from ..linalg.factors import Factor, SingularError
+from ..problem.geometry import Beam
+from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
+from ..problem.materials import Material
 
 COUNTS = (5, 8)
 """Elements over half the height of the two meshes that are solved; the second is the answer."""
@@ -71,7 +74,9 @@ class FiniteStrainSolution:
     profile: np.ndarray
 
 
-def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower=False):
+def solve_neo_hooke(
+    beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "stress", follower: bool = False
+) -> FiniteStrainSolution:
     """Displacements of a neo-Hookean beam under a load.
 
     Parameters
@@ -80,12 +85,11 @@ def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower
     material : Material
     force : float
         Force [N], positive outwards.
-    kind : str
-        Kind of load, one of `springtune.problem.loads.KINDS`.
+    kind : LoadKind
     plane : str
         ``"stress"`` or ``"strain"``.
     follower : bool
-        Whether the load is a pressure that follows the face.
+        Whether the load is a pressure that follows the loaded side.
 
     Returns
     -------
@@ -101,55 +105,49 @@ def solve_neo_hooke(beam, material, force, kind="face", plane="stress", follower
     nu = material.poisson_ratio
     if plane == "strain" and nu >= 0.5:
         raise ValueError(f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999")
-    side = beam.length if kind in ("face", "shear") else beam.height
-    stress = force / (side * beam.thickness * material.young_modulus)
+    stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, nu, count, kind, plane, follower) for count in COUNTS]
     coarse, fine = (sheet.solve(stress, f"{beam.name}, {material.name}") for sheet in sheets)
     # Lengths are over half the height.
     scale = beam.height / 2
     return FiniteStrainSolution(
-        displacement=scale * fine[0],
-        mean_displacement=scale * fine[1],
-        error_estimate=float(abs(coarse[0] / fine[0] - 1)) + fine[4],
-        positions=fine[2],
-        profile=scale * fine[3],
+        displacement=scale * fine.displacement,
+        mean_displacement=scale * fine.mean,
+        error_estimate=float(abs(coarse.displacement / fine.displacement - 1)) + fine.rounding,
+        positions=fine.positions,
+        profile=scale * fine.profile,
     )
+
+
+class _Solved(NamedTuple):
+    """As `FiniteStrainSolution`, over half the height, and the relative error that rounding leaves."""
+
+    displacement: float
+    mean: float
+    positions: np.ndarray
+    profile: np.ndarray
+    rounding: float
 
 
 class _Sheet:
     """What is solved of a sheet of height 2 with E = 1: half of it where the load keeps it symmetric."""
 
-    def __init__(self, aspect_ratio, nu, count, kind, plane, follower):
+    def __init__(self, aspect_ratio: float, nu: float, count: int, kind: LoadKind, plane: str, follower: bool) -> None:
         self.kind = kind
         self.law = NeoHooke(nu, plane)
         length = 2 * aspect_ratio
-        near = np.linspace(0, 1, count + 1) ** GRADING
-        both = np.concatenate([near, 2 - near[-2::-1]])
-        if kind == "face":  # the left half
-            along, across = _spread(near, length / 2, count), both
-        elif kind == "axial":  # the upper half
-            along, across = _spread(near, length, count), 1 - near[::-1]
-        elif kind == "bending":
-            along, across = _spread(near, length, count, MOST_LONG), both
-        else:
-            half = _spread(near, length / 2, count)
-            along, across = np.concatenate([half, length - half[-2::-1]]), both
+        self.extent = max(length, 2.0)
+        along, across = _element_ends(length, count, kind)
         mesh = MeshQuad.init_tensor(along, across)
         basis = Basis(mesh, ElementQuad2(), intorder=4)
-        upper, component = kind in ("face", "shear"), 1 if kind in ("face", "bending") else 0
-        axis, place = (1, 2.0) if upper else (0, length)
+        axis, component, place = kind.normal, kind.axis, kind.loaded.place(along[-1], across[-1])
         facets = mesh.facets_satisfying(lambda x: np.isclose(x[axis], place), boundaries_only=True)
         side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
         places = basis.doflocs.T
         self.held = np.zeros(places.shape, dtype=bool)
-        self.held[np.isclose(places[:, axis], 0)] = True
-        if kind == "face":
-            self.held[np.isclose(places[:, 0], length / 2), 0] = True
-        elif kind == "axial":
-            self.held[np.isclose(places[:, 1], 0), 1] = True
-        elif kind == "shear":
-            self.held[np.isclose(places[:, 1], 2), 1] = True
-        self.extent = max(length, 2.0)
+        for where, axes in kind.half_held if kind.symmetric else kind.held:
+            there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
+            self.held[np.ix_(there, axes)] = True
 
         # Of each element and its points of integration: gradients of shape functions, (elements, points, 2, shapes).
         self.nodes_of = basis.element_dofs.T
@@ -160,15 +158,15 @@ class _Sheet:
         np.add.at(self.load[:, component], side.element_dofs, shapes.sum(axis=2))
         unknowns = (2 * self.nodes_of[:, :, None] + np.arange(2)).reshape(len(self.nodes_of), -1)
         self.rows, self.columns = np.repeat(unknowns, 18, axis=1).ravel(), np.tile(unknowns, 18).ravel()
-        self.turning = _turning(side, shapes) if follower else csr_array((places.size, places.size))
+        self.turning = _turning(side, shapes, kind.along) if follower else csr_array((places.size, places.size))
 
         nodes = side.get_dofs(facets).all()
         order = np.argsort(places[nodes, 1 - axis])
         self.component, self.nodes = component, nodes[order]
         self.places = places[self.nodes, 1 - axis]
 
-    def solve(self, stress, name):
-        """Displacement of the load, mean, positions and profile, over half the height; and its relative rounding."""
+    def solve(self, stress: float, name: str) -> _Solved:
+        """Equilibrium under the whole load, reached in steps."""
         path, step = [(0.0, np.zeros(self.load.shape))], 1.0
         while path[-1][0] < 1:
             done = path[-1][0]
@@ -183,13 +181,16 @@ class _Sheet:
                 step /= 2
         profile = moved[self.nodes, self.component]
         mean = float((self.load * moved).sum() / self.load.sum())
-        if self.kind == "axial":
-            return mean, mean, 0.5 + 0.5 * self.places, profile, uncertain
-        if self.kind != "face":
-            return mean, mean, self.places / self.places[-1], profile, uncertain
-        whole = 2 * self.places[-1]
-        positions = np.concatenate([self.places, whole - self.places[-2::-1]]) / whole
-        return float(profile[-1]), mean, positions, np.concatenate([profile, profile[-2::-1]]), uncertain
+        if not self.kind.symmetric:
+            positions = self.places / self.places[-1]
+        elif self.kind.cut == BOTTOM:  # the upper half of an end
+            positions = 0.5 + 0.5 * self.places
+        else:  # both halves
+            whole = 2 * self.places[-1]
+            positions = np.concatenate([self.places, whole - self.places[-2::-1]]) / whole
+            profile = np.concatenate([profile, profile[-2::-1]])
+        displacement = float(np.interp(0.5, positions, profile)) if self.kind.pressed else mean
+        return _Solved(displacement, mean, positions, profile, uncertain)
 
     def _newton(self, moved, stress):
         """Displacements in equilibrium and what rounding leaves open of the load's, relative; None without any.
@@ -211,13 +212,12 @@ class _Sheet:
             residual = (external - self._forces(gradient, pull)).ravel()[free]
             if not np.isfinite(residual).all():
                 return None
-            step = np.zeros(len(free))
+            step = np.zeros(moved.shape)
             try:
                 factor = Factor(csc_array((self._tangent(gradient, state) - turning)[free][:, free]))
             except SingularError:
                 return None
-            step[free] = factor.solve(residual)
-            step = step.reshape(-1, 2)
+            step[~self.held] = factor.solve(residual)
             if not np.abs(step).max() <= FARTHEST * self.extent:
                 return None
             strain = found + _strain_change(gradient, self._gradient(step))
@@ -251,9 +251,9 @@ class _Sheet:
             changes[:, :, 0, :, axis] = f_x * by_x
             changes[:, :, 1, :, axis] = f_y * by_y
             changes[:, :, 2, :, axis] = f_x * by_y + f_y * by_x
-        changes = changes.reshape(count, points, 3, 2 * shapes)
-        stresses = state.tangent * self.weights[..., None, None] @ changes
-        blocks = np.swapaxes(changes.reshape(count, 3 * points, -1), 1, 2) @ stresses.reshape(count, 3 * points, -1)
+        by_unknown = changes.reshape(count, points, 3, 2 * shapes)
+        stresses = state.tangent * self.weights[..., None, None] @ by_unknown
+        blocks = np.swapaxes(by_unknown.reshape(count, 3 * points, -1), 1, 2) @ stresses.reshape(count, 3 * points, -1)
         held = self.gradients.reshape(count, 2 * points, shapes)
         turned = _matrix(state.stress) * self.weights[..., None, None] @ self.gradients
         stretched = np.swapaxes(held, 1, 2) @ turned.reshape(count, 2 * points, shapes)
@@ -262,10 +262,10 @@ class _Sheet:
         return csr_array((blocks.ravel(), (self.rows, self.columns)), shape=(self.load.size, self.load.size))
 
 
-def _turning(side, shapes):
-    """What a pressure changes with displacements: it acts along the cofactor of the deformation times (0, 1)."""
-    slopes = np.stack([one[0].grad[0] for one in side.basis])
-    blocks = np.einsum("iep,jep->ije", shapes, slopes)
+def _turning(side, shapes, along):
+    """What a pressure changes with displacements: it acts along the cofactor of the deformation times the normal."""
+    slopes = np.stack([one[0].grad[along] for one in side.basis])
+    blocks = np.einsum("iep,jep->ije", shapes, slopes) * (1 if along == 0 else -1)
     rows, columns = np.broadcast_arrays(side.element_dofs[:, None], side.element_dofs[None])
     parts = [(-blocks, 0, 1), (blocks, 1, 0)]
     entries = [(part.ravel(), (2 * rows.ravel() + a, 2 * columns.ravel() + b)) for part, a, b in parts]
@@ -293,6 +293,21 @@ def _strain_change(gradient, change):
 def _matrix(stress):
     """Symmetric matrices of xx, yy, xy."""
     return stress[..., [[0, 2], [2, 1]]]
+
+
+def _element_ends(length, count, kind):
+    """Ends of the elements along x and along y: of half of a symmetric beam, see `LoadKind.cut`, else of the whole."""
+    near = np.linspace(0, 1, count + 1) ** GRADING
+    both = np.concatenate([near, 2 - near[-2::-1]])
+    if kind.along == 0:
+        half = _spread(near, length / 2, count)
+        return half if kind.symmetric else np.concatenate([half, length - half[-2::-1]]), both
+    if any(side != LEFT for side, _ in kind.held):  # corners at the loaded end, too
+        half = _spread(near, length / 2, count)
+        ends = np.concatenate([half, length - half[-2::-1]])
+    else:
+        ends = _spread(near, length, count, np.inf if kind.symmetric else MOST_LONG)
+    return ends, 1 - near[::-1] if kind.symmetric else both
 
 
 def _spread(near, length, count, most=np.inf):
@@ -323,14 +338,25 @@ class NeoHooke:
         ``"stress"`` or ``"strain"``.
     """
 
-    def __init__(self, nu, plane):
+    def __init__(self, nu: float, plane: str) -> None:
         self.shear = 1 / (2 * (1 + nu))
         self.bulk = np.inf if nu >= 0.5 else 1 / (3 * (1 - 2 * nu))
         self.plane = plane
 
-    def response(self, strain):
-        """Stress and tangent at Green's strains xx, yy, 2 xy, shape (..., 3).
+    def response(self, strain: np.ndarray) -> "Response":
+        """Stress and tangent at Green's strains.
 
+        Parameters
+        ----------
+        strain : ndarray of float, shape (..., 3)
+            xx, yy and 2 xy [1].
+
+        Returns
+        -------
+        Response
+
+        Notes
+        -----
         The energy is one of the trace t and the determinant d of C = 1 + 2 E in the plane. With the cofactor a of C,
         S = 2 (W_t 1 + W_d a).
         """
@@ -397,7 +423,15 @@ class NeoHooke:
 
 @dataclass(frozen=True)
 class Response:
-    """Second Piola-Kirchhoff stresses xx, yy, xy, shape (..., 3), and derivatives by Green's, shape (..., 3, 3)."""
+    """What a law answers to strains.
+
+    Attributes
+    ----------
+    stress : ndarray of float, shape (..., 3)
+        Second Piola-Kirchhoff stresses xx, yy, xy over E [1].
+    tangent : ndarray of float, shape (..., 3, 3)
+        Their derivatives by Green's strains xx, yy, 2 xy.
+    """
 
     stress: np.ndarray
     tangent: np.ndarray

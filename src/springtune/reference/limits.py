@@ -5,6 +5,8 @@ A cantilever under a dead load at its end is the elastica :math:`\theta'' = -\al
 :math:`\alpha/2`, and by the closed form of `elastica` at any load.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipkinc
@@ -20,7 +22,7 @@ SHARE = 0.95
 """Share of a body in which rotations and strains are at most those that it is judged by: corners are singular."""
 
 
-def rotation_and_strain(x, y, displacements):
+def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[float, float]:
     """Rotation [rad] and principal strain [1] that 95 % of a body do not exceed, in small strain.
 
     Parameters
@@ -33,7 +35,7 @@ def rotation_and_strain(x, y, displacements):
 
     Returns
     -------
-    tuple of float
+    rotation, strain : float
     """
     middle = [(displacements[:, 1:] + displacements[:, :-1]) / 2, (displacements[1:] + displacements[:-1]) / 2]
     by_x = np.diff(middle[0], axis=0) / np.diff(x)[:, None, None]
@@ -42,15 +44,17 @@ def rotation_and_strain(x, y, displacements):
     mean, half = (by_x[..., 0] + by_y[..., 1]) / 2, (by_x[..., 0] - by_y[..., 1]) / 2
     strain = np.abs(mean) + np.hypot(half, (by_x[..., 1] + by_y[..., 0]) / 2)
     areas = np.multiply.outer(np.diff(x), np.diff(y)).ravel()
-    found = []
-    for values in (rotation.ravel(), strain.ravel()):
-        order = np.argsort(values)
-        reached = np.searchsorted(np.cumsum(areas[order]), SHARE * areas.sum())
-        found.append(float(values[order[min(reached, len(order) - 1)]]))
-    return tuple(found)
+    return _exceeded_rarely(rotation.ravel(), areas), _exceeded_rarely(strain.ravel(), areas)
 
 
-def elastica(load):
+def _exceeded_rarely(values: np.ndarray, areas: np.ndarray) -> float:
+    """Value that most of a body does not exceed, see `SHARE`."""
+    order = np.argsort(values)
+    reached = np.searchsorted(np.cumsum(areas[order]), SHARE * areas.sum())
+    return float(values[order[min(int(reached), len(order) - 1)]])
+
+
+def elastica(load: float) -> float:
     r"""Deflection of a cantilever's end under a dead load across it, over its length [1].
 
     Parameters
@@ -81,7 +85,7 @@ def elastica(load):
     return float(1 - 2 / np.sqrt(load) * parts(turn, ellipeinc))
 
 
-def rotation_effect(rotation):
+def rotation_effect(rotation: float) -> float:
     """Effect of finite rotation on the deflection of a slender cantilever whose end turns so far in small strain [1].
 
     Parameters
@@ -98,7 +102,7 @@ def rotation_effect(rotation):
     return 3 * elastica(load) / load - 1 if load else 0.0
 
 
-def beyond_linear(rotation, strain):
+def beyond_linear(rotation: float, strain: float) -> str:
     """Why a reference of small strain does not apply to a network of nonlinear kinematics.
 
     Parameters
@@ -122,7 +126,7 @@ def beyond_linear(rotation, strain):
     return f"the linear reference does not apply: {', and '.join(reasons)}" if reasons else ""
 
 
-def objection(result, force, kinematics):
+def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
     """Why a network is not compared with a reference, or not to be fitted to it.
 
     Parameters

@@ -4,26 +4,29 @@ Lengths over half the height and stresses over the traction leave a problem of t
 of the kind of load alone. Beams that differ in size or thickness and materials that differ in Young's modulus share it.
 """
 
+from ..problem.geometry import Beam
+from ..problem.loads import LoadKind
+from ..problem.materials import Material
 
-def unit_problem(beam, material, kind):
+
+def unit_problem(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float, LoadKind]:
     """Aspect ratio [1], Poisson's ratio [1] and kind of load.
 
     Parameters
     ----------
     beam : Beam
     material : Material
-    kind : str
-        Kind of load, one of `springtune.problem.loads.KINDS`.
+    kind : LoadKind
 
     Returns
     -------
-    tuple of float, float and str
+    tuple of float, float and LoadKind
         The aspect ratio to twelve digits, so that it is the same for .2 over .04 and for .1 over .02.
     """
     return float(f"{beam.length / beam.height:.12g}"), material.poisson_ratio, kind
 
 
-def unit_scales(beam, material, kind):
+def unit_scales(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float]:
     """What lengths and displacements of the unit problem are multiplied with.
 
     Parameters
@@ -38,5 +41,5 @@ def unit_scales(beam, material, kind):
     displacement : float
         Displacement for 1 N [m]: half the height times the traction over Young's modulus.
     """
-    side = beam.length if kind in ("shear", "face") else beam.height
+    side = kind.side_length(beam)
     return beam.height / 2, beam.height / 2 / (side * beam.thickness * material.young_modulus)

@@ -10,7 +10,8 @@ symmetry or antisymmetry::
         //|__________________|->       //|__________________||          +-------:-------+
                                                                         ///////////////
 
-The kind ``"face"`` is that of shear with a force along y and no rollers, symmetric.
+The kind ``"face"`` is that of shear with a force along y and no rollers, symmetric. Any other kind whose supports are
+symmetric is solved like these: by the upper half where an end is loaded, else by the left half.
 
 The stress is singular where a clamp meets a free edge, the more so the larger Poisson's ratio, and quadratic elements
 of even size creep towards the answer. The elements here are rectangles whose sides shrink geometrically towards the
@@ -28,7 +29,7 @@ from scipy.sparse import block_array, coo_array, csr_array, diags_array, kron
 
 from ..linalg.factors import factorised
 from ..problem.geometry import Beam
-from ..problem.loads import KINDS
+from ..problem.loads import AXIAL, BOTTOM, LEFT, RIGHT, TOP, LoadKind
 from ..problem.materials import Material
 from .field import interpolate
 from .limits import rotation_and_strain
@@ -57,7 +58,7 @@ CORRECTIONS = 40
 #: Error of a displacement from the twelve digits of a unit problem's aspect ratio, at most its third power, relative.
 SHARED = 2e-12
 
-#: What is added to the diagonal of a matrix before it is factorised, relative.
+#: What is added to the diagonal of a matrix before it is factorized, relative.
 SHIFT = 1e-15
 
 #: Number of points of the field that is handed out, about.
@@ -75,7 +76,7 @@ class ReferenceSolution:
     Attributes
     ----------
     displacement : float
-        Mean displacement of the loaded side along the force [m]; of a face, that of its middle.
+        Mean displacement of the loaded side along the force [m]; of a pressed side, that of its middle.
     mean_displacement : float
         Mean displacement of the loaded side along the force [m].
     error_estimate : float
@@ -102,18 +103,41 @@ class ReferenceSolution:
     unknowns: int
 
     def scaled(self, factor: float, length: float = 1.0) -> "ReferenceSolution":
-        """The solution with displacements times `factor` on a beam of sizes times `length`; small strain is linear."""
+        """The solution of a similar beam: small strain is linear.
+
+        Parameters
+        ----------
+        factor : float
+            What displacements are multiplied with [1].
+        length : float, optional
+            What the sizes of the beam are multiplied with [1].
+
+        Returns
+        -------
+        ReferenceSolution
+        """
         names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
         names |= {"rotation": abs(factor) / length, "strain": abs(factor) / length}
         return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Displacements at points of the beam [m], shape (n, 2); see `springtune.reference.field.interpolate`."""
+        """Displacements at points of the beam; see `springtune.reference.field.interpolate`.
+
+        Parameters
+        ----------
+        points : ndarray of float, shape (n, 2)
+            [m]
+
+        Returns
+        -------
+        ndarray of float, shape (n, 2)
+            [m]
+        """
         return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_small_strain(
-    beam: Beam, material: Material, force: float, tolerance: float = 1e-4, kind: str = "axial"
+    beam: Beam, material: Material, force: float, tolerance: float = 1e-4, kind: LoadKind = AXIAL
 ) -> ReferenceSolution:
     r"""Displacements of a beam under a load.
 
@@ -127,8 +151,8 @@ def solve_small_strain(
         Force [N], spread evenly over the loaded side; axial ones are positive in tension.
     tolerance : float
         Largest relative error estimate to accept [1].
-    kind : str
-        Kind of load, one of `springtune.problem.loads.KINDS`.
+    kind : LoadKind
+        With supports that are symmetric, see `LoadKind.mirrored`.
 
     Returns
     -------
@@ -137,7 +161,7 @@ def solve_small_strain(
     Raises
     ------
     ValueError
-        If Poisson's ratio is outside its range, or the kind of load unknown.
+        If Poisson's ratio is outside its range, or the supports of the load are not symmetric.
     ReferenceNotConvergedError
         If the last level does not meet the tolerance.
 
@@ -169,13 +193,13 @@ def solve_small_strain(
     nu = material.poisson_ratio
     if not -1 < nu <= 0.5:
         raise ValueError(f"Poisson's ratio of {material.name!r} is {nu}: isotropic materials have -1 < nu <= 0.5")
-    if kind not in KINDS:
-        raise ValueError(f"unknown kind of load {kind!r}; known: {', '.join(KINDS)}")
+    if not kind.mirrored:
+        raise ValueError(f"supports of '{kind}' are not symmetric; half of a beam is solved")
     length, displacement = unit_scales(beam, material, kind)
     return solve_unit(*unit_problem(beam, material, kind), tolerance).scaled(force * displacement, length)
 
 
-def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-4) -> ReferenceSolution:
+def solve_unit(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float = 1e-4) -> ReferenceSolution:
     """Displacements of a beam of height 2 with E = 1 under traction 1; see `springtune.reference.similarity`.
 
     Parameters
@@ -184,8 +208,8 @@ def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-
         Length over height [1].
     nu : float
         Poisson's ratio [1].
-    kind : str
-        Kind of load, one of `springtune.problem.loads.KINDS`.
+    kind : LoadKind
+        With supports that are symmetric, see `LoadKind.mirrored`.
     tolerance : float
         Largest relative error estimate to accept [1].
 
@@ -215,7 +239,7 @@ def solve_unit(aspect_ratio: float, nu: float, kind: str, tolerance: float = 1e-
     )
 
 
-def _converge(aspect_ratio, nu, kind, tolerance):
+def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) -> tuple["UnitLevel", float]:
     """First level whose error estimate meets the tolerance, and the estimate."""
     values, middle = [], 0.0
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
@@ -232,7 +256,7 @@ def _converge(aspect_ratio, nu, kind, tolerance):
         if len(values) < 3:
             continue
         before, last = np.abs(np.diff(values[-3:])) / level.displacement
-        # The middle of a face is no energy: its own step counts, too.
+        # The middle of a pressed side is no energy: its own step counts, too.
         estimate = float(max(last, abs(middle - middle_before) / middle) + level.round_off + SHARED)
         if estimate <= tolerance and (last <= before / 2 or before <= level.round_off):
             return level, estimate
@@ -252,15 +276,15 @@ class UnitLevel:
         Poisson's ratio [1].
     degree : int
         Level: degree of the polynomials along each axis, and number of layers at a corner.
-    kind : str
-        Kind of load, one of `springtune.problem.loads.KINDS`.
+    kind : LoadKind
+        With supports that are symmetric, see `LoadKind.mirrored`.
 
     Attributes
     ----------
     displacement : float
         Mean displacement of the loaded side along the force [1].
     measured : float
-        The displacement of the load: as `displacement`, of a face that of its middle.
+        The displacement of the load: as `displacement`, of a pressed side that of its middle.
     round_off : float
         Bound on the relative rounding error of both [1].
     unknowns : int
@@ -286,20 +310,41 @@ class UnitLevel:
     are computed, and their sum is `round_off`.
     """
 
-    def __init__(self, length, nu, degree, kind="axial"):
+    def __init__(self, length: float, nu: float, degree: int, kind: LoadKind = AXIAL) -> None:
         self._grid = grid = _grid(length, degree, kind)
         solution, energy, measured, self.round_off = grid.solve(nu)
-        self.displacement = energy / (length / 2 if kind in ("shear", "face") else 1.0)
+        self.displacement = energy / (length / 2 if kind.along == 0 else 1.0)  # over the half of the side
         self.unknowns = len(solution)
         self._coefficients = grid.fields(solution)
         self.measured = self.displacement if measured is None else measured
 
-    def displacements(self, x, y):
-        """Displacements on the grid of the coordinates x (0 to length) and y (-1 to 1), shape (n_x, n_y, 2)."""
+    def displacements(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Displacements on a grid.
+
+        Parameters
+        ----------
+        x : ndarray of float, shape (n_x,)
+            From 0 to the length [1].
+        y : ndarray of float, shape (n_y,)
+            From -1 to 1 [1].
+
+        Returns
+        -------
+        ndarray of float, shape (n_x, n_y, 2)
+        """
         return self._sum(self._grid.values(x, y))
 
-    def field(self):
-        """Coordinates along x (0 to length) and y (-1 to 1) of a grid, and displacements; see `ReferenceSolution`."""
+    def field(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacements on the grid that is handed out.
+
+        Returns
+        -------
+        x : ndarray of float, shape (n_x,)
+            From 0 to the length [1].
+        y : ndarray of float, shape (n_y,)
+            From -1 to 1 [1].
+        displacements : ndarray of float, shape (n_x, n_y, 2)
+        """
         x, y = self._grid.plot_points
         return x, y, self._sum(self._grid.plot_values)
 
@@ -309,7 +354,7 @@ class UnitLevel:
 
 
 @lru_cache(maxsize=2 * LAST_LEVEL)
-def _grid(length, degree, kind):
+def _grid(length: float, degree: int, kind: LoadKind) -> "_Grid":
     """Grids are shared by references that differ in Poisson's ratio alone."""
     return _Grid(length, degree, kind)
 
@@ -320,25 +365,47 @@ class _Grid:
     Parameters are those of `UnitLevel`.
     """
 
-    def __init__(self, length, degree, kind):
+    def __init__(self, length: float, degree: int, kind: LoadKind) -> None:
         self._length, self._kind = length, kind
-        if kind in ("shear", "face"):  # the left half, from y = 0 to 2
-            along, across = _graded(length / 2, min(length / 2, 1.0), degree), _graded_both(2.0, degree)
-        else:  # the upper half; its free edge, where corners are, is at y = 1
-            reach = min(length, 1.0)
-            along = _graded(length, reach, degree) if kind == "axial" else _graded_both(length, degree)
-            across = 1 - _graded(1.0, reach, degree)[::-1]
-        self._x, self._y = x, y = _Line(along, degree), _Line(across, degree)
-        # Unknowns of u_x and of u_y along x and along y: what clamp, rollers and symmetry leave.
-        x_held, y_held = {
-            "axial": (((x.first,), ()), ((x.first,), (y.first,))),
-            "bending": (((x.first,), (y.first,)), ((x.first,), ())),
-            "shear": (((), (y.first,)), ((x.last,), (y.first, y.last))),
-            "face": (((x.last,), (y.first,)), ((), (y.first,))),
-        }[kind]
-        self._unknowns = first, second = [
-            [line.all[~np.isin(line.all, ends)] for line, ends in zip((x, y), sides)] for sides in (x_held, y_held)
-        ]
+        self._x, self._y = (_Line(points, degree) for points in _element_ends(length, degree, kind))
+        self._unknowns = self._free()
+        self._direct, self._lateral, self._shear = self._matrices()
+        self._split = len(self._unknowns[0][0]) * len(self._unknowns[0][1])
+        loaded = self._on_loaded_side()
+        self.load = self._along_force(np.kron(*loaded))
+        self.middle = None
+        if kind.pressed:
+            # The middle of the side is the end of its half that lies on the axis of symmetry.
+            line, numbers = (self._x, self._y)[kind.along], self._unknowns[kind.axis][kind.along]
+            loaded[kind.along] = numbers == (line.last if kind.cut.far else line.first)
+            self.middle = self._along_force(np.kron(*loaded)).astype(float)
+
+    def _free(self):
+        """Of u_x and of u_y the unknowns along x and along y: what clamps, rollers and symmetry leave."""
+        ends = {LEFT: self._x.first, RIGHT: self._x.last, BOTTOM: self._y.first, TOP: self._y.last}
+        lines = self._x, self._y
+        held = [[[ends[side] for side, axes in self._kind.half_held if side.axis == across and axis in axes]
+                 for across in range(2)] for axis in range(2)]  # fmt: skip
+        return [[line.all[~np.isin(line.all, there)] for line, there in zip(lines, sides)] for sides in held]
+
+    def _on_loaded_side(self):
+        """Along x and along y factors of the integrals over the loaded side of what moves along the force."""
+        kind, lines = self._kind, (self._x, self._y)
+        numbers, across = self._unknowns[kind.axis], lines[kind.normal]
+        factors = [line.integrals[of] for line, of in zip(lines, numbers)]
+        factors[kind.normal] = numbers[kind.normal] == (across.last if kind.loaded.far else across.first)
+        return factors
+
+    def _along_force(self, part):
+        """Values of all unknowns, of which those across the force are zero."""
+        first = np.zeros(self._split, EXTENDED)
+        second = np.zeros(len(self._unknowns[1][0]) * len(self._unknowns[1][1]), EXTENDED)
+        (first, second)[self._kind.axis][:] = part
+        return np.concatenate([first, second])
+
+    def _matrices(self):
+        """Of the stiffness matrix the parts by direct strains, by lateral contraction and by shear."""
+        (first, second), x, y = self._unknowns, self._x, self._y
 
         def product(of_x, of_y, rows, columns):
             # Slices of so small matrices are cheaper dense.
@@ -347,26 +414,14 @@ class _Grid:
         lateral, turning = product(x.mixed, y.mixed.T, first, second), product(x.mixed.T, y.mixed, first, second)
         direct = [product(x.slope, y.mass, first, first), product(x.mass, y.slope, second, second)]
         shear = [product(x.mass, y.slope, first, first), product(x.slope, y.mass, second, second)]
-        self._direct = block_array([[direct[0], None], [None, direct[1]]], format="csc")
-        self._lateral = block_array([[None, lateral], [lateral.T, None]], format="csc")
-        self._shear = block_array([[shear[0], turning], [turning.T, shear[1]]], format="csc")
-
-        (x_1, y_1), (x_2, y_2) = first, second
-        self._split = split = len(x_1) * len(y_1)
-        self.load = np.zeros(split + len(x_2) * len(y_2), EXTENDED)
-        if kind == "axial":
-            self.load[:split] = np.kron(x_1 == x.last, y.integrals[y_1])
-        elif kind == "bending":
-            self.load[split:] = np.kron(x_2 == x.last, y.integrals[y_2])
-        elif kind == "shear":
-            self.load[:split] = np.kron(x.integrals[x_1], y_1 == y.last)
-        else:
-            self.load[split:] = np.kron(x.integrals[x_2], y_2 == y.last)
-            self.middle = np.zeros(len(self.load))
-            self.middle[split:] = np.kron(x_2 == x.last, y_2 == y.last)
+        return (
+            block_array([[direct[0], None], [None, direct[1]]], format="csc"),
+            block_array([[None, lateral], [lateral.T, None]], format="csc"),
+            block_array([[shear[0], turning], [turning.T, shear[1]]], format="csc"),
+        )
 
     def solve(self, nu):
-        """Unknowns for a Poisson's ratio, energy, displacement of a face's middle or None, relative rounding error."""
+        """Unknowns for a Poisson's ratio, energy, displacement of a pressed side's middle if any, rounding."""
         one = EXTENDED(1)
         direct, shear = one / (1 - one * nu * nu), one / (2 * (1 + one * nu))
         matrix = float(direct) * (self._direct + nu * self._lateral) + float(shear) * self._shear
@@ -391,7 +446,7 @@ class _Grid:
             solution, softest = solution + gain / curvature * direction, min(softest, curvature / norm)
         round_off = rounding + lacking + 2 * np.finfo(float).eps
         energy, refined = float(load @ solution + solution @ residual), (solution + correction).astype(float)
-        if self._kind != "face":
+        if self.middle is None:
             return refined, energy, None, round_off
         # Not the energy: its error is the rounded forces' work on the displacements under a unit force there.
         measured = float(self.middle @ refined)
@@ -428,11 +483,12 @@ class _Grid:
     def values(self, x, y):
         """Signs of the two displacements on a grid of coordinates, and what takes coefficients there along x and y."""
         signs = np.ones((2, len(x), len(y)))
-        if self._kind in ("shear", "face"):
-            signs[1 if self._kind == "shear" else 0] = np.sign(self._length / 2 - x)[:, None]
+        odd = 1 - self._kind.axis
+        if self._kind.along == 0:
+            signs[odd] = np.sign(self._length / 2 - x)[:, None]
             x, y = np.minimum(x, self._length - x), y + 1
         else:
-            signs[0 if self._kind == "bending" else 1] = np.sign(y)
+            signs[odd] = np.sign(y)
             y = np.abs(y)
         return signs, self._x.values(x), self._y.values(y)
 
@@ -456,7 +512,7 @@ class _Line:
     `slope` and `mixed` hold the integrals of v w, v' w' and v' w (v: row, w: column), `integrals` those of v.
     """
 
-    def __init__(self, points, degree):
+    def __init__(self, points: np.ndarray, degree: int) -> None:
         self.points, self.degree = points, degree
         count, size = len(points) - 1, degree + 1
         # Element after element: its first end, its inner polynomials; the last end is the next one's first.
@@ -500,20 +556,31 @@ class _Line:
         return found
 
 
-def _graded(length, reach, layers):
+def _element_ends(length: float, layers: int, kind: LoadKind) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the elements of half a beam along x and along y."""
+    if kind.along == 0:  # the left half, from y = 0 to 2
+        return _graded(length / 2, min(length / 2, 1.0), layers), _graded_both(2.0, layers)
+    # The upper half; its free edge, where corners are, is at y = 1. An end that is pulled evenly has none.
+    reach = min(length, 1.0)
+    pulled = kind.direct and all(side == LEFT for side, _ in kind.held)
+    along = _graded(length, reach, layers) if pulled else _graded_both(length, layers)
+    return along, 1 - _graded(1.0, reach, layers)[::-1]
+
+
+def _graded(length: float, reach: float, layers: int) -> np.ndarray:
     """Ends of elements from 0 to length: `layers` that shrink towards 0 within its reach, and few beyond."""
     near = reach * SHRINKAGE ** np.arange(layers - 1, -1, -1.0)
     count = ceil(log(length / reach, GROWTH))  # none where the reach is the length
     return np.concatenate([[0.0], near, np.geomspace(reach, length, count + 1)[1:]])
 
 
-def _graded_both(length, layers):
+def _graded_both(length: float, layers: int) -> np.ndarray:
     """Ends of elements from 0 to length, as `_graded` towards either end."""
     half = _graded(length / 2, min(length / 2, 1.0), layers)
     return np.concatenate([half, length - half[-2::-1]])
 
 
-def _plot_points(length, spacing):
+def _plot_points(length: float, spacing: float) -> np.ndarray:
     """Points from 0 to length, evenly spaced but for the first interval, which is halved some times towards 0."""
     even = np.linspace(0, length, max(2, ceil(length / spacing)) + 1)
     return np.concatenate([[0.0], even[1] / [16, 8, 4, 2], even[1:]])

@@ -8,7 +8,6 @@ or with a material.
 import importlib
 from dataclasses import dataclass
 
-from ..problem.loads import KINDS
 from .base import DefinitionError, Springs
 
 __all__ = ["DEFINITIONS", "Definition", "DefinitionError", "Springs"]
@@ -28,8 +27,8 @@ class Definition:
         Whether all springs have one stiffness, so that it is a number to report.
     cells : tuple of int
         Numbers of corners of the cells that it can have.
-    kinds : tuple of str
-        Kinds of load that it is for, of `springtune.problem.loads.KINDS`.
+    uniaxial : bool
+        Whether it is for loads alone that stretch a beam along its length, see `LoadKind.uniaxial`.
     needs : str
         What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
     """
@@ -38,7 +37,7 @@ class Definition:
     place: str
     uniform: bool = False
     cells: tuple = (3, 4)
-    kinds: tuple = KINDS
+    uniaxial: bool = False
     needs: str = ""
 
     @property
@@ -71,7 +70,7 @@ DEFINITIONS = {
         Definition("van-gelder", "van_gelder", cells=(3,)),
         Definition("van-gelder-general", "van_gelder:general", cells=(3,)),
         Definition("baudet", "baudet", cells=(4,)),
-        Definition("baudet-corrected", "baudet:corrected", cells=(4,), kinds=("axial",)),
+        Definition("baudet-corrected", "baudet:corrected", cells=(4,), uniaxial=True),
         Definition("flechon", "baudet:incompressible", cells=(4,)),
         Definition("axis-exact", "axis_exact"),
         Definition("element-fit", "element_fit"),

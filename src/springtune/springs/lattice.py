@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from ..problem.loads import LOADS
 from .base import Springs, not_negative, rectangles_only
 
 COEFFICIENT = math.sqrt(3) / 2
@@ -85,5 +86,7 @@ def predicted_stiffness(material, beam, mesh_size, load="traction"):
     float
         Stiffness [N/m]; NaN for loads without a closed form.
     """
-    excess = {"traction": 1.0, "compression": 1.0, "bending": 3.0}.get(load, math.nan) * COEFFICIENT
+    kind = LOADS[load].kind
+    known = kind.clamped and kind.normal == 0
+    excess = (1.0 if kind.direct else 3.0) * COEFFICIENT if known else math.nan
     return COEFFICIENT * material.young_modulus * beam.thickness / (1.0 + excess * mesh_size / beam.height)

@@ -113,8 +113,8 @@ def _check_kinds(grids, problems):
             if mesh_type in MESH_TYPES and count not in definition.cells:
                 needs, has = ("triangles", "quadrilaterals") if count == 4 else ("rectangles", "triangles")
                 found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
-            if LOADS[scene.load].kind not in definition.kinds:
-                kinds = " and ".join(name for name, load in LOADS.items() if load.kind in definition.kinds)
+            if definition.uniaxial and not LOADS[scene.load].kind.uniaxial:
+                kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
                 found[f"'{definition.name}' is for {kinds} and load '{scene.load}' is neither; {SEPARATE}"] = None
         for message in found:
             problems.add(("grids", grid.name, "definition"), message)

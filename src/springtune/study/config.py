@@ -190,7 +190,7 @@ class GridConfig(Section):
             missing = "'force' is missing; give a force such as '400 kN', or one for each beam"
             raise refuse(missing if self.force is None else both, *(() if self.force is None else ("pressure",)))
         for load in self.load if self.pressure is not None else ():
-            if LOADS[load].kind != "face":
+            if not LOADS[load].kind.pressed:
                 raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 

@@ -68,14 +68,12 @@ def number(words, low, high, *, above=False, whole=False):
 
 
 def one_of(what, names):
-    names = list(names)
-
     def read(value):
         if value not in names:
             raise refuse(f"unknown {what} '{value}'; {nearest(value, names)}")
         return value
 
-    return Annotated[str, Scalar(read, {"enum": names}, " or ".join(f"'{name}'" for name in names))]
+    return Annotated[str, Scalar(read, {"enum": list(names)}, " or ".join(f"'{name}'" for name in names))]
 
 
 def _read_flag(value):

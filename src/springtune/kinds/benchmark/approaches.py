@@ -106,7 +106,7 @@ def _triangles(scene, size, clock, degree):
         side = FacetBasis(mesh, element, facets=mesh.facets_satisfying(lambda x: np.isclose(x[along], value)))
         load = LinearForm(lambda v, w: v[axis]).assemble(side)
         mean = load / load.sum()
-        clamp = basis.get_dofs(lambda x: np.isclose(x[1 if scene.kind == "face" else 0], 0.0)).all()
+        clamp = basis.get_dofs(lambda x: np.isclose(x[scene.kind.normal], 0.0)).all()
         free = np.setdiff1d(np.arange(len(load)), clamp)
         matrix = matrix[free][:, free].tocsc()
     with clock("factorizing"):
@@ -114,9 +114,10 @@ def _triangles(scene, size, clock, degree):
     with clock("solving"):
         solution = np.zeros(len(load))
         solution[free] = factor.solve(scene.force * mean[free])
-    if scene.kind == "face":
-        middle = np.array([[scene.beam.length / 2], [scene.beam.height - 1e-12]])
-        return float((basis.probes(middle) @ solution).ravel()[1]), len(free)
+    if scene.kind.pressed:
+        middle = np.array([[scene.beam.length / 2], [scene.beam.height / 2]])
+        middle[along] = value - 1e-12
+        return float((basis.probes(middle) @ solution).ravel()[axis]), len(free)
     return float(mean @ solution), len(free)
 
 
@@ -256,9 +257,9 @@ def boundary_elements(scene, size, clock):
         u[own, :, own, :] = itself / (8 * np.pi * shear * (1 - nu))
         t[own, :, own, :] = 0.5 * np.eye(2)
         u, t = u.reshape(2 * count, -1), t.reshape(2 * count, -1)
-        clamped = np.repeat(side == (0 if scene.kind == "face" else 3), 2)
-        loaded = side == (2 if scene.kind == "face" else 1)
-        axis = 0 if scene.kind == "axial" else 1
+        clamped = np.repeat(side == (0 if scene.kind.normal == 1 else 3), 2)
+        loaded = side == (2 if scene.kind.normal == 1 else 1)
+        axis = scene.kind.axis
         traction = np.zeros((count, 2))
         traction[loaded, axis] = scene.force / (scene.beam.thickness * lengths[loaded].sum())
         matrix = np.where(clamped[None, :], -u, t)
@@ -267,9 +268,11 @@ def boundary_elements(scene, size, clock):
         solution = np.linalg.solve(matrix, right)
     with clock("solving"):
         moved = np.where(clamped, 0.0, solution).reshape(-1, 2)[:, axis]
-        if scene.kind == "face":
-            order = np.argsort(middle[loaded, 0])
-            displacement = float(np.interp(length / 2, middle[loaded, 0][order], moved[loaded][order]))
+        if scene.kind.pressed:
+            places = middle[loaded, scene.kind.along]
+            order = np.argsort(places)
+            half = scene.kind.side_length(scene.beam) / 2
+            displacement = float(np.interp(half, places[order], moved[loaded][order]))
         else:
             displacement = float(moved[loaded] @ lengths[loaded] / lengths[loaded].sum())
     return displacement, 2 * count
@@ -284,14 +287,13 @@ def free_form(scene, size, clock):
     with clock("meshing"):
         mesh = _mesh(scene, size)
     with clock("solving"):
-        given = {
-            "axial": beam.length / (young * beam.thickness * beam.height),
-            "bending": 4 * beam.length**3 / (young * beam.thickness * beam.height**3),
-            "face": beam.height / (young * beam.thickness * beam.length),
-        }[scene.kind]
-        across, axis = {"axial": (0, 0), "bending": (0, 1), "face": (1, 1)}[scene.kind]
+        across, axis = scene.kind.normal, scene.kind.axis
+        far, side = (beam.length, beam.height)[across], scene.kind.side_length(beam)
+        given = (far if scene.kind.direct else 4 * far**3) / (
+            young * beam.thickness * (side if scene.kind.direct else side**3)
+        )
         # Cubic: control points along the axis that carry a straight line, or a cantilever's cubic.
-        control = np.array([0, 0, 0.5, 1.0]) if scene.kind == "bending" else np.linspace(0, 1, 4)
+        control = np.array([0, 0, 0.5, 1.0]) if not scene.kind.direct else np.linspace(0, 1, 4)
         s = mesh.points[:, across] / mesh.points[:, across].max()
         basis = np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=1)
         moved = np.zeros(mesh.points.shape)
@@ -320,14 +322,15 @@ def calculix_cps8(scene, size, clock):
         load = np.zeros(points.shape)
         load[:, axis] = scene.force * shares
         clamp = np.zeros(points.shape, dtype=bool)
-        clamp[points[:, 1 if scene.kind == "face" else 0] == 0.0] = True
+        clamp[points[:, scene.kind.normal] == 0.0] = True
     with clock("solving"):
         found = calculix.solve(points, elements, "CPS8", scene.material, scene.beam.thickness, load, clamp)
     moved = found[:, axis]
-    if scene.kind == "face":
+    if scene.kind.pressed:
         loaded = np.flatnonzero(shares)
-        loaded = loaded[np.argsort(points[loaded, 0])]
-        return float(np.interp(scene.beam.length / 2, points[loaded, 0], moved[loaded])), int((~clamp).sum())
+        places, half = points[loaded, scene.kind.along], scene.kind.side_length(scene.beam) / 2
+        order = np.argsort(places)
+        return float(np.interp(half, places[order], moved[loaded][order])), int((~clamp).sum())
     return float(moved @ shares), int((~clamp).sum())
 
 

@@ -114,6 +114,12 @@ class Case:
     second_beam: Beam | None
 
 
+def in_benchmark(load):
+    """Whether all approaches of the benchmark can hold and pull a beam like that."""
+    kind = LOADS[load].kind
+    return kind.clamped and kind.loaded.far and not LOADS[load].follower
+
+
 def _check(config, problems):
     if not config.benchmark:
         return
@@ -132,8 +138,9 @@ def _check(config, problems):
         check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
         check_known(problems, (*place, "material"), "material", scene.material, config.materials)
         check_density(config, scene.material, (*place, "material"), problems)
-        if LOADS[scene.load].kind == "shear" or LOADS[scene.load].follower:
-            problems.add((*place, "load"), f"'{scene.load}' is not benchmarked; choose traction, bending or pressure")
+        if not in_benchmark(scene.load):
+            able = ", ".join(filter(in_benchmark, LOADS))
+            problems.add((*place, "load"), f"'{scene.load}' is no load of the benchmark; choose of {able}")
     for name in section.definition:
         if DEFINITIONS[name].needs:
             able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)

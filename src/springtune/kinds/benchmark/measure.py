@@ -60,9 +60,7 @@ class Scene:
     @property
     def side(self):
         """Coordinate of the loaded side [m], axis of that coordinate, axis of the force."""
-        if self.kind == "face":
-            return self.beam.height, 1, 1
-        return self.beam.length, 0, 1 if self.kind == "bending" else 0
+        return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
 
 
 class _Clock:

@@ -163,7 +163,7 @@ def _scenes(study, folder, root, block, fields, objections):
             labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
             labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
             root.put(values, **labels)
-            if LOADS[scene.load].kind == "face":
+            if LOADS[scene.load].kind.pressed:
                 block.put({new: result[old] for old, new in FACE.items() if old in result}, **labels)
             if "displacements" in result:
                 x, y = result["displacements"].T
@@ -226,7 +226,7 @@ def _block(study, folder, axes):
     kinds = (SMALL_STRAIN, *study.further_references)
     block = Filler(BLOCK.empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
     for asked in study.references:
-        if LOADS[asked.load].kind != "face":
+        if not LOADS[asked.load].kind.pressed:
             continue
         labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
         for kind in kinds:

@@ -25,7 +25,7 @@ def stems(study):
 
 def pressed(study):
     """Whether a study has scenes under pressure."""
-    return any(LOADS[scene.load].kind == "face" for scene in study.scenes)
+    return any(LOADS[scene.load].kind.pressed for scene in study.scenes)
 
 
 def _lack_of_pressure(study):

@@ -51,9 +51,9 @@ def reference_of(beam, material, load):
     Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
     kind.
     """
-    problem = beam, material, LOADS[load].kind
-    length, displacement = unit_scales(*problem)
-    key = hash_of(unit_problem(*problem), stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem"))
+    length, displacement = unit_scales(beam, material, LOADS[load].kind)
+    code = stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
+    key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
 
@@ -63,23 +63,19 @@ def finite_key(reference, kind):
     return hash_of(kind, _finite_problem(reference), code)
 
 
-def _problem(reference):
-    return reference.beam, reference.material, LOADS[reference.load].kind
+def _unit_problem(beam, material, load):
+    aspect_ratio, nu, kind = unit_problem(beam, material, LOADS[load].kind)
+    return aspect_ratio, nu, kind.name
 
 
 def _finite_problem(reference):
-    parameters = [
-        beam_key(reference.beam),
-        material_key(reference.material),
-        LOADS[reference.load].kind,
-        reference.force,
-    ]
-    return [*parameters, LOADS[reference.load].follower]
+    load = LOADS[reference.load]
+    return [beam_key(reference.beam), material_key(reference.material), load.kind.name, reference.force, load.follower]
 
 
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
-    parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind, curve.force, curve.kinematics]
+    parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind.name, curve.force, curve.kinematics]
     parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
     return hash_of(parameters, stage_key("kinds.scenes.sensitivity", "numpy", "scipy", "cvxopt"))
 
@@ -88,7 +84,7 @@ def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
     reference = reference_of(scene.mesh.beam, scene.material, scene.load)
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
-    parameters += [LOADS[scene.load].kind, _follows(scene), scene.force, scene.definition, scene.kinematics]
+    parameters += [LOADS[scene.load].kind.name, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
     return hash_of(
         parameters, stage_key("kinds.scenes.solve", "numpy", "scipy", "cvxopt"), definition_digest(scene.definition)
@@ -175,7 +171,7 @@ def _reference_members(study, costs):
     """References in groups: unit problems that share elements and differ in Poisson's ratio; each at finite strain."""
     groups = defaultdict(dict)
     for reference in study.references:
-        aspect_ratio, nu, kind = unit_problem(*_problem(reference))
+        aspect_ratio, nu, kind = _unit_problem(reference.beam, reference.material, reference.load)
         groups[hash_of(aspect_ratio, kind)].setdefault(nu, (reference, None))
     members = {
         name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
@@ -193,9 +189,8 @@ def _references(study, folder, groups):
     return {
         "folder": str(folder / "references"),
         "references": [
-            {"key": reference_of(one.beam, one.material, one.load)["key"], "problem": unit_problem(*_problem(one))}
-            for one, kind in references
-            if kind is None
+            {"key": reference_of(*problem)["key"], "problem": _unit_problem(*problem)}
+            for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
         ],
         "finite": [
             {
@@ -203,7 +198,7 @@ def _references(study, folder, groups):
                 "beam": beam_key(one.beam),
                 "material": material_key(one.material),
                 "force": one.force,
-                "load": LOADS[one.load].kind,
+                "load": LOADS[one.load].kind.name,
                 "plane": kind.rpartition("-")[2],
                 "follower": LOADS[one.load].follower,
             }
@@ -220,7 +215,7 @@ def _reference_products(content):
 def _curve(study, curve):
     return {
         "key": curve_key(study, curve),
-        "kind": LOADS[curve.load].kind,
+        "kind": LOADS[curve.load].kind.name,
         "force": curve.force,
         "kinematics": curve.kinematics,
         "stiffnesses": stiffnesses(study, curve),
@@ -267,7 +262,7 @@ def _scene(study, scene):
     task = {
         "key": scene_key(study, scene),
         "material": material_key(scene.material),
-        "kind": LOADS[scene.load].kind,
+        "kind": LOADS[scene.load].kind.name,
         "follower": _follows(scene),
         "force": scene.force,
         "definition": scene.definition,

@@ -7,6 +7,7 @@ from pathlib import Path
 from ...jobs import atomic, store
 from ...jobs.spent import Spent
 from ...problem.geometry import Beam
+from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
 from ...reference.small_strain import solve_unit
 
@@ -18,8 +19,8 @@ def run(tasks, done):
     ----------
     tasks : str or Path
         JSON file: ``folder``, ``references``, each with ``key`` and ``problem``, what
-        `springtune.reference.similarity.unit_problem` gives, and ``finite``, each with ``key, beam, material, force,
-        load, plane, follower``.
+        `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
+        with ``key, beam, material, force, load, plane, follower``, where ``load`` is the name of the kind.
     done : str or Path
         JSON file to write: what was spent.
     """
@@ -39,8 +40,9 @@ def run(tasks, done):
 
 def _unit(task):
     """Result of a unit problem."""
+    aspect_ratio, nu, kind = task["problem"]
     try:
-        solution = solve_unit(*task["problem"])
+        solution = solve_unit(aspect_ratio, nu, LOAD_KINDS[kind])
     except RuntimeError as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
@@ -53,7 +55,8 @@ def _finite(task):
 
     try:
         beam, material = Beam(**task["beam"]), Material(**task["material"])
-        solution = solve_neo_hooke(beam, material, task["force"], task["load"], task["plane"], task["follower"])
+        kind = LOAD_KINDS[task["load"]]
+        solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
     except (RuntimeError, ValueError) as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")

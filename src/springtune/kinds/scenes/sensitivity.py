@@ -17,6 +17,7 @@ from ...mechanics.statics import StaticProblem
 from ...mesh import read_mesh
 from ...problem.boundary import held, measured, weights
 from ...problem.compare import Best, best_stiffness
+from ...problem.loads import LOAD_KINDS
 from ...reference.limits import objection
 from ...springs.lattice import uniform
 from . import stored_reference as references
@@ -43,9 +44,10 @@ def run(tasks, done):
             continue
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
         results = {}
-        for kind in {curve["kind"]: None for curve in missing}:
+        for name in {curve["kind"]: None for curve in missing}:
+            kind = LOAD_KINDS[name]
             problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
-            alike = [curve for curve in missing if curve["kind"] == kind]
+            alike = [curve for curve in missing if curve["kind"] == name]
             results |= _trace(problem, measured(mesh, kind), alike, tasks["references"])
         store.add(path, results)
         for result in results.values():

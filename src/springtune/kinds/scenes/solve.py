@@ -16,6 +16,7 @@ from ...mechanics.network import Network
 from ...mechanics.statics import FollowerPressure, StaticProblem
 from ...mesh import read_mesh
 from ...problem.boundary import FACE_POSITIONS, held, loaded_edges, measured, weights
+from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
 from ...reference.field import field_error, interpolate
 from ...springs import DEFINITIONS, DefinitionError
@@ -74,7 +75,7 @@ def _stored_key(scene, calibration):
 def _turn(scene):
     """Order in which scenes of one network follow each other."""
     uniform = DEFINITIONS[scene["definition"]].uniform
-    return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], scene["kind"] == "shear")
+    return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], LOAD_KINDS[scene["kind"]].held)
 
 
 class References:
@@ -160,7 +161,8 @@ class Solver:
             stiffness = group["stiffness"] * scene["thickness_ratio"]
         reference = self.references.field(scene["reference"])
         springs, seconds = self._springs(scene, stiffness, reference)
-        problem = self._problem(springs, scene["kind"], scene["follower"])
+        kind = LOAD_KINDS[scene["kind"]]
+        problem = self._problem(springs, kind, scene["follower"])
         s = scene["force"] / springs.reference
         found = problem.linear(s) if scene["kinematics"] == "linear" else problem.nonlinear(s)
         result = {
@@ -177,11 +179,11 @@ class Solver:
         result |= {"status": status, "message": message}
         if not found.converged:
             if found.last is not None:
-                result["last_displacement"] = float(np.tensordot(found.last, self.measured(scene["kind"]), axes=2))
+                result["last_displacement"] = float(np.tensordot(found.last, self.measured(kind), axes=2))
             return result
-        result["displacement"] = float(np.tensordot(found.displacements, self.measured(scene["kind"]), axes=2))
-        if scene["kind"] == "face":
-            result |= self._face(found.displacements)
+        result["displacement"] = float(np.tensordot(found.displacements, self.measured(kind), axes=2))
+        if kind.pressed:
+            result |= self._face(found.displacements, kind)
         if reference is not None:
             result["field_error"] = field_error(self.mesh, found.displacements, scene["force"] * reference)
         result["negative_pivots"] = pivots
@@ -195,8 +197,8 @@ class Solver:
         if definition.needs == "cases":
             if reference is None:
                 raise DefinitionError("needs the reference's displacements, and there are none")
-            force = scene["force"]
-            given = [Case(self.held(scene["kind"]), force * self.weights(scene["kind"]), force * reference)]
+            force, kind = scene["force"], LOAD_KINDS[scene["kind"]]
+            given = [Case(self.held(kind), force * self.weights(kind), force * reference)]
             name += (scene["kind"], force)
         if self.found.get("name") != name:
             begin = time.perf_counter()
@@ -205,13 +207,13 @@ class Solver:
             self.found = {"name": name, "springs": springs, "seconds": self.deriving}
         return self.found["springs"], self.found["seconds"]
 
-    def _face(self, displacements):
+    def _face(self, displacements, kind):
         """Mean displacement of a pressed face and its profile, along the force [m]."""
-        face = np.flatnonzero(self.weights("face")[:, 1] > 0)
-        x, moved = self.mesh.points[face, 0], displacements[face, 1]
+        face = np.flatnonzero(self.weights(kind)[:, kind.axis] > 0)
+        x, moved = self.mesh.points[face, kind.along], displacements[face, kind.axis]
         order = np.argsort(x)
         profile = np.interp(FACE_POSITIONS * np.ptp(x), x[order], moved[order])
-        return {"face_mean": float((self.weights("face") * displacements).sum()), "face_profile": profile}
+        return {"face_mean": float((self.weights(kind) * displacements).sum()), "face_profile": profile}
 
     def _problem(self, springs, kind, follower=False):
         directions = self.held(kind)

@@ -19,6 +19,7 @@ from ...mechanics.statics import FollowerPressure, StaticProblem
 from ...mesh import MESH_TYPES, Mesh, corner_angles
 from ...problem.boundary import held, loaded_edges, weights
 from ...problem.geometry import Beam
+from ...problem.loads import AXIAL, FACE
 from ...problem.materials import Material
 from ...springs import DEFINITIONS, DefinitionError
 from .names import AXES
@@ -68,12 +69,12 @@ class Setup:
         """Springs of the definition."""
         return DEFINITIONS[self.definition].springs(mesh, self.material, self.beam.thickness)
 
-    def network(self, mesh, kind="axial"):
+    def network(self, mesh, kind=AXIAL):
         """Network and its reference stiffness."""
         springs = self.springs(mesh)
         return Network(mesh, held(mesh, kind), springs.relative, springs.energies), springs.reference
 
-    def problem(self, mesh, kind="axial"):
+    def problem(self, mesh, kind=AXIAL):
         """Static problem and its reference stiffness."""
         network, reference = self.network(mesh, kind)
         return StaticProblem(network, weights(mesh, kind)), reference
@@ -82,7 +83,7 @@ class Setup:
         """The beam under its force, free of damping."""
         network, reference = self.network(mesh)
         inertia = masses(mesh, self.material.density, self.beam.thickness) / reference
-        load = self.force / reference * weights(mesh, "axial")
+        load = self.force / reference * weights(mesh, AXIAL)
         return Motion(network, inertia, **({"load": load, "linear": True} | options))
 
 
@@ -206,7 +207,7 @@ def drift(setup):
     motion = setup.motion(setup.coarse, linear=False)
     if motion.network.energies:  # not compiled, and the same schemes
         motion = changed(motion, linear=True)
-    problem = StaticProblem(motion.network, weights(setup.coarse, "axial"))
+    problem = StaticProblem(motion.network, weights(setup.coarse, AXIAL))
     pulled = (problem.linear if motion.linear else problem.nonlinear)(motion.load.sum()).displacements
     free = changed(motion, load=np.zeros_like(motion.load))
     step = 0.5 * free.step_limit("central-difference")
@@ -249,7 +250,7 @@ def rest(setup):
     relax_steps = np.full(len(setup.mesh_sizes), np.nan)
     for i, size in enumerate(setup.mesh_sizes):
         motion = setup.motion(setup.mesh(size))
-        static = StaticProblem(motion.network, weights(motion.network.mesh, "axial")).linear(motion.load.sum())
+        static = StaticProblem(motion.network, weights(motion.network.mesh, AXIAL)).linear(motion.load.sum())
         largest = np.abs(static.displacements).max()
         for j, iterations in enumerate(AXES["cg_iterations"]):
             u = v = None
@@ -278,7 +279,7 @@ def slivers(setup):
     mesh = setup.coarse
     whole, reference = setup.problem(mesh)
     s = setup.force / reference
-    pattern = weights(mesh, "axial")
+    pattern = weights(mesh, AXIAL)
     answer = float(np.tensordot(whole.linear(s).displacements, pattern, axes=2))
     inside = np.setdiff1d(np.arange(len(mesh.points)), mesh.edges[mesh.on_outline])
     moved = inside[np.argmin(np.linalg.norm(mesh.points[inside] - mesh.points.mean(axis=0), axis=1))]
@@ -317,7 +318,7 @@ def contrast(setup):
     base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
     for i, ratio in enumerate(ratios):
         stiffer = Network(setup.coarse, network.held, base * np.where(soft, 1.0, ratio), like=network)
-        problem, s = StaticProblem(stiffer, weights(setup.coarse, "axial")), setup.force / reference
+        problem, s = StaticProblem(stiffer, weights(setup.coarse, AXIAL)), setup.force / reference
         found = problem.linear(s)
         _noted(result, i, lambda problem=problem, s=s, found=found: (problem, s, found))
         exact = _refined(problem, s, found.displacements)
@@ -384,7 +385,7 @@ def sizes(setup):
         one = replace(setup, beam=beam, force=setup.force * ratio**2, mesh_sizes=(size,))
         motion = one.motion(one.coarse, linear=False)
         motion = changed(motion, mass_damping=motion.loaded_frequency)
-        static = StaticProblem(motion.network, weights(one.coarse, "axial")).nonlinear(motion.load.sum())
+        static = StaticProblem(motion.network, weights(one.coarse, AXIAL)).nonlinear(motion.load.sum())
         limits[i] = motion.step_limit("central-difference") / size
         for j, kind in enumerate(kinds):
             found = motion.run("central-difference", 0.9 * limits[i] * size, 60_000, precision=kind)
@@ -427,7 +428,7 @@ def strains(setup):
     result = _statics(*shape) | {"displacement": np.full(shape, np.nan), "load_share": np.full(shape, np.nan)}
     membrane = setup.material.young_modulus * setup.beam.thickness
     for i, load in enumerate(loads):
-        kind, side = ("axial", setup.beam.height) if load == "axial" else ("face", setup.beam.length)
+        kind, side = (AXIAL, setup.beam.height) if load == "axial" else (FACE, setup.beam.length)
         pattern = weights(mesh, kind)
         for j, strain in enumerate(values):
 
@@ -450,7 +451,7 @@ def strains(setup):
 def perturbation(setup):
     """Answers of meshes whose inner particles are moved at random, and Newton's method from inverted starts."""
     mesh, size = setup.coarse, setup.mesh_sizes[-1]
-    pattern = weights(mesh, "axial")
+    pattern = weights(mesh, AXIAL)
     shares = AXES["perturbation"]
     result = _statics(len(shares)) | {"error": np.full(len(shares), np.nan), "step_limit": np.full(len(shares), np.nan)}
     random = np.random.default_rng(0).uniform(-1, 1, mesh.points.shape)

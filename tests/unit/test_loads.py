@@ -1,0 +1,159 @@
+"""Kinds of load: their properties, and new ones that are added from outside."""
+
+import json
+
+import numpy as np
+import pytest
+
+from springtune.campaign import plan
+from springtune.jobs import store
+from springtune.kinds.scenes import mesh as mesh_stage
+from springtune.kinds.scenes import reference as reference_stage
+from springtune.kinds.scenes import solve as solve_stage
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
+from springtune.mesh import MESH_TYPES
+from springtune.problem.boundary import held, measured, weights
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import (
+    AXIAL,
+    BENDING,
+    BOTH,
+    BOTTOM,
+    FACE,
+    LEFT,
+    LOAD_KINDS,
+    LOADS,
+    RIGHT,
+    SHEAR,
+    TOP,
+    Load,
+    LoadKind,
+)
+from springtune.problem.materials import Material
+from springtune.reference.finite_strain import solve_neo_hooke
+from springtune.reference.small_strain import solve_small_strain
+from springtune.springs import DEFINITIONS
+from springtune.study import load_study
+
+LIFT = LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
+BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
+
+BEAM, FORCE = Beam("100x20", 0.1, 0.02, 1e-3), 50.0
+CORK = Material("cork", 1e9, 0.0)
+EXACT = FORCE * BEAM.height / (CORK.young_modulus * BEAM.thickness * BEAM.length)
+"""Displacement of the top under an even traction without lateral contraction: strain is the same everywhere."""
+
+
+@pytest.fixture
+def lift(monkeypatch):
+    """A load that the package does not have."""
+    monkeypatch.setitem(LOADS, "lift", Load(LIFT, 1.0))
+    monkeypatch.setitem(LOAD_KINDS, "lift", LIFT)
+
+
+def network_displacement(beam, material, force, kind, definition, size, mesh_type="structured"):
+    """Displacement of a load on a linear network [m]."""
+    mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+    springs = DEFINITIONS[definition].springs(mesh, material, beam.thickness)
+    network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
+    found = StaticProblem(network, weights(mesh, kind)).linear(force / springs.reference)
+    return float(np.tensordot(found.displacements, measured(mesh, kind), axes=2))
+
+
+@pytest.mark.parametrize("kind", [AXIAL, BENDING, SHEAR, FACE, LIFT, BUILT_IN])
+def test_properties(kind):
+    assert kind.direct == (kind in (AXIAL, FACE, LIFT, BUILT_IN))
+    assert kind.clamped == (kind in (AXIAL, BENDING, FACE, LIFT))
+    assert kind.mirrored and kind.symmetric == kind.direct
+    assert kind.uniaxial == (kind == AXIAL)
+    assert kind.side_length(BEAM) == (BEAM.height if kind in (AXIAL, BENDING) else BEAM.length)
+    assert str(kind) == kind.name
+
+
+def test_half_models_hold_what_symmetry_asks_for():
+    assert AXIAL.half_held == ((LEFT, BOTH), (BOTTOM, (1,)))
+    assert BENDING.half_held == ((LEFT, BOTH), (BOTTOM, (0,)))
+    assert SHEAR.half_held == ((BOTTOM, BOTH), (TOP, (1,)), (RIGHT, (1,)))
+    assert FACE.half_held == ((BOTTOM, BOTH), (RIGHT, (0,)))
+    assert BUILT_IN.half_held == ((LEFT, BOTH), (RIGHT, (0,)))
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "right", "free"])
+def test_a_new_kind_on_a_network(lift, mesh_type):
+    found = network_displacement(BEAM, CORK, FORCE, LOADS["lift"].kind, "delingette", 2e-3, mesh_type)
+    assert found == pytest.approx(EXACT, rel=1e-6)
+
+
+def test_a_new_kind_in_the_references(lift):
+    kind = LOADS["lift"].kind
+    small = solve_small_strain(BEAM, CORK, FORCE, kind=kind)
+    assert small.displacement == pytest.approx(EXACT, rel=1e-6)
+    assert small.displacement == pytest.approx(small.mean_displacement, rel=1e-12)
+    little = 1e-3 * FORCE
+    finite = solve_neo_hooke(BEAM, CORK, little, kind=kind)
+    assert finite.displacement == pytest.approx(1e-3 * EXACT, rel=1e-4)
+
+
+def test_a_new_kind_through_a_study(lift, tmp_path):
+    study = tmp_path / "study.yaml"
+    study.write_text("""
+title: A sheet that is lifted
+beams: {sheet: {length: 100 mm, height: 20 mm}}
+materials: {cork: {young_modulus: 1 GPa, poisson_ratio: 0}}
+outputs: [size]
+grids:
+  lifted:
+    beam: sheet
+    mesh_type: structured
+    mesh_size: 5 mm
+    material: cork
+    load: lift
+    force: 50 N
+    definition: delingette
+    kinematics: linear
+""")
+    study = load_study(study)
+    plan.write_tasks(study, tmp_path, 1)
+    for name, stage in (("mesh_0", mesh_stage), ("reference_0", reference_stage), ("solve_0", solve_stage)):
+        stage.run(tmp_path / "tasks" / f"{name}.json", tmp_path / "done" / f"{name}.json")
+    tasks = json.loads((tmp_path / "tasks" / "solve_0.json").read_text())
+    (family,) = tasks["families"]
+    (scene,) = family["scenes"]
+    assert scene["kind"] == "lift"
+    (result,) = store.read(f"{tasks['folder']}/{family['name']}.h5", [scene["key"]]).values()
+    assert result["displacement"] == pytest.approx(EXACT, rel=1e-6)
+
+
+def test_a_plate_clamped_at_both_ends():
+    slender, nu = Beam("slender", 0.4, 0.01, 1e-3), 0.0
+    wood = Material("wood", 1e9, nu)
+    bending = FORCE * slender.length**3 / (384 * wood.young_modulus * slender.thickness * slender.height**3 / 12)
+    # Shear stress of a parabola: 6/5 of the mean strain counts; the middle sinks by F L / 8 of it.
+    shear = 1.2 * FORCE * slender.length / (8 * wood.young_modulus / 2 * slender.thickness * slender.height)
+    small = solve_small_strain(slender, wood, -FORCE, kind=BUILT_IN)
+    assert small.displacement == pytest.approx(-(bending + shear), rel=5e-3)
+    assert small.mean_displacement / small.displacement == pytest.approx(8 / 15, rel=1e-2)
+
+
+@pytest.mark.parametrize("material", [CORK, Material("rubber", 1e6, 0.45)], ids=lambda one: one.name)
+def test_supports_of_a_new_kind_are_the_same_everywhere(material):
+    force = -1e-7 * material.young_modulus * BEAM.thickness * BEAM.length
+    small = solve_small_strain(BEAM, material, force, kind=BUILT_IN)
+    finite = solve_neo_hooke(BEAM, material, force, kind=BUILT_IN)
+    assert finite.displacement == pytest.approx(small.displacement, rel=1e-3)
+    assert finite.mean_displacement == pytest.approx(small.mean_displacement, rel=1e-3)
+    network = network_displacement(BEAM, material, force, BUILT_IN, "delingette", 1e-3)
+    assert network == pytest.approx(small.displacement, rel=0.02)
+
+
+def test_a_kind_whose_supports_are_not_symmetric_has_no_half_model():
+    one_sided = LoadKind("one-sided", loaded=TOP, axis=1, held=((LEFT, BOTH),))
+    assert not one_sided.mirrored
+    with pytest.raises(ValueError, match="not symmetric"):
+        solve_small_strain(BEAM, CORK, FORCE, kind=one_sided)
+    # The whole is solved at finite strain: a cantilever under an even load, F L^3 / (8 E I) at its end.
+    beam, force = Beam("slender", 0.4, 0.01, 1e-3), 1e-4
+    found = solve_neo_hooke(beam, CORK, force, kind=one_sided)
+    end = force * beam.length**3 / (8 * CORK.young_modulus * beam.thickness * beam.height**3 / 12)
+    assert found.profile[-1] == pytest.approx(end, rel=5e-3)
