@@ -23,6 +23,7 @@ slow: $(VENV)/.test
 lint: $(VENV)/.test
 	ruff check
 	ruff format --check
+	mypy
 
 # The configuration's schema and manual, from the models that validate it.
 docs: $(VENV)/.run

@@ -86,7 +86,7 @@ def predict(beam, thickness, mesh_type, size, unit, material, young, poisson):
         click.echo(str(getattr(error, "message", error)), err=True)
         raise SystemExit(1) from None
     name = f"{mesh_type} {size}" if made else Path(mesh_type).name
-    click.echo(_prediction(f"{beam.name} mm, {name}: {about}", beam, material, found, known, mesh_type, sizes))
+    click.echo(prediction_text(f"{beam.name} mm, {name}: {about}", beam, material, found, known, mesh_type, sizes))
 
 
 def _quantity(option, text, kind):
@@ -180,8 +180,26 @@ def _asked_mesh(beam, mesh_type, edge, unit):
     return mesh
 
 
-def _prediction(title, beam, material, choices, known, mesh_type, sizes):
-    """Text of a prediction."""
+def prediction_text(title, beam, material, choices, known, mesh_type="", sizes=()):
+    """Text of a prediction.
+
+    Parameters
+    ----------
+    title : str
+    beam : Beam
+    material : Material
+    choices : list of Choice
+    known : dict
+        What `springtune.prediction.references` gave.
+    mesh_type : str, optional
+        Of the meshes of bands.
+    sizes : list of float, optional
+        Mesh sizes that bands are from [m]; none where the mesh itself was solved.
+
+    Returns
+    -------
+    str
+    """
     from .prediction import CASES
 
     modulus = material.young_modulus

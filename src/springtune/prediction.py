@@ -6,7 +6,7 @@ Poisson's ratio of the network. Meshes too large for that have bands from coarse
 """
 
 from dataclasses import dataclass, field, fields, replace
-from math import ceil, inf, nan, sqrt
+from math import inf, nan, sqrt
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from .mechanics.energies import AreaEnergy
 from .mechanics.moduli import PatchTest
 from .mechanics.network import Network
 from .mechanics.statics import StaticProblem
-from .mesh import ISOSCELES, MESH_TYPES, ROW_HEIGHT, row_height
+from .mesh import MESH_TYPES
 from .problem.boundary import held, weights
 from .problem.loads import LOADS
 from .reference.small_strain import ReferenceNotConvergedError, solve_small_strain
@@ -186,25 +186,7 @@ def particles(mesh_type, beam, size):
     -------
     float
     """
-    return (beam.length / size + 1.5) * (beam.height / (_row_height(mesh_type) * size) + 1.0)
-
-
-def _row_height(mesh_type):
-    """Height of a row of cells over the mesh size [1]."""
-    if mesh_type in ISOSCELES:
-        return row_height(1.0, ISOSCELES[mesh_type])
-    return ROW_HEIGHT if mesh_type in ("structured", "free") else 1.0
-
-
-def _stretch(mesh_type, beam, size):
-    """How much wider cells come out than high, over what they should be, as whole numbers of them fit the beam [1]."""
-    shape, whole = _row_height(mesh_type), round
-    if mesh_type == "free":  # its sides are divided, each by itself
-        shape, whole = 1.0, ceil
-    rows = max(1, whole(beam.height / (shape * size)))
-    if mesh_type in ISOSCELES:
-        size = beam.height / (shape * rows)
-    return beam.length / max(1, whole(beam.length / size)) / (beam.height / (shape * rows))
+    return (beam.length / size + 1.5) * (beam.height / (MESH_TYPES[mesh_type].row_height * size) + 1.0)
 
 
 def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
@@ -265,8 +247,8 @@ def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
 
 def _like(mesh_type, beam, size, sizes, sign):
     """Of some mesh sizes that whose cells are next to those of a size in their stretch, on one side of it if any is."""
-    asked = _stretch(mesh_type, beam, size)
-    apart = sign * np.array([_stretch(mesh_type, beam, one) / asked - 1 for one in sizes])
+    stretch, box = MESH_TYPES[mesh_type].stretch, (beam.length, beam.height)
+    apart = sign * np.array([stretch(*box, one) / stretch(*box, size) - 1 for one in sizes])
     return float(sizes[np.argmin(np.where(apart >= -1e-9, np.abs(apart), 1 + np.abs(apart)))])
 
 

@@ -10,6 +10,10 @@ from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
 from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pint
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,11 @@ class Kind:
         Its SI unit, in which numbers are returned.
     example : str
         A quantity to show in messages.
+
+    Examples
+    --------
+    >>> KINDS["stress"].unit
+    'Pa'
     """
 
     name: str
@@ -61,7 +70,7 @@ class UnitError(ValueError):
     """A text that is not a quantity of the wanted kind; the message says why and what to write instead."""
 
 
-def parse(text, kind):
+def parse(text: str, kind: str) -> float:
     """Number in SI units of a quantity.
 
     Parameters
@@ -79,6 +88,7 @@ def parse(text, kind):
     Raises
     ------
     UnitError
+        If the text has no number, no unit, or one of another kind of quantity.
 
     Examples
     --------
@@ -86,6 +96,10 @@ def parse(text, kind):
     0.2
     >>> parse("170e6 N/m", "stiffness")
     170000000.0
+    >>> parse("200 mm", "force")
+    Traceback (most recent call last):
+    ...
+    springtune.units.UnitError: '200 mm' is a length; give a force such as '400 kN'
     """
     wanted = KINDS[kind]
     remedy = f"give a {kind} such as '{wanted.example}'"
@@ -112,31 +126,31 @@ def parse(text, kind):
     return value
 
 
-def _spelling(unit):
+def _spelling(unit: str) -> str:
     """One spelling of a unit: micro and squares are written in several ways."""
     return (
         unicodedata.normalize("NFKC", unit.replace("²", "^2").replace("³", "^3")).replace("μ", "u").replace("**", "^")
     )
 
 
-def _article(kind):
+def _article(kind: str) -> str:
     return f"a {kind}" if kind in KINDS else kind
 
 
-def _measure(unit):
+def _measure(unit: str) -> tuple[str, Decimal] | None:
     """Kind and size in SI units of a unit; None where nobody knows it."""
     return _KNOWN.get(unit) or _ask_pint(unit)
 
 
 @cache
-def _registry():
+def _registry() -> "pint.UnitRegistry[float]":
     import pint  # here, since few studies need it
 
     return pint.UnitRegistry()
 
 
 @cache
-def _ask_pint(unit):
+def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     registry = _registry()
     try:
         asked = registry.parse_units(unit)

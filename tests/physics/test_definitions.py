@@ -9,7 +9,7 @@ from springtune.jobs import atomic, store
 from springtune.kinds.moduli import stage as moduli
 from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
 from springtune.mechanics.network import Network
-from springtune.mesh import ISOSCELES, MESH_TYPES, ROW_HEIGHT, Mesh, lattice, row_height
+from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.adjoint import springs as adjoint
@@ -23,10 +23,10 @@ EVERY_RATIO = (0.0, 0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5)
 def patch(mesh_type, length=0.1):
     """Mesh of ten cells over the height: of the exact lattice for rows of triangles, on which closed forms hold."""
     size = HEIGHT / (10 * ROW_HEIGHT) if mesh_type == "structured" else SIZE
-    rows = {"structured": ROW_HEIGHT * size} | {name: row_height(size, nu) for name, nu in ISOSCELES.items()}
-    if mesh_type not in rows:
+    if mesh_type != "structured" and not mesh_type.startswith("isosceles"):
         return MESH_TYPES[mesh_type](length, HEIGHT, size)
-    return lattice(round(length / size), round(HEIGHT / rows[mesh_type]), size, rows[mesh_type])
+    row_height = MESH_TYPES[mesh_type].row_height * size
+    return lattice(round(length / size), round(HEIGHT / row_height), size, row_height)
 
 
 def errors(name, mesh, nu):

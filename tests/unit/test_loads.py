@@ -7,6 +7,7 @@ import pytest
 
 from springtune.campaign import plan
 from springtune.jobs import store
+from springtune.kinds import load_study
 from springtune.kinds.scenes import mesh as mesh_stage
 from springtune.kinds.scenes import reference as reference_stage
 from springtune.kinds.scenes import solve as solve_stage
@@ -34,7 +35,6 @@ from springtune.problem.materials import Material
 from springtune.reference.finite_strain import solve_neo_hooke
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs import DEFINITIONS
-from springtune.study import load_study
 
 LIFT = LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
 BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)

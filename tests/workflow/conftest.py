@@ -30,7 +30,7 @@ class Run:
         ]
         command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default", "--cores", "2"]
         command += ["--configfile", self.folder / config, *arguments]
-        done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 
     def write(self, name, text):

@@ -19,7 +19,7 @@ for stage in plan.stages():
             tasks=RESULTS / "tasks" / f"{stage.name}_{{bundle}}.json",
             same=[RESULTS / "done" / f"{other}_{{bundle}}.json" for other in stage.same],
             every=[path for other in stage.every for path in done(other)],
-            code=modules(stage.module, definitions=stage.definitions),
+            code=modules(stage.module, definitions=stage.definitions, mesh_types=stage.mesh_types),
         output:
             RESULTS / "done" / f"{stage.name}_{{bundle}}.json",
         wildcard_constraints:

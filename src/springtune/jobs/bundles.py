@@ -7,9 +7,14 @@ shared out.
 """
 
 from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from math import ceil
+from pathlib import Path
 
 from . import atomic
+
+Usual = Mapping[str, tuple[float, float]]
+"""Seconds of a task by its name: in any case, and per unit."""
 
 START_UP = 0.25
 """Seconds of imports of a job before any was measured."""
@@ -31,12 +36,17 @@ class Costs:
     ----------
     path : Path
         File of `remember`; without it, costs are the usual ones.
-    usual : dict of str to tuple
+    usual : dict of str to tuple of float
         Seconds of a task, in any case and per unit, before any was measured, by name; what a machine measures
         multiplies them.
+
+    Examples
+    --------
+    >>> Costs(Path("no such file"), {"linear": (5e-4, 1e-6)}).of("linear", 1000)
+    0.0015
     """
 
-    def __init__(self, path, usual):
+    def __init__(self, path: Path, usual: Usual) -> None:
         self.usual = usual
         known = atomic.read_json(path) if path.exists() else {}
         self.ratios = {
@@ -44,17 +54,30 @@ class Costs:
         }
         self.start_up = known.get("start_up", START_UP) + SPAWNED
 
-    def of(self, kind, units=0.0):
-        """Seconds of a task, none of one of no known cost."""
+    def of(self, kind: str, units: float = 0.0) -> float:
+        """Seconds of a task.
+
+        Parameters
+        ----------
+        kind : str
+            Its name.
+        units : float, optional
+            Its particles, or what else its cost grows with.
+
+        Returns
+        -------
+        float
+            None of a task of no known cost.
+        """
         return self.ratios.get(kind, 1.0) * _usual(self.usual, kind, 1, units) if kind in self.usual else 0.0
 
 
-def _usual(usual, kind, count, units):
+def _usual(usual: Usual, kind: str, count: float, units: float) -> float:
     always, each = usual[kind]
     return always * count + each * units
 
 
-def remember(path, done, usual):
+def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
     """Add what the jobs of a run did to what is known of the machine.
 
     Parameters
@@ -69,7 +92,7 @@ def remember(path, done, usual):
     known = atomic.read_json(path) if path.exists() else {"kinds": {}}
     since = path.stat().st_mtime if path.exists() else 0.0
     notes = [atomic.read_json(file) for file in done if file.stat().st_mtime > since]
-    sums = defaultdict(lambda: [0.0, 0.0])
+    sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
     for note in notes:
         for kind, (count, units, seconds) in note.get("work", {}).items():
             if kind in usual:
@@ -85,7 +108,9 @@ def remember(path, done, usual):
         atomic.write_json(path, known)
 
 
-def share_out(costs, cores, start_up, before):
+def share_out(
+    costs: Mapping[str, float], cores: int, start_up: float, before: Mapping[str, list[str]]
+) -> dict[str, list[str]]:
     """Bundles of about equal cost.
 
     Parameters
@@ -103,6 +128,14 @@ def share_out(costs, cores, start_up, before):
     -------
     dict of str to list of str
         Names of the tasks of each bundle by its label.
+
+    Examples
+    --------
+    >>> bundles = share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0}, 2, 0.5, {})
+    >>> bundles
+    {'0': ['fine'], '1': ['middle', 'coarse']}
+    >>> share_out({"coarse": 1.0, "fine": 4.0, "new": 3.0}, 2, 0.5, bundles)
+    {'0': ['fine'], '1': ['coarse', 'new']}
     """
     bundles = {label: [name for name in names if name in costs] for label, names in before.items()}
     bundles = {label: names for label, names in bundles.items() if names}
@@ -126,7 +159,7 @@ def share_out(costs, cores, start_up, before):
     return {label: bundles[label] for label in sorted(bundles, key=int)}
 
 
-def _number(seconds, size, start_up, cores, most):
+def _number(seconds: float, size: float, start_up: float, cores: int, most: int) -> int:
     """Number of bundles for so many seconds of work: as many on each core, if there are more than cores."""
     count = round(seconds / size)
     if count > cores:

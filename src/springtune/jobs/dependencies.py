@@ -6,60 +6,113 @@ again after an edit of a plot. So each stage depends on the modules that it impo
 
 import ast
 import hashlib
+import inspect
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
 
+from ..mesh import MESH_TYPES
+from ..registry import Declared
 from ..springs import DEFINITIONS
 
 PACKAGE = Path(__file__).parents[1]
 
 
-def modules(*names, definitions=False):
-    """Files of the package that modules run on: their own and all that they import.
+def modules(*names: str, definitions: bool = False, mesh_types: bool = False) -> tuple[str, ...]:
+    """Files that modules run on: their own, all that they import and what they may choose by name.
 
     Parameters
     ----------
     *names : str
         Modules, from the package on, such as ``"campaign.collect"``.
-    definitions : bool, optional
-        Whether they run definitions by name: which modules those are no import in them says.
+    definitions, mesh_types : bool, optional
+        Whether they run definitions and make meshes by name: which modules those are no import in them says.
 
     Returns
     -------
     tuple of str
         Paths, sorted.
+
+    Examples
+    --------
+    >>> [Path(file).name for file in modules("jobs.atomic")]
+    ['atomic.py']
     """
     found = {path for name in names for path in _closure(_place(name))}
-    for name in DEFINITIONS if definitions else ():
-        found |= set(_closure(_definition_file(name)))
+    declared: list[Declared] = [*DEFINITIONS.values()] if definitions else []
+    declared += MESH_TYPES.values() if mesh_types else ()
+    for file in {one.file for one in declared if one.file}:
+        found |= set(_closure(file))
     return tuple(sorted(found))
 
 
 @cache
-def digest(stage):
-    """Hash of the source of a stage's modules, definitions left out."""
-    return _hash(_closure(_place(stage)))
+def digest(stage: str) -> str:
+    """Hash of the source of the files that a stage runs on, without definitions and mesh types that it may choose.
+
+    Parameters
+    ----------
+    stage : str
+        Its module, as `modules` takes it.
+
+    Returns
+    -------
+    str
+    """
+    return _hash(modules(stage))
+
+
+def definition_digest(name: str) -> str:
+    """Hash of the source of a definition and of what it imports of this package, or from beside it.
+
+    Parameters
+    ----------
+    name : str
+        Key of `springtune.springs.DEFINITIONS`.
+
+    Returns
+    -------
+    str
+    """
+    return _declared_digest(DEFINITIONS[name])
+
+
+def mesh_type_digest(name: str) -> str:
+    """Hash of the source of a mesh type and of what it imports, as `definition_digest`.
+
+    Parameters
+    ----------
+    name : str
+        Key of `springtune.mesh.MESH_TYPES`.
+
+    Returns
+    -------
+    str
+    """
+    return _declared_digest(MESH_TYPES[name])
+
+
+def _declared_digest(one: Declared) -> str:
+    if one.file is None:  # of a notebook: the function is all that is known
+        return hashlib.sha256(inspect.getsource(one.function).encode()).hexdigest()
+    return _file_digest(one.file)
 
 
 @cache
-def definition_digest(name):
-    """Hash of the source of a definition and of what it imports."""
-    return _hash(_closure(_definition_file(name)))
+def _file_digest(path: Path) -> str:
+    return _hash(_closure(path))
 
 
-def _place(stage):
+def _place(stage: str) -> str:
     return stage.replace(".", "/") + ".py"
 
 
-def _definition_file(name):
-    return f"springs/{DEFINITIONS[name].place.partition(':')[0]}.py"
-
-
 @cache
-def _closure(start):
-    """A file of the package and those that it imports, directly or not: paths, sorted."""
-    found, waiting = set(), {PACKAGE / start}
+def _closure(start: str | Path) -> tuple[str, ...]:
+    """A file, from the package on, and those that it imports, directly or not: paths, sorted."""
+    found: set[Path] = set()
+    waiting = {PACKAGE / start}
     while waiting:
         path = waiting.pop()
         found.add(path)
@@ -67,7 +120,7 @@ def _closure(start):
     return tuple(sorted(str(path) for path in found))
 
 
-def _hash(paths):
+def _hash(paths: Iterable[str]) -> str:
     total = hashlib.sha256()
     for path in paths:
         total.update(_source(path))
@@ -75,11 +128,11 @@ def _hash(paths):
 
 
 @cache
-def _source(path):
+def _source(path: str | Path) -> bytes:
     return Path(path).read_bytes()
 
 
-def _executed(tree):
+def _executed(tree: ast.AST) -> Iterator[ast.AST]:
     """Nodes of a module, without what type checkers alone read."""
     waiting = [tree]
     while waiting:
@@ -90,21 +143,25 @@ def _executed(tree):
 
 
 @cache
-def _imported(path):
-    relative = path.relative_to(PACKAGE.parent).with_suffix("")
-    package = ".".join(relative.parts[:-1])
-    names = set()
+def _imported(path: Path) -> tuple[Path, ...]:
+    inside = path.is_relative_to(PACKAGE)
+    package = ".".join(path.parent.relative_to(PACKAGE.parent).parts) if inside else ""
+    names: set[str] = set()
     for node in _executed(ast.parse(_source(path))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            base = resolve_name("." * node.level + (node.module or ""), package) if node.level else node.module
+            relative = node.level and inside
+            base = resolve_name("." * node.level + (node.module or ""), package) if relative else node.module or ""
             names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
-    files = []
+    files: list[Path] = []
     for name in names:
-        parts = name.split(".")
-        if parts[0] != PACKAGE.name:
+        parts = name.strip(".").split(".")
+        if parts[0] == PACKAGE.name:
+            place = PACKAGE.joinpath(*parts[1:])
+        elif not inside:  # a module beside it
+            place = path.parent.joinpath(*parts)
+        else:
             continue
-        place = PACKAGE.joinpath(*parts[1:])
         files += [file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()]
     return tuple(files)

@@ -5,12 +5,29 @@ import json
 import os
 from dataclasses import asdict
 from functools import cache
+from typing import Any
 
-from .dependencies import digest
+from ..mesh import MESH_TYPES
+from .dependencies import digest, mesh_type_digest
 
 
-def hash_of(*parts):
-    """Hash of what a result depends on: nested dicts, lists, texts and numbers."""
+def hash_of(*parts: Any) -> str:
+    """Hash of what a result depends on.
+
+    Parameters
+    ----------
+    *parts : object
+        Nested dicts, lists, texts and numbers.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
+    True
+    """
     text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:24]
 
@@ -30,6 +47,14 @@ def installed(package):
 def stage_key(module, *packages):
     """What the results of a stage depend on besides their parameters: its modules and these packages."""
     return [digest(module), *(f"{package} {installed(package)}" for package in packages)]
+
+
+@cache
+def mesh_type_key(name):
+    """What meshes of a type depend on besides their parameters; nothing that is known of meshes from files."""
+    if name not in MESH_TYPES:
+        return []
+    return [mesh_type_digest(name), *(f"{package} {installed(package)}" for package in MESH_TYPES[name].packages)]
 
 
 @cache

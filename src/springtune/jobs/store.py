@@ -7,7 +7,9 @@ stays, so going back to it computes nothing. Nothing but the dataset is meant fo
 
 import json
 import os
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,8 +18,17 @@ SCALARS = "scalars"
 """Dataset of what is not an array."""
 
 
-def stored(path):
-    """Keys of the results in a file; an unreadable file holds none."""
+def stored(path: str | Path) -> set[str]:
+    """Keys of the results in a file; an unreadable file holds none.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    set of str
+    """
     try:
         with h5py.File(path) as file:
             return set(_scalars(file))
@@ -25,11 +36,12 @@ def stored(path):
         return set()
 
 
-def _scalars(file):
-    return json.loads(file[SCALARS][()])
+def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
+    scalars: dict[str, dict[str, Any]] = json.loads(file[SCALARS][()])
+    return scalars
 
 
-def read(path, names, fields=()):
+def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """Read results.
 
     Parameters
@@ -54,21 +66,30 @@ def read(path, names, fields=()):
     return results
 
 
-def add(path, results):
+def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     """Add results to a file, which changes whole or not at all.
 
     Parameters
     ----------
     path : str or Path
     results : dict of str to dict
-        Results by key; arrays become datasets, all else attributes.
+        Results by key; arrays become datasets, all else one JSON text.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "results.h5"
+    ...     add(path, {"one": {"displacement": 1.25e-3, "field": np.arange(3.0)}})
+    ...     read(path, stored(path), ["field"])
+    {'one': {'displacement': 0.00125, 'field': array([0., 1., 2.])}}
     """
     if not results:
         return
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(path.name + ".unfinished")
-    scalars = {}
+    scalars: dict[str, dict[str, Any]] = {}
     with h5py.File(unfinished, "w") as file:
         try:
             with h5py.File(path) as before:

@@ -68,8 +68,8 @@ class Stage:
         Stages that it waits for: for the job of the same bundle, and for all jobs.
     alone : bool
         Whether a job has a single member and the machine to itself, since other jobs would be in its seconds.
-    definitions : bool
-        Whether it runs definitions by name.
+    definitions, mesh_types : bool
+        Whether it runs definitions and makes meshes by name.
     """
 
     name: str
@@ -83,6 +83,7 @@ class Stage:
     every: tuple = ()
     alone: bool = False
     definitions: bool = False
+    mesh_types: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ DIAGONALS = {3: (), 4: ((0, 2), (1, 3))}
 """Corners that are joined across a cell."""
 
 
-def no_cells(corners):
+def no_cells(corners: int) -> np.ndarray:
     """Corner indices of no cells, shape (0, corners)."""
     return np.zeros((0, corners), dtype=np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     r"""A conforming mesh of counter-clockwise cells; each edge carries one spring.
 
@@ -36,6 +36,15 @@ class Mesh:
         Corner indices, counter-clockwise.
     quads : ndarray of int, shape (n_quads, 4), optional
         Corner indices, counter-clockwise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> mesh.edges.tolist()
+    [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
+    >>> mesh.area
+    1.0
     """
 
     points: np.ndarray
@@ -43,17 +52,17 @@ class Mesh:
     quads: np.ndarray = field(default_factory=lambda: no_cells(4))
 
     @property
-    def cells(self):
+    def cells(self) -> dict[int, np.ndarray]:
         """Corner indices of the cells by number of corners, those kinds that the mesh has."""
         return {corners.shape[1]: corners for corners in (self.triangles, self.quads) if len(corners)}
 
     @cached_property
-    def _edges(self):
-        pairs = [
+    def _edges(self) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
+        joins = [
             corners[:, joined] for count, corners in self.cells.items() for joined in SIDES[count] + DIAGONALS[count]
         ]
-        sizes = np.cumsum([0, *map(len, pairs)])
-        pairs = np.sort(np.concatenate(pairs), axis=1)
+        sizes = np.cumsum([0, *map(len, joins)])
+        pairs = np.sort(np.concatenate(joins), axis=1)
         # One integer per edge sorts ten times faster than rows do.
         codes, places, counts = np.unique(
             pairs[:, 0] * len(self.points) + pairs[:, 1], return_inverse=True, return_counts=True
@@ -66,22 +75,22 @@ class Mesh:
         return edges, counts, of_cells
 
     @property
-    def edges(self):
+    def edges(self) -> np.ndarray:
         """Edges, shape (n_edges, 2), sorted, each once."""
         return self._edges[0]
 
     @property
-    def cells_per_edge(self):
+    def cells_per_edge(self) -> np.ndarray:
         """Number of cells at each edge, shape (n_edges,): 2 inside, 1 on the outline and on diagonals."""
         return self._edges[1]
 
     @property
-    def cell_edges(self):
+    def cell_edges(self) -> dict[int, np.ndarray]:
         """Edges of each cell by number of corners: sides as in `SIDES`, then diagonals, shape (n_cells, 3 or 6)."""
         return self._edges[2]
 
     @cached_property
-    def on_outline(self):
+    def on_outline(self) -> np.ndarray:
         """Whether each edge is a side of the outline, shape (n_edges,)."""
         outline = self.cells_per_edge == 1
         if len(self.quads):
@@ -89,17 +98,17 @@ class Mesh:
         return outline
 
     @cached_property
-    def edge_lengths(self):
+    def edge_lengths(self) -> np.ndarray:
         """Length of each edge [m], shape (n_edges,)."""
         ends = self.points[self.edges]
         return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
     @cached_property
-    def area(self):
+    def area(self) -> float:
         """Area of all cells [m2]."""
         return float(sum(signed_areas(self.points, corners).sum() for corners in self.cells.values()))
 
-    def sum_to_edges(self, values):
+    def sum_to_edges(self, values: dict[int, np.ndarray]) -> np.ndarray:
         """Sum of values given on the edges of each cell.
 
         Parameters
@@ -117,21 +126,21 @@ class Mesh:
         return total
 
     @cached_property
-    def particle_areas(self):
+    def particle_areas(self) -> np.ndarray:
         """Share of each particle in the area of its cells [m2], shape (n_points,)."""
         shares = np.zeros(len(self.points))
         for count, corners in self.cells.items():
             np.add.at(shares, corners, signed_areas(self.points, corners)[:, None] / count)
         return shares
 
-    def side_shares(self, edges, axis):
+    def side_shares(self, edges: np.ndarray, axis: int) -> np.ndarray:
         """Share of each particle in the extent of edges along an axis [m], shape (n_points,): half of each edge's."""
         shares = np.zeros(len(self.points))
         extent = np.abs(self.points[edges[:, 1], axis] - self.points[edges[:, 0], axis])
         np.add.at(shares, edges, 0.5 * extent[:, None])
         return shares
 
-    def outline_edges(self, coordinate, value):
+    def outline_edges(self, coordinate: int, value: float) -> np.ndarray:
         """Outline edges that lie on a line ``x = value`` or ``y = value``.
 
         Parameters
@@ -149,7 +158,7 @@ class Mesh:
         tolerance = 1e-9 * np.ptp(self.points[:, coordinate])
         return outline[(np.abs(self.points[outline, coordinate] - value) <= tolerance).all(axis=1)]
 
-    def inverted(self, points):
+    def inverted(self, points: np.ndarray) -> bool:
         """Whether any corner of any cell is turned inside out at other positions of the particles [m]."""
         for count, corners in self.cells.items():
             for i in range(1 if count == 3 else count):
@@ -158,14 +167,14 @@ class Mesh:
         return False
 
 
-def signed_areas(points, corners):
+def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Signed area of each cell [m2], shape (n_cells,); negative where it is inverted."""
     # About the first corner: coordinates far from the origin would cost digits.
     x, y = (points[corners] - points[corners[:, :1]]).transpose(2, 0, 1)
     return 0.5 * sum(x[:, i] * y[:, i + 1] - x[:, i + 1] * y[:, i] for i in range(1, corners.shape[1] - 1))
 
 
-def corner_angles(points, corners):
+def corner_angles(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Angle at each corner of each cell [rad], shape (n_cells, n_corners)."""
     here = points[corners]
     first, second = np.roll(here, -1, axis=1) - here, np.roll(here, 1, axis=1) - here
@@ -173,7 +182,7 @@ def corner_angles(points, corners):
     return np.arctan2(np.abs(cross), (first * second).sum(axis=2))
 
 
-def quality(mesh):
+def quality(mesh: Mesh) -> dict[str, float]:
     """Quality figures of a mesh.
 
     Parameters

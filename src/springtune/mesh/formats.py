@@ -1,6 +1,9 @@
 """Mesh files: VTU, as meshio and ParaView open them, and whatever else meshio reads."""
 
 import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +23,7 @@ class MeshError(ValueError):
     """A mesh that cannot be used; the message says why and what to do."""
 
 
-def write_mesh(path, mesh):
+def write_mesh(path: str | Path, mesh: Mesh) -> None:
     """Write a mesh; the file appears whole or not at all.
 
     Parameters
@@ -38,7 +41,7 @@ def write_mesh(path, mesh):
     os.replace(unfinished, path)
 
 
-def read_mesh(path, unit=1.0):
+def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     """Read a mesh of any format that meshio knows.
 
     Particles that belong to no cell are left out, clockwise cells are turned.
@@ -67,8 +70,20 @@ def read_mesh(path, unit=1.0):
         raise MeshError(
             f"{path}: meshio cannot read it: {error or 'unknown format'}; convert it to .vtu or .msh"
         ) from None
-    points = unit * np.asarray(content.points, dtype=float)
-    cells = {}
+    cells = _read_cells(path, content)
+    used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
+    points = _read_points(path, unit * np.asarray(content.points, dtype=float), used)
+    start = 0
+    for count, corners in cells.items():
+        corners = numbers[start : start + corners.size].reshape(corners.shape)
+        start += corners.size
+        cells[count] = _counter_clockwise(path, points, corners)
+    return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4)))
+
+
+def _read_cells(path: str | Path, content: Any) -> dict[int, np.ndarray]:
+    """Corner indices of what meshio read, by number of corners; refused where cells are of other types."""
+    cells: dict[int, list[np.ndarray]] = {}
     for block in content.cells:
         if block.type in CELLS:
             cells.setdefault(CELLS[block.type], []).append(block.data)
@@ -76,8 +91,11 @@ def read_mesh(path, unit=1.0):
             raise MeshError(f"{path}: has cells '{block.type}'; write linear triangles and quadrilaterals only")
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
-    cells = {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
-    used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
+    return {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
+
+
+def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Coordinates in the plane of the points that cells have, `used`, sorted; refused where these are not there."""
     for number in used[[0, -1]]:
         if not 0 <= number < len(points):
             raise MeshError(f"{path}: a cell has point {number}, and points are 0 to {len(points) - 1}; renumber them")
@@ -90,25 +108,22 @@ def read_mesh(path, unit=1.0):
         )
     if points.shape[1] > 2 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points[:, :2], axis=0).max():
         raise MeshError(f"{path}: points leave the plane of x and y; give a plane mesh")
-    points = points[:, :2].copy()
-    start = 0
-    for count, corners in cells.items():
-        corners = numbers[start : start + corners.size].reshape(corners.shape)
-        start += corners.size
-        areas = signed_areas(points, corners)
-        flat = np.abs(areas) <= 1e-12 * np.abs(areas).max()
-        if flat.any():
-            raise MeshError(
-                f"{path}: cells with no area: {flat.sum()}, the first one at {_place(points[corners[flat][0]])}; "
-                "remove them"
-            )
-        clockwise = areas < 0
-        corners[clockwise] = corners[clockwise][:, ::-1]
-        cells[count] = corners
-    return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4)))
+    return points[:, :2].copy()
 
 
-def read_beam_mesh(path, length, height, unit=1.0):
+def _counter_clockwise(path: str | Path, points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Corner indices of cells, clockwise ones turned; refused where cells have no area."""
+    areas = signed_areas(points, corners)
+    flat = np.abs(areas) <= 1e-12 * np.abs(areas).max()
+    if flat.any():
+        first = _place(points[corners[flat][0]])
+        raise MeshError(f"{path}: cells with no area: {flat.sum()}, the first one at {first}; remove them")
+    clockwise = areas < 0
+    corners[clockwise] = corners[clockwise][:, ::-1]
+    return corners
+
+
+def read_beam_mesh(path: str | Path, length: float, height: float, unit: float = 1.0) -> Mesh:
     """Read a mesh that is to fill a box, and put its lower left corner at the origin.
 
     Parameters
@@ -145,7 +160,7 @@ def read_beam_mesh(path, length, height, unit=1.0):
     return mesh
 
 
-def _fault(mesh, box):
+def _fault(mesh: Mesh, box: np.ndarray) -> str:
     """Why a mesh does not fill a box exactly once, and what to do about it; empty where it does.
 
     All cells are convex and counter-clockwise, no two lie on the same side of an edge, and the edges that have one cell
@@ -185,7 +200,7 @@ def _fault(mesh, box):
     return ""
 
 
-def _opening(points, edges):
+def _opening(points: np.ndarray, edges: np.ndarray) -> str:
     """What is wrong where edges inside a box have one cell only, and what to do about it."""
     from scipy.spatial import cKDTree  # here, since a good mesh needs none
 
@@ -195,8 +210,8 @@ def _opening(points, edges):
     pairs = ends[cKDTree(points[ends]).query_pairs(small, output_type="ndarray")]
     if len(pairs):
         one, other = points[pairs[np.argmin(pairs.min(axis=1))]]
-        apart = np.linalg.norm(other - one)
-        apart = f", {1e3 * apart:.3g} mm apart" if apart else ""
+        distance = np.linalg.norm(other - one)
+        apart = f", {1e3 * distance:.3g} mm apart" if distance else ""
         return f"two points at {_place(one)}{apart}, do not join their cells ({count}); merge duplicate points"
     start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
     squares = (along**2).sum(axis=1)
@@ -212,11 +227,11 @@ def _opening(points, edges):
     return f"{count}, the first one {_edge(points, edges[0])}; close the hole there"
 
 
-def _place(points):
+def _place(points: np.ndarray) -> str:
     """Middle of one or more points, in words."""
     return "({:.6g}, {:.6g}) mm".format(*(1e3 * points.reshape(-1, 2).mean(axis=0)))
 
 
-def _edge(points, ends):
+def _edge(points: np.ndarray, ends: Sequence[int] | np.ndarray) -> str:
     """Both ends of an edge, in words."""
     return f"from {_place(points[ends[0]])} to {_place(points[ends[1]])}"

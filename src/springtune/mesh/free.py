@@ -1,12 +1,22 @@
 """Delaunay triangulation inside an outline of imposed edge size: the mesh type ``free``."""
 
+import math
+
 import numpy as np
 
 from .cells import Mesh, signed_areas
+from .rows import ROW_HEIGHT
+from .types import mesh_type
 
 
-def free(length, height, size):
-    """Mesh a box by netgen's advancing front; the triangulation it returns is Delaunay.
+def _stretch(length: float, height: float, size: float) -> float:
+    """As of `MeshType.stretch`: the sides are divided, each by itself."""
+    return length / max(1, math.ceil(length / size)) / (height / max(1, math.ceil(height / size)))
+
+
+@mesh_type("free", order=20, row_height=ROW_HEIGHT, packages=("netgen-mesher",), own_stretch=_stretch)
+def free(length: float, height: float, size: float) -> Mesh:
+    """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
 
     The sides are divided into equal edges no longer than `size`; inside, netgen places points so that triangles come
     out near-equilateral. Same input, same mesh.

@@ -5,13 +5,15 @@ import math
 import numpy as np
 
 from .cells import Mesh
+from .types import mesh_type, nearest_counts
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""
 
 
-def structured(length, height, size):
-    r"""Mesh a box with rows of near-equilateral triangles along x.
+@mesh_type("structured", order=10, row_height=ROW_HEIGHT)
+def structured(length: float, height: float, size: float) -> Mesh:
+    r"""Rows of near-equilateral triangles along x, fitted to the box.
 
     The number of cells along x and of rows are the whole numbers nearest to the exact lattice; both directions are
     then stretched to fit. Every other line of points is shifted by half a cell and closed with a point on either end,
@@ -34,11 +36,11 @@ def structured(length, height, size):
     -------
     Mesh
     """
-    return _fitted(length, height, max(1, round(length / size)), max(1, round(height / (ROW_HEIGHT * size))))
+    return _fitted(length, height, *nearest_counts(length, height, size, ROW_HEIGHT))
 
 
-def isosceles(length, height, size, poisson_ratio):
-    """Mesh a box with rows of isosceles triangles whose shape sets Poisson's ratio under load along x.
+def isosceles(length: float, height: float, size: float, poisson_ratio: float) -> Mesh:
+    """Rows of isosceles triangles whose shape sets Poisson's ratio under load along x.
 
     Only the row springs of such a network carry a uniaxial load along the rows, so ``nu = (a / 2h)^2`` whatever the
     stiffness is: rows of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper.
@@ -57,23 +59,50 @@ def isosceles(length, height, size, poisson_ratio):
     Mesh
         As `structured`; the number of rows is the nearest whole one, that of cells along x keeps the shape best.
     """
+    return _fitted(length, height, *_isosceles_counts(length, height, size, poisson_ratio))
+
+
+def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: float) -> tuple[int, int]:
     rows = max(1, round(height / row_height(size, poisson_ratio)))
     size = 2 * math.sqrt(poisson_ratio) * height / rows
-    return _fitted(length, height, max(1, round(length / size)), rows)
+    return max(1, round(length / size)), rows
 
 
-def row_height(size, poisson_ratio):
-    """Height of a row of isosceles triangles of base `size` that sets Poisson's ratio [m]."""
+def row_height(size: float, poisson_ratio: float) -> float:
+    """Height of a row of isosceles triangles of base `size` that sets Poisson's ratio [m].
+
+    Examples
+    --------
+    >>> row_height(2e-3, 0.25)
+    0.002
+    """
     return size / (2 * math.sqrt(poisson_ratio))
 
 
-def _fitted(length, height, cells, rows):
+def _declare_isosceles(order: float, poisson_ratio: float) -> None:
+    def made(length: float, height: float, size: float) -> Mesh:
+        return isosceles(length, height, size, poisson_ratio)
+
+    def stretch(length: float, height: float, size: float) -> float:
+        cells, rows = _isosceles_counts(length, height, size, poisson_ratio)
+        return length / cells / (height / (shape * rows))
+
+    shape = row_height(1.0, poisson_ratio)
+    made.__doc__ = f"Rows of triangles along x whose shape sets a Poisson's ratio of {poisson_ratio:g}."
+    mesh_type(f"isosceles-{poisson_ratio:g}", order=order, row_height=shape, own_stretch=stretch)(made)
+
+
+_declare_isosceles(order=60, poisson_ratio=0.3)
+_declare_isosceles(order=70, poisson_ratio=0.5)
+
+
+def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
     straight = np.linspace(0.0, length, cells + 1)
     shifted = np.concatenate([[0.0], 0.5 * (straight[:-1] + straight[1:]), [length]])
     return _join([straight if row % 2 == 0 else shifted for row in range(rows + 1)], np.linspace(0.0, height, rows + 1))
 
 
-def lattice(cells, rows, size=1.0, row_height=None):
+def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None = None) -> Mesh:
     """Exact lattice with staggered ends: every particle inside sees the same neighbours.
 
     Each line of points has the same length, every other one shifted by half an edge; no triangle is cut. It is what
@@ -97,7 +126,7 @@ def lattice(cells, rows, size=1.0, row_height=None):
     return _join([line + 0.5 * size * (row % 2) for row in range(rows + 1)], row_height * np.arange(rows + 1.0))
 
 
-def _join(lines, heights):
+def _join(lines: list[np.ndarray], heights: np.ndarray) -> Mesh:
     """Join lines of points, each sorted along x, by triangles: always the next point that is further left."""
     starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
     points = np.concatenate([np.stack([line, np.full(len(line), y)], axis=1) for line, y in zip(lines, heights)])

@@ -3,10 +3,12 @@
 import numpy as np
 
 from .cells import Mesh, no_cells
+from .types import mesh_type, nearest_counts
 
 
-def right(length, height, size):
-    r"""Mesh a box with squares cut by parallel diagonals.
+@mesh_type("right", order=30)
+def right(length: float, height: float, size: float) -> Mesh:
+    r"""Squares cut by parallel diagonals.
 
     ::
 
@@ -31,8 +33,11 @@ def right(length, height, size):
     return Mesh(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
 
 
-def alternating(length, height, size):
-    r"""Mesh a box with squares whose diagonals alternate like a chequerboard; parameters as `right`.
+@mesh_type("alternating", order=40)
+def alternating(length: float, height: float, size: float) -> Mesh:
+    r"""Squares whose diagonals alternate like a chequerboard.
+
+    Parameters and returns as of `right`.
 
     ::
 
@@ -43,15 +48,18 @@ def alternating(length, height, size):
         +---+---+
     """
     points, a, b, c, d = _grid(length, height, size)
-    columns, rows = _counts(length, height, size)
+    columns, rows = nearest_counts(length, height, size)
     falling = np.add.outer(np.arange(columns), np.arange(rows)).ravel() % 2 == 1
     first = np.where(falling[:, None], np.stack([a, b, d], axis=1), np.stack([a, b, c], axis=1))
     second = np.where(falling[:, None], np.stack([b, c, d], axis=1), np.stack([a, c, d], axis=1))
     return Mesh(points, np.concatenate([first, second]))
 
 
-def braced(length, height, size):
-    r"""Mesh a box with squares that have both diagonals; parameters as `right`.
+@mesh_type("braced", order=50, corners=4)
+def braced(length: float, height: float, size: float) -> Mesh:
+    r"""Squares with both diagonals.
+
+    Parameters and returns as of `right`.
 
     ::
 
@@ -63,13 +71,9 @@ def braced(length, height, size):
     return Mesh(points, no_cells(3), np.stack(corners, axis=1))
 
 
-def _counts(length, height, size):
-    return max(1, round(length / size)), max(1, round(height / size))
-
-
-def _grid(length, height, size):
+def _grid(length: float, height: float, size: float) -> tuple[np.ndarray, ...]:
     """Points column by column, and the four corners of each square, counter-clockwise from the lower left."""
-    columns, rows = _counts(length, height, size)
+    columns, rows = nearest_counts(length, height, size)
     x, y = np.meshgrid(np.linspace(0, length, columns + 1), np.linspace(0, height, rows + 1), indexing="ij")
     a = np.add.outer(np.arange(columns) * (rows + 1), np.arange(rows)).ravel()
     b = a + rows + 1

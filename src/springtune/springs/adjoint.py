@@ -8,19 +8,23 @@ are reached through uneven motion of the particles, at the price of springs of d
 import math
 
 import numpy as np
-from scipy.optimize import minimize
 
-from .base import Springs
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
 from .identification import SPAN, Misfit, patch_cases
 
 MAX_EVALUATIONS = 400
 
 
-def springs(mesh, material, thickness):
+@definition("adjoint", order=170)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.
     """
+    from scipy.optimize import minimize  # here: see `springtune.springs`
+
     misfit = Misfit(mesh, material, thickness, patch_cases(mesh, material, thickness))
     limit = math.log(SPAN)
     found = minimize(

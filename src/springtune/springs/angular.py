@@ -16,17 +16,20 @@ import math
 
 import numpy as np
 
-from ..mechanics.energies import AngleEnergy
-from ..mesh import signed_areas
-from .base import Springs, triangles_only
+from ..mesh import Mesh, signed_areas
+from ..problem.materials import Material
+from .base import Springs, definition, triangles_only
 from .lattice import half_weight
 
 
-def springs(mesh, material, thickness):
+@definition("angular", order=220, cells=(3,))
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs for the bulk modulus and angular springs for the rest (Keating): any nu on lattices, no tuning.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
     """
+    from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`
+
     triangles_only(mesh)
     nu = material.poisson_ratio
     reference = material.young_modulus * thickness / (math.sqrt(3) * (1 - nu))

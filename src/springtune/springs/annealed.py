@@ -5,17 +5,22 @@ probability. The search is scipy's generalised annealing without its local searc
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import dual_annealing
 
-from .base import Springs
-from .identification import SPAN, Misfit
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
+from .identification import SPAN, Case, Misfit
 
 MAX_EVALUATIONS = 1000
 
 
-def springs(mesh, material, thickness, cases, evaluations=MAX_EVALUATIONS):
+@definition("annealed", order=150, needs="cases")
+def springs(
+    mesh: Mesh, material: Material, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
+) -> Springs:
     """Stiffness of each spring by simulated annealing on a scene's reference displacements.
 
     Parameters
@@ -31,6 +36,8 @@ def springs(mesh, material, thickness, cases, evaluations=MAX_EVALUATIONS):
     -------
     Springs
     """
+    from scipy.optimize import dual_annealing  # here: see `springtune.springs`
+
     misfit = Misfit(mesh, material, thickness, cases)
     limit = math.log(SPAN)
     found = dual_annealing(

@@ -15,21 +15,25 @@ Cauchy part, an energy of the volume alone the rest. The plane form is derived h
 
 import numpy as np
 
-from ..mechanics.energies import AreaEnergy
-from .base import Springs
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
 from .lattice import COEFFICIENT, half_weight
 
 
-def springs(mesh, material, thickness):
+@definition("area", order=210)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs for the shear modulus and an area energy for the rest (after Golec 2019): any nu, no tuning.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.
     """
+    from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
+
     nu = material.poisson_ratio
     spring_modulus = 4 / (3 * (1 + nu))  # over E
     reference = COEFFICIENT * spring_modulus * material.young_modulus * thickness
     modulus = (3 * nu - 1) / (2 * (1 - nu**2)) / (COEFFICIENT * spring_modulus)
-    energies = ()
+    energies: tuple[AreaEnergy, ...] = ()
     if abs(modulus) > 1e-15:
         energies = tuple(
             AreaEnergy(mesh.points, corners, np.full(len(corners), modulus)) for corners in mesh.cells.values()

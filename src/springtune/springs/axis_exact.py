@@ -15,14 +15,16 @@ row edges on the outline halved. The shear modulus is 2 nu / (1 - nu) of what it
 
 import numpy as np
 
-from ..mesh import row_height, signed_areas
-from .base import DefinitionError, Springs, from_rectangles, not_negative, rectangles_only
+from ..mesh import Mesh, row_height, signed_areas
+from ..problem.materials import Material
+from .base import DefinitionError, Springs, definition, from_rectangles, not_negative, rectangles_only
 
 SHAPE_TOLERANCE = 0.02
 """Largest difference of a mesh's own Poisson's ratio from the material's [1]: rows are stretched to fit a box."""
 
 
-def springs(mesh, material, thickness):
+@definition("axis-exact", order=130)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs whose E and nu along x and y are exact, on rectangles or on isosceles rows made for nu; shear pays.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError for nu = 0, on slender
@@ -37,17 +39,17 @@ def springs(mesh, material, thickness):
     return Springs(membrane, _rows(mesh, nu))
 
 
-def _rectangles(mesh, nu):
+def _rectangles(mesh: Mesh, nu: float) -> np.ndarray:
     along, across = rectangles_only(mesh)
-    first = mesh.points[mesh.quads[:, 1]] - mesh.points[mesh.quads[:, 0]]
-    if np.abs(first).min(axis=1).max() > 1e-9 * along.max():
+    sides = mesh.points[mesh.quads[:, 1]] - mesh.points[mesh.quads[:, 0]]
+    if np.abs(sides).min(axis=1).max() > 1e-9 * along.max():
         raise DefinitionError("needs rectangles with sides along x and y; use mesh type 'braced'")
     scale = 1 / (2 * along * across * (1 - nu**2))
-    sides = (not_negative(scale * (b**2 - nu * a**2)) for a, b in ((along, across), (across, along)))
-    return from_rectangles(mesh, *sides, scale * nu * (along**2 + across**2))
+    first, second = (not_negative(scale * (b**2 - nu * a**2)) for a, b in ((along, across), (across, along)))
+    return from_rectangles(mesh, first, second, scale * nu * (along**2 + across**2))
 
 
-def _rows(mesh, nu):
+def _rows(mesh: Mesh, nu: float) -> np.ndarray:
     vectors = np.abs(mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]])[mesh.cell_edges[3]]
     x, y = vectors[..., 0], vectors[..., 1]
     small = 1e-9 * vectors.max()

@@ -1,15 +1,22 @@
-"""What a definition returns, and how it refuses a mesh."""
+"""How a definition is declared, what it returns and how it refuses a mesh."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
+
+from ..mesh import Mesh
+from ..problem.materials import Material
+from ..registry import Declared, Registry
 
 
 class DefinitionError(ValueError):
     """A definition that cannot live on a mesh or with a material; the message says why and what to do."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Springs:
     """Parameters of a network.
 
@@ -19,8 +26,8 @@ class Springs:
         Reference stiffness [N/m].
     relative : ndarray of float, shape (n_edges,)
         Stiffness of each spring over the reference stiffness [1].
-    energies : tuple of Energy
-        Energies besides the springs', their moduli over the reference stiffness.
+    energies : tuple
+        Energies of `springtune.mechanics.energies` besides the springs', their moduli over the reference stiffness.
     lateral : float
         Stress on the long faces over the axial stress [1] that goes with the springs in uniaxial scenes.
     evaluations : int
@@ -31,30 +38,142 @@ class Springs:
 
     reference: float
     relative: np.ndarray
-    energies: tuple = ()
+    energies: tuple[Any, ...] = ()
     lateral: float = 0.0
     evaluations: int = 0
     linear_springs: np.ndarray | None = None
 
     @property
-    def spring_ratio(self):
+    def spring_ratio(self) -> float:
         """Largest stiffness of a spring over the smallest one [1]; infinite where a spring has none."""
         springs = np.abs(self.relative if self.linear_springs is None else self.linear_springs)
         return float(springs.max() / springs.min()) if springs.min() > 0 else np.inf
 
 
-def zero(mesh):
+@dataclass(frozen=True, eq=False)
+class Definition(Declared):
+    """A definition as a study knows it; made by the decorator `definition`.
+
+    Attributes
+    ----------
+    name : str
+        Label in a study and in the dataset.
+    function : callable
+        Its formula: (mesh, material, thickness) and, where it `needs` something, that -> `Springs`.
+    order : float
+        Place in the order of labels.
+    uniform : bool
+        Whether all springs have one stiffness, so that it is a number to report.
+    cells : tuple of int
+        Numbers of corners of the cells that it can have.
+    uniaxial : bool
+        Whether it is for loads alone that stretch a beam along its length, see `LoadKind.uniaxial`.
+    needs : str
+        What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
+    """
+
+    uniform: bool = False
+    cells: tuple[int, ...] = (3, 4)
+    uniaxial: bool = False
+    needs: str = ""
+
+    def springs(self, mesh: Mesh, material: Material, thickness: float, given: Any = None) -> Springs:
+        """Springs of a mesh.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        material : Material
+        thickness : float
+            Thickness of the sheet [m].
+        given : float or sequence of Case, optional
+            What the definition `needs`: a stiffness [N/m] or cases; not used by others.
+
+        Returns
+        -------
+        Springs
+
+        Raises
+        ------
+        DefinitionError
+            If the definition cannot live on the mesh or with the material.
+        """
+        arguments = (given,) if self.needs else ()
+        return self.function(mesh, material, thickness, *arguments)
+
+
+Function = TypeVar("Function", bound=Callable[..., Springs])
+
+DEFINITIONS: Registry[Definition] = Registry(__package__, "definition")
+"""Definitions by name, in the order of their labels."""
+
+
+def definition(
+    name: str,
+    *,
+    order: float = math.inf,
+    uniform: bool = False,
+    cells: tuple[int, ...] = (3, 4),
+    uniaxial: bool = False,
+    needs: str = "",
+) -> Callable[[Function], Function]:
+    """Declare a function to be a definition, by a decorator that returns it as it is.
+
+    Parameters
+    ----------
+    name : str
+        Label in a study and in the dataset.
+    order : float, optional
+        Place in the order of labels: a number between those of its neighbours; at the end without.
+    uniform, cells, uniaxial, needs
+        As of `Definition`.
+
+    Returns
+    -------
+    callable
+        Decorator.
+
+    Raises
+    ------
+    ValueError
+        If another function is the definition of that name; the same one, declared again, replaces the former.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from springtune.mesh import MESH_TYPES
+    >>> from springtune.problem.materials import Material
+    >>> from springtune.springs import DEFINITIONS, Springs, definition
+    >>> @definition("half", uniform=True)
+    ... def half(mesh, material, thickness):
+    ...     "Half of E t for every spring."
+    ...     return Springs(0.5 * material.young_modulus * thickness, np.ones(len(mesh.edges)))
+    >>> mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
+    >>> steel = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
+    >>> DEFINITIONS["half"].springs(mesh, steel, thickness=1e-3).reference
+    105000000.0
+    >>> DEFINITIONS.discard("half")
+    """
+
+    def declare(function: Function) -> Function:
+        DEFINITIONS.declare(Definition(name, function, order, uniform, tuple(cells), uniaxial, needs))
+        return function
+
+    return declare
+
+
+def zero(mesh: Mesh) -> np.ndarray:
     """No springs, shape (n_edges,)."""
     return np.zeros(len(mesh.edges))
 
 
-def triangles_only(mesh):
+def triangles_only(mesh: Mesh) -> None:
     """Refuse a mesh of quadrilaterals."""
     if len(mesh.quads):
         raise DefinitionError("needs triangles and the mesh has quadrilaterals; choose another mesh type")
 
 
-def rectangles_only(mesh):
+def rectangles_only(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Sides of the rectangles of a mesh, refusing any other mesh.
 
     Returns
@@ -72,12 +191,12 @@ def rectangles_only(mesh):
     return lengths[:, 0], lengths[:, 1]
 
 
-def from_rectangles(mesh, first, second, diagonal):
+def from_rectangles(mesh: Mesh, first: np.ndarray, second: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
     """Springs from the stiffness that each rectangle gives its first and second pair of sides and its diagonals."""
     return mesh.sum_to_edges({4: np.stack([first, second, first, second, diagonal, diagonal], axis=1)})
 
 
-def not_negative(stiffness):
+def not_negative(stiffness: np.ndarray) -> np.ndarray:
     """Stiffnesses, refused where one is negative: such a network need not be stable."""
     bad = int((stiffness < 0).sum())
     if bad:

@@ -19,11 +19,13 @@ well as they should be under any load; G stays exact, E and nu are not, since th
 
 import numpy as np
 
-from ..mechanics.energies import AreaEnergy
-from .base import Springs, from_rectangles, not_negative, rectangles_only
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
 
 
-def springs(mesh, material, thickness):
+@definition("baudet", order=100, cells=(4,))
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Rectangles with both diagonals that keep the shear modulus (Baudet 2009); nu moves the wrong way.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on cells other than
@@ -38,7 +40,8 @@ def springs(mesh, material, thickness):
     return Springs(material.young_modulus * thickness, relative)
 
 
-def corrected(mesh, material, thickness):
+@definition("baudet-corrected", order=110, cells=(4,), uniaxial=True)
+def corrected(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone.
 
     Parameters, returns and errors as in `springs`.
@@ -47,11 +50,14 @@ def corrected(mesh, material, thickness):
     return Springs(plain.reference, plain.relative, lateral=(1 - 3 * material.poisson_ratio) / 2)
 
 
-def incompressible(mesh, material, thickness):
+@definition("flechon", order=120, cells=(4,))
+def incompressible(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours).
 
     Parameters, returns and errors as in `springs`.
     """
+    from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
+
     plain = springs(mesh, material, thickness)
     nu = material.poisson_ratio
     modulus = np.full(len(mesh.quads), (3 * nu - 1) / (4 * (1 - nu)))

@@ -5,11 +5,15 @@ equilibrium is zero; the mean over the mesh sizes serves every beam, size and lo
 """
 
 import math
+from collections.abc import Iterable
 
+from ..mesh import Mesh
+from ..problem.materials import Material
 from . import paper
+from .base import Springs, definition
 
 
-def calibrate(curves):
+def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
     """Calibrated stiffness from the best stiffness of each mesh size.
 
     Parameters
@@ -36,7 +40,8 @@ def calibrate(curves):
     return sum(value for _, value, _ in curves) / len(curves)
 
 
-def springs(mesh, material, thickness, stiffness):
+@definition("calibrated", order=20, uniform=True, needs="stiffness")
+def springs(mesh: Mesh, material: Material, thickness: float, stiffness: float) -> Springs:
     """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
 
     Parameters and returns as in `springtune.springs.paper`.

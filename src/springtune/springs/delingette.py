@@ -16,12 +16,13 @@ nu = 1/3; without it E is wrong by (10 - 6 nu) / (9 (1 - nu^2)) there.
 
 import numpy as np
 
-from ..mechanics.energies import BiquadraticEnergy
-from ..mesh import corner_angles, signed_areas
-from .base import Springs, triangles_only, zero
+from ..mesh import Mesh, corner_angles, signed_areas
+from ..problem.materials import Material
+from .base import Springs, definition, triangles_only, zero
 
 
-def springs(mesh, material, thickness):
+@definition("delingette", order=230, cells=(3,))
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles, any nu, any mesh.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
@@ -29,7 +30,8 @@ def springs(mesh, material, thickness):
     return _springs(mesh, material, thickness, coupled=True)
 
 
-def tensile(mesh, material, thickness):
+@definition("delingette-tensile", order=180, cells=(3,))
+def tensile(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """The tensile part of Delingette's springs alone: what is left without coupling.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
@@ -37,7 +39,9 @@ def tensile(mesh, material, thickness):
     return _springs(mesh, material, thickness, coupled=False)
 
 
-def _springs(mesh, material, thickness, coupled):
+def _springs(mesh: Mesh, material: Material, thickness: float, coupled: bool) -> Springs:
+    from ..mechanics.energies import BiquadraticEnergy  # here: see `springtune.springs`
+
     triangles_only(mesh)
     nu = material.poisson_ratio
     first, second = nu / (1 - nu**2), 1 / (1 + nu)  # lambda and mu over E

@@ -8,11 +8,17 @@ of the excess of rows along it a third is seen. Assumptions: many directions, no
 
 import numpy as np
 
-from .base import Springs
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
 from .lattice import uniform
 
 
-def springs(mesh, material, thickness):
-    """Uniform stiffness from the density of springs, 3 E t A / sum L^2 (Kot 2015); see `lattice.springs`."""
+@definition("density", order=40, uniform=True)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+    """Uniform stiffness from the density of springs, 3 E t A / sum L^2 (Kot 2015).
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; lives on any mesh.
+    """
     total = float(np.sum(mesh.edge_lengths**2))
     return Springs(3 * material.young_modulus * thickness * mesh.area / total, uniform(mesh))

@@ -11,12 +11,14 @@ from itertools import combinations
 
 import numpy as np
 
-from ..mesh import signed_areas
+from ..mesh import Mesh, signed_areas
 from ..mesh.cells import DIAGONALS, SIDES
-from .base import Springs
+from ..problem.materials import Material
+from .base import Springs, definition
 
 
-def springs(mesh, material, thickness):
+@definition("element-fit", order=140)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs fitted by least squares to the stiffness matrix of each finite element, none negative.
 
     Parameters and returns as in `springtune.springs.lattice.springs`.
@@ -34,14 +36,14 @@ def springs(mesh, material, thickness):
     return Springs(material.young_modulus * thickness, mesh.sum_to_edges(parts))
 
 
-def _element_matrices(here, elasticity):
+def _element_matrices(here: np.ndarray, elasticity: np.ndarray) -> np.ndarray:
     """Stiffness matrix of each cell for E t = 1, shape (n_cells, 2 m, 2 m), from its corners, shape (n_cells, m, 2)."""
     if here.shape[1] == 3:
         areas = signed_areas(here.reshape(-1, 2), np.arange(here.size // 2).reshape(-1, 3))
         turned = np.roll(here, -1, axis=1) - np.roll(here, -2, axis=1)
         strain = _strain(np.stack([turned[..., 1], -turned[..., 0]], axis=2) / (2 * areas[:, None, None]))
         return np.einsum("n,nki,kl,nlj->nij", areas, strain, elasticity, strain, optimize=True)
-    total = 0.0
+    total = np.zeros((len(here), 8, 8))
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     for xi, eta in signs / np.sqrt(3):
         local = 0.25 * np.stack([signs[:, 0] * (1 + eta * signs[:, 1]), signs[:, 1] * (1 + xi * signs[:, 0])], axis=1)
@@ -52,7 +54,7 @@ def _element_matrices(here, elasticity):
     return total
 
 
-def _strain(slopes):
+def _strain(slopes: np.ndarray) -> np.ndarray:
     """Matrix from the corners' displacements to xx, yy and xy strain, shape (n_cells, 3, 2 m)."""
     count, corners, _ = slopes.shape
     strain = np.zeros((count, 3, corners, 2))
@@ -61,15 +63,15 @@ def _strain(slopes):
     return strain.reshape(count, 3, 2 * corners)
 
 
-def _fit(here, pairs, matrices):
+def _fit(here: np.ndarray, pairs: tuple[tuple[int, int], ...], matrices: np.ndarray) -> np.ndarray:
     """Non-negative stiffness of each edge of each cell, shape (n_cells, n_pairs)."""
     count, corners, _ = here.shape
-    springs = np.zeros((count, len(pairs), corners, 2))
+    parts = np.zeros((count, len(pairs), corners, 2))
     for number, (i, j) in enumerate(pairs):
         normal = here[:, j] - here[:, i]
         normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        springs[:, number, i], springs[:, number, j] = -normal, normal
-    springs = springs.reshape(count, len(pairs), -1)
+        parts[:, number, i], parts[:, number, j] = -normal, normal
+    springs = parts.reshape(count, len(pairs), -1)
     products = np.einsum("npi,nqi->npq", springs, springs) ** 2
     wanted = np.einsum("npi,nij,npj->np", springs, matrices, springs)
     # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.

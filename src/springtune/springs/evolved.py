@@ -5,22 +5,29 @@ which mutants and crossings replace the worse ones. The search is scipy's differ
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import differential_evolution
 
-from .base import Springs
-from .identification import SPAN, Misfit
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
+from .identification import SPAN, Case, Misfit
 
 MAX_EVALUATIONS = 1000
 POPULATION = 20
 
 
-def springs(mesh, material, thickness, cases, evaluations=MAX_EVALUATIONS):
+@definition("evolved", order=160, needs="cases")
+def springs(
+    mesh: Mesh, material: Material, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
+) -> Springs:
     """Stiffness of each spring by a genetic search on a scene's reference displacements.
 
     Parameters and returns as in `springtune.springs.annealed.springs`.
     """
+    from scipy.optimize import differential_evolution  # here: see `springtune.springs`
+
     misfit = Misfit(mesh, material, thickness, cases)
     limit = math.log(SPAN)
     generator = np.random.default_rng(1)

@@ -8,19 +8,20 @@ over all particles. Unknown are the logarithms of the stiffnesses, from a tenth 
 `springtune.springs.lattice`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..linalg.factors import SingularError
-from ..mechanics.network import Network
+from ..mesh import Mesh
+from ..problem.materials import Material
 from . import lattice
 
 SPAN = 10.0
 """Largest factor between a spring and where its search starts [1]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """A load and what it should do.
 
@@ -39,7 +40,7 @@ class Case:
     displacements: np.ndarray
 
 
-def patch_cases(mesh, material, thickness):
+def patch_cases(mesh: Mesh, material: Material, thickness: float) -> list[Case]:
     """Tension along x and y and shear of the free mesh under even tractions; what it should do is known exactly.
 
     Parameters
@@ -71,7 +72,7 @@ def patch_cases(mesh, material, thickness):
     return cases
 
 
-def outline_forces(mesh, stress):
+def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
     """Forces of an even stress on the outline, over the thickness, shape (n_points, 2)."""
     total = np.zeros(mesh.points.shape)
     for corners in mesh.cells.values():
@@ -94,21 +95,26 @@ class Misfit:
     cases : sequence of Case
     """
 
-    def __init__(self, mesh, material, thickness, cases):
+    def __init__(self, mesh: Mesh, material: Material, thickness: float, cases: Sequence[Case]):
+        from ..mechanics.network import Network  # here: see `springtune.springs`
+
         start = lattice.springs(mesh, material, thickness)
         self.reference, self.start = start.reference, start.relative
         self.mesh, self.evaluations = mesh, 0
-        self.groups = {}
+        self.groups: dict[bytes, list[Case]] = {}
         for case in cases:
             self.groups.setdefault(case.held.tobytes(), []).append(case)
         self.patterns = {name: Network(mesh, group[0].held, self.start) for name, group in self.groups.items()}
 
-    def __call__(self, logarithms):
+    def __call__(self, logarithms: np.ndarray) -> float:
         """Misfit at natural logarithms of the stiffnesses over their start, shape (n_edges,)."""
         return self.evaluate(logarithms, gradient=False)[0]
 
-    def evaluate(self, logarithms, gradient=True):
+    def evaluate(self, logarithms: np.ndarray, gradient: bool = True) -> tuple[float, np.ndarray]:
         """Misfit and its gradient, shape (n_edges,), by one solve more for each case (adjoint method)."""
+        from ..linalg.factors import SingularError
+        from ..mechanics.network import Network
+
         self.evaluations += 1
         relative = self.start * np.exp(logarithms)
         total, slope = 0.0, np.zeros(len(relative))

@@ -18,14 +18,18 @@ import math
 
 import numpy as np
 
+from ..mesh import Mesh
+from ..problem.geometry import Beam
 from ..problem.loads import LOADS
-from .base import Springs, not_negative, rectangles_only
+from ..problem.materials import Material
+from .base import Springs, definition, not_negative, rectangles_only
 
 COEFFICIENT = math.sqrt(3) / 2
 """Stiffness of an edge inside over E t [1]."""
 
 
-def springs(mesh, material, thickness):
+@definition("lattice", order=60)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3.
 
     Parameters
@@ -47,7 +51,7 @@ def springs(mesh, material, thickness):
     return Springs(COEFFICIENT * material.young_modulus * thickness, half_weight(mesh))
 
 
-def half_weight(mesh):
+def half_weight(mesh: Mesh) -> np.ndarray:
     """Stiffness of each edge over that of an edge inside an equilateral lattice [1], shape (n_edges,)."""
     parts = {}
     if len(mesh.triangles):
@@ -61,12 +65,12 @@ def half_weight(mesh):
     return mesh.sum_to_edges(parts)
 
 
-def uniform(mesh):
+def uniform(mesh: Mesh) -> np.ndarray:
     """Multiples of a uniform stiffness [1], shape (n_edges,): ones."""
     return np.ones(len(mesh.edges))
 
 
-def predicted_stiffness(material, beam, mesh_size, load="traction"):
+def predicted_stiffness(material: Material, beam: Beam, mesh_size: float, load: str = "traction") -> float:
     """Uniform stiffness that gives a beam its stiffness under a load, outline included.
 
     ``k = sqrt(3)/2 E t / (1 + c sqrt(3)/2 a/H)``, from the excess of the full outline: c = 1 in tension and

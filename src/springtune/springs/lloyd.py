@@ -12,14 +12,17 @@ Assumptions: nu = 1/3, near-equilateral triangles, squares.
 
 import numpy as np
 
+from ..mesh import Mesh
+from ..problem.materials import Material
 from . import lattice
-from .base import DefinitionError, Springs, from_rectangles, rectangles_only
+from .base import DefinitionError, Springs, definition, from_rectangles, rectangles_only
 
 SIDE, DIAGONAL = 5 / 16, 7 / 16
 """Stiffness that a square gives its sides and diagonals over E t [1]."""
 
 
-def springs(mesh, material, thickness):
+@definition("lloyd", order=70)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs matched to finite elements at nu = 1/3: equilateral triangle, or square (Lloyd 2007).
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals other

@@ -8,11 +8,14 @@ on a lattice. Derived here.
 
 import numpy as np
 
-from .base import DefinitionError, Springs
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import DefinitionError, Springs, definition
 from .lattice import uniform
 
 
-def springs(mesh, material, thickness):
+@definition("oriented", order=50, uniform=True)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Uniform stiffness from the affine moduli of the mesh along x, directions of springs and outline included.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError where the springs of the

@@ -4,11 +4,14 @@ The paper chose one stiffness by hand from the sensitivity curve of its 200x30 b
 185e6 N/m on free meshes for steel, 800 N/m for rubber. Springs on the outline have the same stiffness as those inside.
 """
 
-from .base import Springs
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
 from .lattice import uniform
 
 
-def springs(mesh, material, thickness, stiffness):
+@definition("paper", order=10, uniform=True, needs="stiffness")
+def springs(mesh: Mesh, material: Material, thickness: float, stiffness: float) -> Springs:
     """Uniform stiffness as printed: the value that the study states for a mesh type and material.
 
     Parameters

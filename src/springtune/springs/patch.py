@@ -8,11 +8,14 @@ Derived here.
 
 from dataclasses import replace
 
-from ..mechanics.moduli import axial_moduli
+from ..mesh import Mesh
+from ..problem.materials import Material
 from . import area, lattice
+from .base import Springs, definition
 
 
-def springs(mesh, material, thickness):
+@definition("patch", order=190)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of `lattice` scaled once by a roller patch test of the mesh itself: E exact on any mesh, nu is not.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.
@@ -20,7 +23,8 @@ def springs(mesh, material, thickness):
     return _scaled(lattice.springs(mesh, material, thickness), mesh, material, thickness)
 
 
-def with_area(mesh, material, thickness):
+@definition("patch-area", order=200)
+def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs and area energy of `area` scaled once by a roller patch test of the mesh itself: any nu, any mesh.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.
@@ -28,7 +32,9 @@ def with_area(mesh, material, thickness):
     return _scaled(area.springs(mesh, material, thickness), mesh, material, thickness)
 
 
-def _scaled(found, mesh, material, thickness):
+def _scaled(found: Springs, mesh: Mesh, material: Material, thickness: float) -> Springs:
+    from ..mechanics.moduli import axial_moduli  # here: see `springtune.springs`
+
     # The modulus in units of the reference stiffness: the scalar is a ratio of the two.
     stiffness, _ = axial_moduli(mesh, found)
     scalar = material.young_modulus * thickness / (stiffness * found.reference)

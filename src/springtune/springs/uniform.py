@@ -5,10 +5,16 @@ tension the network is too stiff by ``1 + sqrt(3)/2 a/H``, in bending by ``1 + 3
 a the edge length and H the height. Any Poisson's ratio gives nu = 1/3.
 """
 
-from .base import Springs
+from ..mesh import Mesh
+from ..problem.materials import Material
+from .base import Springs, definition
 from .lattice import COEFFICIENT, uniform
 
 
-def springs(mesh, material, thickness):
-    """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline; see `lattice.springs`."""
+@definition("uniform", order=30, uniform=True)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+    """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; lives on any mesh.
+    """
     return Springs(COEFFICIENT * material.young_modulus * thickness, uniform(mesh))

@@ -21,17 +21,19 @@ Assumptions: triangles.
 
 import numpy as np
 
-from ..mesh import signed_areas
-from .base import Springs, not_negative, triangles_only
+from ..mesh import Mesh, signed_areas
+from ..problem.materials import Material
+from .base import Springs, definition, not_negative, triangles_only
 
 
-def _shapes(mesh):
+def _shapes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     triangles_only(mesh)
     areas = signed_areas(mesh.points, mesh.triangles)[:, None]
     return areas, mesh.edge_lengths[mesh.cell_edges[3]] ** 2
 
 
-def springs(mesh, material, thickness):
+@definition("van-gelder", order=80, cells=(3,))
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the form for nu = 0 (Van Gelder 1998): exact on lattices with no tuning.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
@@ -40,7 +42,8 @@ def springs(mesh, material, thickness):
     return Springs(material.young_modulus * thickness, mesh.sum_to_edges({3: areas / squares}))
 
 
-def general(mesh, material, thickness):
+@definition("van-gelder-general", order=90, cells=(3,))
+def general(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the general form (Van Gelder 1998), whose nu only scales E.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals, and

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 
-from ..mesh import MESH_TYPES, QUADS
+from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
@@ -109,9 +109,9 @@ def _check_kinds(grids, problems):
         found = {}
         for scene in grid.scenes:
             definition, mesh_type = DEFINITIONS[scene.definition], scene.mesh.mesh_type
-            count = 4 if mesh_type in QUADS else 3
-            if mesh_type in MESH_TYPES and count not in definition.cells:
-                needs, has = ("triangles", "quadrilaterals") if count == 4 else ("rectangles", "triangles")
+            made = MESH_TYPES.get(mesh_type)
+            if made and made.corners not in definition.cells:
+                needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
                 found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
             if definition.uniaxial and not LOADS[scene.load].kind.uniaxial:
                 kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
@@ -164,6 +164,7 @@ def check_definitions(config, content, grids, problems):
 
 
 def stated_rows(config):
+    """Rows of stated stiffnesses; none where the study states none."""
     return config.definitions.paper.stiffness if config.definitions.paper else []
 
 

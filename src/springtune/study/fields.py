@@ -2,9 +2,11 @@
 
 import math
 import re
-from typing import Annotated
+from collections.abc import Callable, Collection
+from typing import Annotated, Any
 
-from pydantic_core import core_schema
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
 from .. import units
 from ..mesh import MESH_TYPES
@@ -18,27 +20,38 @@ MOST_POINTS = 10_001
 
 
 class Scalar:
-    """Annotation of a field: how its text is read, its JSON schema and words for the manual."""
+    """Annotation of a field.
 
-    def __init__(self, read, schema, words):
+    Parameters
+    ----------
+    read : callable
+        From the field's text to its value.
+    schema : dict
+        JSON schema.
+    words : str
+        What is expected, for messages and the manual.
+    """
+
+    def __init__(self, read: Callable[[str], Any], schema: dict[str, Any], words: str) -> None:
         self.read, self.schema, self.words = read, schema, words
 
-    def __get_pydantic_core_schema__(self, source, handler):
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self._read)
 
-    def __get_pydantic_json_schema__(self, schema, handler):
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return dict(self.schema)
 
-    def _read(self, value):
+    def _read(self, value: object) -> Any:
         if not isinstance(value, str) or not value.strip():
             raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
         return self.read(value)
 
 
-def quantity(kind, negative="give a size above zero"):
+def quantity(kind: str, negative: str = "give a size above zero") -> Any:
+    """Type of a quantity above zero, of a key of `springtune.units.KINDS`."""
     example = units.KINDS[kind].example
 
-    def read(value):
+    def read(value: str) -> float:
         try:
             number = units.parse(value, kind)
         except units.UnitError as error:
@@ -51,8 +64,10 @@ def quantity(kind, negative="give a size above zero"):
     return Annotated[float, Scalar(read, schema, f"a {kind} such as '{example}'")]
 
 
-def number(words, low, high, *, above=False, whole=False):
-    def read(value):
+def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Any:
+    """Type of a number from `low`, or `above` it, to `high`."""
+
+    def read(value: str) -> float:
         try:
             number = int(value) if whole else float(value)
         except ValueError:
@@ -61,14 +76,16 @@ def number(words, low, high, *, above=False, whole=False):
             raise refuse(f"'{value}' is out of range; give {words}")
         return number
 
-    schema = {"type": "integer" if whole else "number", "exclusiveMinimum" if above else "minimum": low}
+    schema: dict[str, Any] = {"type": "integer" if whole else "number", "exclusiveMinimum" if above else "minimum": low}
     if math.isfinite(high):
         schema["maximum"] = high
     return Annotated[int if whole else float, Scalar(read, schema, words)]
 
 
-def one_of(what, names):
-    def read(value):
+def one_of(what: str, names: Collection[str]) -> Any:
+    """Type of a name out of some."""
+
+    def read(value: str) -> str:
         if value not in names:
             raise refuse(f"unknown {what} '{value}'; {nearest(value, names)}")
         return value
@@ -76,7 +93,7 @@ def one_of(what, names):
     return Annotated[str, Scalar(read, {"enum": list(names)}, " or ".join(f"'{name}'" for name in names))]
 
 
-def _read_flag(value):
+def _read_flag(value: str) -> bool:
     if value.lower() not in ("true", "false"):
         raise refuse(f"'{value}' is neither true nor false; give one of them")
     return value.lower() == "true"
@@ -110,15 +127,15 @@ MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a mat
 class OneOrMore:
     """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
 
-    def __get_pydantic_core_schema__(self, source, handler):
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
-    def __get_pydantic_json_schema__(self, schema, handler):
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         array = handler(schema["schema"]) | {"minItems": 1, "uniqueItems": True}
         return {"anyOf": [array["items"], array]}
 
     @staticmethod
-    def _read(value, handler):
+    def _read(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         listed = [value] if isinstance(value, str) else value
         if not isinstance(listed, list):
             raise refuse(f"{show(value)} instead of a value or a list; write it as [first, second]")
@@ -136,45 +153,53 @@ class PerBeam:
 
     words = "a force such as '400 kN', or one for each beam"
 
-    def __get_pydantic_core_schema__(self, source, handler):
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         single = handler.generate_schema(Force)
         each = core_schema.no_info_wrap_validator_function(self._read_each, handler(source))
-        choices = {"single": core_schema.no_info_after_validator_function(lambda force: {None: force}, single)}
-        choices["each"] = each
+        everywhere = core_schema.no_info_after_validator_function(lambda force: {None: force}, single)
+        choices: dict[Any, CoreSchema] = {"single": everywhere, "each": each}
         return core_schema.tagged_union_schema(choices, lambda value: "each" if isinstance(value, dict) else "single")
 
-    def __get_pydantic_json_schema__(self, schema, handler):
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         each = handler(schema["choices"]["each"]["schema"])
         return {"anyOf": [each["additionalProperties"], each | {"minProperties": 1}]}
 
     @staticmethod
-    def _read_each(value, handler):
+    def _read_each(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if not value:
             raise refuse("no force at all; give one for each beam, such as {200x40: 400 kN}")
         return handler(value)
 
 
 class Named:
-    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one."""
+    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one.
 
-    def __init__(self, what, for_files=True):
+    Parameters
+    ----------
+    what : str
+        What is named, for messages.
+    for_files : bool, optional
+        Whether the names become parts of file names.
+    """
+
+    def __init__(self, what: str, for_files: bool = True) -> None:
         self.what, self.for_files = what, for_files
         self.words = f"a section for each {what}, by name; see below"
 
-    def __get_pydantic_core_schema__(self, source, handler):
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
-    def __get_pydantic_json_schema__(self, schema, handler):
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         described = handler(schema["schema"]) | {"minProperties": 1}
         if self.for_files:
             described["propertyNames"] = {"pattern": f"^{NAME.pattern}$"}
         return described
 
-    def _read(self, value, handler):
+    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if not isinstance(value, dict) or not value:
             shown = show(value) if value else f"no {self.what} at all"
             raise refuse(f"{shown}; give at least one {self.what}, its name followed by a colon and its keys")
-        seen = {}
+        seen: dict[str, str] = {}
         for name in value if self.for_files else ():
             if not NAME.fullmatch(name):
                 raise refuse(f"'{name}' cannot name a {self.what}; {NAME_RULE}", name)

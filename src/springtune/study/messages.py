@@ -1,8 +1,12 @@
 """What is wrong with a file: messages that name file, line, key, value and remedy."""
 
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
 from pydantic_core import PydanticCustomError
+
+Key = str | int
+"""A step of a path into a file: a key of a mapping, a number in a list."""
 
 SHOWN_PROBLEMS = 5
 """Problems that one message lists; it counts the others."""
@@ -21,12 +25,33 @@ class Problems:
         The file as its user named it.
     lines : dict of tuple to int, optional
         Line of each path of keys.
+
+    Examples
+    --------
+    >>> problems = Problems("study.yaml", {("beams",): 3})
+    >>> problems.add(("beams", "small"), "no length; give one such as '200 mm'")
+    >>> problems.stop()
+    Traceback (most recent call last):
+    ...
+    springtune.study.messages.StudyError: study.yaml:3: beams.small: no length; give one such as '200 mm'
     """
 
-    def __init__(self, file, lines=None):
-        self._file, self._lines, self._found = file, lines or {}, []
+    def __init__(self, file: str, lines: Mapping[tuple[Key, ...], int] | None = None) -> None:
+        self._file, self._lines = file, lines or {}
+        self._found: list[tuple[int, str]] = []
 
-    def add(self, path, message, line=0):
+    def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
+        """Note what is wrong.
+
+        Parameters
+        ----------
+        path : iterable of str or int
+            Keys that lead to it; its line, or that of what holds it, is part of the message.
+        message : str
+            What is wrong, and the remedy.
+        line : int, optional
+            Where it is, if no path leads there.
+        """
         path = tuple(path)
         # What is missing has no line of its own; that of what should hold it helps.
         above = (path[:size] for size in range(len(path), 0, -1))
@@ -35,8 +60,14 @@ class Problems:
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
 
-    def stop(self):
-        """Raise if anything was found."""
+    def stop(self) -> None:
+        """Raise if anything was found.
+
+        Raises
+        ------
+        StudyError
+            With the first of them, in the file's order.
+        """
         if not self._found:
             return
         messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
@@ -45,24 +76,66 @@ class Problems:
         raise StudyError("\n".join(messages))
 
 
-def refuse(message, *path):
-    """Error of a validator; `path` leads from the validated value to the culprit inside it."""
+def refuse(message: str, *path: Key) -> PydanticCustomError:
+    """Error of a validator.
+
+    Parameters
+    ----------
+    message : str
+    *path : str or int
+        Leads from the validated value to the culprit inside it.
+
+    Returns
+    -------
+    PydanticCustomError
+        To be raised.
+    """
     return PydanticCustomError("study", "{message}", {"message": message, "path": path})
 
 
-def show(value):
-    """A value of the file, for a message."""
+def show(value: object) -> str:
+    """A value of the file, for a message.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> show("200 mm"), show([]), show({"length": "1 m"})
+    ("'200 mm'", 'an empty list', 'a mapping')
+    """
     if isinstance(value, dict):
         return "a mapping"
     if isinstance(value, list):
         return "a list" if value else "an empty list"
     if value is None:
         return "nothing"
-    return f"'{value}'" if len(value) <= 60 else f"'{value[:57]}...'"
+    text = str(value)
+    return f"'{text}'" if len(text) <= 60 else f"'{text[:57]}...'"
 
 
-def nearest(word, words):
-    """``did you mean ...? `` if one of the words is near, and all of them."""
+def nearest(word: str, words: Iterable[str]) -> str:
+    """``did you mean ...? `` if one of the words is near, and all of them.
+
+    Parameters
+    ----------
+    word : str
+    words : iterable of str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> nearest("latice", ["lattice", "uniform"])
+    "did you mean 'lattice'? known: lattice, uniform"
+    """
     words = list(words)
     near = get_close_matches(word, words, n=1, cutoff=0.6)
     hint = f"did you mean '{near[0]}'? " if near else ""

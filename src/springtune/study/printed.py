@@ -2,7 +2,10 @@
 
 import csv
 import math
+from collections.abc import Sequence
 from decimal import Decimal
+from pathlib import Path
+from typing import Any
 
 from ..problem.loads import LOADS
 from .messages import Problems, nearest
@@ -25,8 +28,26 @@ _PRINTED_COLUMNS = {
 }
 
 
-def read_printed(path, mesh_types, problems):
-    """Cells of a CSV file of printed values; lines that begin with # are comments."""
+def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> tuple[PrintedCell, ...]:
+    """Cells of a CSV file of printed values; lines that begin with # are comments.
+
+    Parameters
+    ----------
+    path : Path
+    mesh_types : sequence of str
+        Those that the study knows.
+    problems : Problems
+        Of the study that names the file.
+
+    Returns
+    -------
+    tuple of PrintedCell
+
+    Raises
+    ------
+    StudyError
+        If anything is wrong with the file.
+    """
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except (OSError, ValueError) as error:
@@ -36,16 +57,19 @@ def read_printed(path, mesh_types, problems):
     file_problems = Problems(str(path))
     # Empty lines in place of comments, so that the reader's line numbers are the file's.
     rows = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
-    cells, header = {}, None
+    cells: dict[tuple[Any, ...], tuple[int, PrintedCell]] = {}
+    header: list[str] | None = None
     try:
         for row in rows:
-            if row and header is None:
+            if not row:
+                continue
+            if header is None:
                 header = row
                 if sorted(header) != sorted(_PRINTED_COLUMNS):
                     wanted = ",".join(_PRINTED_COLUMNS)
                     file_problems.add((), f"has columns {','.join(header)}; give {wanted}", rows.line_num)
                     break
-            elif row:
+            else:
                 cell = _printed_cell(header, row, mesh_types, rows.line_num, file_problems)
                 if cell:
                     label = (cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load)
@@ -60,11 +84,13 @@ def read_printed(path, mesh_types, problems):
     return tuple(cell for _, cell in cells.values())
 
 
-def _printed_cell(header, row, mesh_types, line, problems):
+def _printed_cell(
+    header: Sequence[str], row: Sequence[str], mesh_types: Sequence[str], line: int, problems: Problems
+) -> PrintedCell | None:
     if len(row) != len(header):
         problems.add((), f"{len(row)} values for {len(header)} columns; add or remove some", line)
         return None
-    values = {}
+    values: dict[str, Any] = {}
     for column, text in zip(header, row):
         field, size = _PRINTED_COLUMNS[column]
         known = {"mesh_type": mesh_types, "load": LOADS}.get(field)

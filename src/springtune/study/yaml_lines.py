@@ -1,17 +1,44 @@
 """YAML with the line of every key."""
 
+from typing import Any
+
 import yaml
 
-from .messages import Problems, StudyError
+from .messages import Key, Problems, StudyError
 
 
-def read_yaml(text, file):
-    """Content of a YAML text as dicts, lists and texts, and the line of each path of keys.
+def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
+    r"""Content of a YAML text as dicts, lists and texts, and the line of each path of keys.
 
     Scalars stay the texts they are, so that names such as ``1e3`` or ``no`` are no numbers or booleans, and messages
     show what the file holds.
+
+    Parameters
+    ----------
+    text : str
+    file : str
+        Its name, for messages.
+
+    Returns
+    -------
+    content : dict, list, str or None
+    lines : dict of tuple to int
+        Counted from 1.
+
+    Raises
+    ------
+    StudyError
+        If the text is not YAML, or gives a key twice.
+
+    Examples
+    --------
+    >>> content, lines = read_yaml("title: no\nbeams:\n  small: {length: 50 mm}", "study.yaml")
+    >>> content
+    {'title': 'no', 'beams': {'small': {'length': '50 mm'}}}
+    >>> lines["beams", "small", "length"]
+    3
     """
-    lines = {}
+    lines: dict[tuple[Key, ...], int] = {}
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
         return _content(root, (), lines, file), lines
@@ -26,7 +53,7 @@ def read_yaml(text, file):
         raise StudyError(f"{file}: not a study: nested too deeply; see config/README.md for what it may hold") from None
 
 
-def _content(node, path, lines, file):
+def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Key, ...], int], file: str) -> Any:
     if node is None or node.tag == "tag:yaml.org,2002:null":
         return None
     lines.setdefault(path, node.start_mark.line + 1)
@@ -34,7 +61,8 @@ def _content(node, path, lines, file):
         return node.value
     if isinstance(node, yaml.SequenceNode):
         return [_content(item, (*path, number), lines, file) for number, item in enumerate(node.value)]
-    content, merged = {}, {}
+    content: dict[str, Any] = {}
+    merged: dict[str, Any] = {}
     for key, value in node.value:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):

@@ -1,6 +1,6 @@
 """Names of the approaches of the benchmark."""
 
-from ...mesh import QUADS
+from ...mesh import MESH_TYPES
 from ...springs import DEFINITIONS
 
 OTHER_APPROACHES = (
@@ -27,7 +27,8 @@ def approach_names(definitions, mesh_types, others):
     names = []
     for name in definitions:
         for mesh_type in mesh_types:
-            count = 4 if mesh_type in QUADS else 3
-            if count in DEFINITIONS[name].cells and not DEFINITIONS[name].needs:
+            made, definition = MESH_TYPES.get(mesh_type), DEFINITIONS[name]
+            # An unknown mesh type is told elsewhere.
+            if not definition.needs and (made is None or made.corners in definition.cells):
                 names.append(f"{name}/{mesh_type}")
     return (*names, *others)

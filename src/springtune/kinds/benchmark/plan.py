@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, hash_of, material_key, stage_key
+from ...jobs.keys import beam_key, hash_of, material_key, mesh_type_key, stage_key
 from ..base import Stage
 
 
@@ -12,10 +12,13 @@ def case_key(case):
     """Key of a scene of the benchmark."""
     parameters = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
     parameters["second_beam"] = case.second_beam and beam_key(case.second_beam)
-    packages = "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "netgen-mesher", "pyamg"
+    packages = "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "pyamg"
     code = stage_key("kinds.benchmark.stage", *packages)
-    definitions = sorted({approach.partition("/")[0] for approach in case.approaches if "/" in approach})
-    return hash_of(parameters, code, [definition_digest(name) for name in definitions])
+    pairs = [approach.split("/") for approach in case.approaches if "/" in approach]
+    definitions, mesh_types = ({pair[place] for pair in pairs} for place in (0, 1))
+    digests = [definition_digest(name) for name in sorted(definitions)]
+    # The other approaches have structured meshes.
+    return hash_of(parameters, code, digests, [mesh_type_key(name) for name in sorted(mesh_types | {"structured"})])
 
 
 def _members(study, costs):
@@ -42,5 +45,6 @@ STAGES = (
         _members,
         alone=True,
         definitions=True,
+        mesh_types=True,
     ),
 )

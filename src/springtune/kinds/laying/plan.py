@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import hash_of, stage_key
+from ...jobs.keys import hash_of, mesh_type_key, stage_key
 from ..base import Stage
 from .cost import cost_units
 
@@ -12,7 +12,10 @@ from .cost import cost_units
 def laying_key(one):
     """Key of a laid strip."""
     return hash_of(
-        asdict(one), stage_key("kinds.laying.stage", "numpy", "scipy", "cvxopt"), definition_digest(one.definition)
+        asdict(one),
+        stage_key("kinds.laying.stage", "numpy", "scipy", "cvxopt"),
+        mesh_type_key("structured"),
+        definition_digest(one.definition),
     )
 
 
@@ -30,4 +33,15 @@ def _products(content):
     return [Path(content["folder"]) / f"{strip['key']}.h5" for strip in content["strips"]]
 
 
-STAGES = (Stage("laying", "kinds.laying.stage", "Laying the strips", _content, _products, _members, definitions=True),)
+STAGES = (
+    Stage(
+        "laying",
+        "kinds.laying.stage",
+        "Laying the strips",
+        _content,
+        _products,
+        _members,
+        definitions=True,
+        mesh_types=True,
+    ),
+)

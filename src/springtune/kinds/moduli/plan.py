@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import hash_of, stage_key
+from ...jobs.keys import hash_of, mesh_type_key, stage_key
 from ...mesh import MESH_TYPES
 from ...study.model import MeshSpec
 from ..base import Stage
@@ -15,7 +15,8 @@ def moduli_key(study, one):
     mesh = mesh_of(study, one)
     parameters = [mesh_source(mesh), one.definition, one.poisson_ratio]
     code = (
-        stage_key("kinds.moduli.stage", "numpy", "scipy", "cvxopt", "netgen-mesher"),
+        stage_key("kinds.moduli.stage", "numpy", "scipy", "cvxopt"),
+        mesh_type_key(one.mesh_type),
         definition_digest(one.definition),
     )
     return hash_of(parameters, *code)
@@ -63,5 +64,6 @@ STAGES = (
         _products,
         _members,
         definitions=True,
+        mesh_types=True,
     ),
 )

@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 
 from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, hash_of, material_key, stage_key
+from ...jobs.keys import beam_key, hash_of, material_key, mesh_type_key, stage_key
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
@@ -31,8 +31,9 @@ def by_mesh(items):
 @cache
 def mesh_key(mesh):
     """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
-    packages = {"free": ["netgen-mesher"]}.get(mesh.mesh_type, []) if mesh.file is None else ["meshio"]
-    return hash_of(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy", *packages))
+    if mesh.file is not None:
+        return hash_of(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy", "meshio"))
+    return hash_of(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy"), mesh_type_key(mesh.mesh_type))
 
 
 def mesh_source(mesh):
@@ -321,7 +322,7 @@ STAGES = (
         _reference_products,
         _reference_members,
     ),
-    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members),
+    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members, mesh_types=True),
     Stage(
         "sensitivity",
         "kinds.scenes.sensitivity",

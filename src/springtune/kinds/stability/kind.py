@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from ...mesh import MESH_TYPES, QUADS
+from ...mesh import MESH_TYPES
 from ...problem.geometry import Beam
 from ...problem.materials import Material
 from ...study.checks import check_density, check_for_triangles, check_known
@@ -77,7 +77,7 @@ def _check(config, problems):
     check_known(problems, ("stability", "material"), "material", section.material, config.materials)
     check_density(config, section.material, ("stability", "material"), problems)
     check_for_triangles(section.definition, ("stability", "definition"), problems)
-    made = [name for name in MESH_TYPES if name not in QUADS]
+    made = [name for name, one in MESH_TYPES.items() if one.corners == 3]
     if section.mesh_type not in made:
         message = f"'{section.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
         problems.add(("stability", "mesh_type"), message)

@@ -1,0 +1,146 @@
+"""How a mesh type is declared: a function that meshes a box, and what others must know of its meshes."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from ..registry import Declared, Registry
+from .cells import Mesh
+
+
+def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
+    """Whole numbers of cells along a box and of rows over its height that come nearest to a size.
+
+    Parameters
+    ----------
+    length, height : float
+        Extent of the box [m].
+    size : float
+        Asked length of an edge [m].
+    row_height : float, optional
+        Height of a row over the length of an edge [1].
+
+    Returns
+    -------
+    cells, rows : int
+        At least 1.
+
+    Examples
+    --------
+    >>> nearest_counts(0.2, 0.04, 0.011)
+    (18, 4)
+    """
+    return max(1, round(length / size)), max(1, round(height / (row_height * size)))
+
+
+Function = TypeVar("Function", bound=Callable[..., Mesh])
+
+
+@dataclass(frozen=True, eq=False)
+class MeshType(Declared):
+    """A mesh type as a study knows it; made by the decorator `mesh_type`, called to make a mesh.
+
+    Attributes
+    ----------
+    name : str
+        Label in a study and in the dataset.
+    function : callable
+        (length, height, size) -> `Mesh`.
+    order : float
+        Place in the order of labels.
+    corners : int
+        Corners of its cells: 3 or 4.
+    row_height : float
+        Height of a row of cells over the mesh size [1].
+    packages : tuple of str
+        Distributions besides numpy whose versions its meshes depend on.
+    own_stretch : callable or None
+        (length, height, size) -> `stretch`, where the numbers of cells are not the whole ones nearest to the size.
+    """
+
+    corners: int = 3
+    row_height: float = 1.0
+    packages: tuple[str, ...] = ()
+    own_stretch: Callable[[float, float, float], float] | None = None
+
+    def __call__(self, length: float, height: float, size: float) -> Mesh:
+        """Mesh a box.
+
+        Parameters
+        ----------
+        length, height : float
+            Extent of the box [m].
+        size : float
+            Asked length of an edge [m].
+
+        Returns
+        -------
+        Mesh
+        """
+        return self.function(length, height, size)
+
+    def stretch(self, length: float, height: float, size: float) -> float:
+        """How much wider cells come out than high, over what they should be, as whole numbers of them fit a box [1].
+
+        Known without making the mesh; parameters as of a call.
+        """
+        if self.own_stretch:
+            return self.own_stretch(length, height, size)
+        cells, rows = nearest_counts(length, height, size, self.row_height)
+        return length / cells / (height / (self.row_height * rows))
+
+
+MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type")
+"""Mesh types by name, in the order of their labels."""
+
+
+def mesh_type(
+    name: str,
+    *,
+    order: float = math.inf,
+    corners: int = 3,
+    row_height: float = 1.0,
+    packages: tuple[str, ...] = (),
+    own_stretch: Callable[[float, float, float], float] | None = None,
+) -> Callable[[Function], Function]:
+    """Declare a function to be a mesh type, by a decorator that returns it as it is.
+
+    Parameters
+    ----------
+    name : str
+        Label in a study and in the dataset.
+    order : float, optional
+        Place in the order of labels: a number between those of its neighbours; at the end without.
+    corners, row_height, packages, own_stretch
+        As of `MeshType`.
+
+    Returns
+    -------
+    callable
+        Decorator.
+
+    Raises
+    ------
+    ValueError
+        If another function is the mesh type of that name; the same one, declared again, replaces the former.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from springtune.mesh import MESH_TYPES, Mesh, mesh_type
+    >>> @mesh_type("two")
+    ... def two(length, height, size):
+    ...     "Two triangles, whatever the size."
+    ...     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [length, height]
+    ...     return Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> len(MESH_TYPES["two"](0.2, 0.04, 5e-3).edges)
+    5
+    >>> MESH_TYPES.discard("two")
+    """
+
+    def declare(function: Function) -> Function:
+        MESH_TYPES.declare(MeshType(name, function, order, corners, row_height, tuple(packages), own_stretch))
+        return function
+
+    return declare

@@ -1,0 +1,117 @@
+"""Named things that are declared where they stand: a decorator adds each to a mapping that others read.
+
+The mapping finds what the modules of a package declare by importing them all, when it is first read. So a new entry is
+one place: its function. Code outside the package adds its own with the same decorator.
+"""
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+
+@dataclass(frozen=True, eq=False)
+class Declared:
+    """A function and the name by which studies know it.
+
+    Attributes
+    ----------
+    name : str
+        Label in a study and in the dataset.
+    function : callable
+        What was declared.
+    order : float
+        Place among the others, the smallest first; those of one place are sorted by name.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    order: float
+
+    @property
+    def summary(self) -> str:
+        """First line of the function's docstring, without its full stop."""
+        return (inspect.getdoc(self.function) or "").partition("\n")[0].rstrip(".")
+
+    @property
+    def place(self) -> str:
+        """Module and name of the function."""
+        return f"{self.function.__module__}.{self.function.__qualname__}"
+
+    @cached_property
+    def file(self) -> Path | None:
+        """File where the function stands; None where it was typed into a notebook or a prompt."""
+        found = inspect.getsourcefile(inspect.unwrap(self.function))
+        return Path(found).absolute() if found and Path(found).is_file() else None
+
+
+Entry = TypeVar("Entry", bound=Declared)
+
+
+class Registry(Mapping[str, Entry]):
+    """Read-only mapping from names to what was declared, in order; the modules of a package are read when needed.
+
+    Parameters
+    ----------
+    package : str
+        Package whose modules declare entries.
+    what : str
+        What an entry is, for messages.
+    """
+
+    def __init__(self, package: str, what: str):
+        self._package, self._what = package, what
+        self._entries: dict[str, Entry] = {}
+        self._complete = False
+
+    def declare(self, entry: Entry) -> None:
+        """Add an entry; what the decorators call.
+
+        A function that is declared once more from the same place, as when a cell of a notebook runs again, replaces
+        the former one.
+
+        Raises
+        ------
+        ValueError
+            If another function has the name.
+        """
+        if not entry.function.__module__.startswith(f"{self._package}."):
+            self._discover()
+        former = self._entries.get(entry.name)
+        if former is not None and former.place != entry.place:
+            raise ValueError(
+                f"{self._what} '{entry.name}' is {former.place} already; choose another name for {entry.place}"
+            )
+        entries = [*(self._entries | {entry.name: entry}).values()]
+        self._entries = {one.name: one for one in sorted(entries, key=lambda one: (one.order, one.name))}
+
+    def discard(self, name: str) -> None:
+        """Take out what code outside the package declared; nothing happens where there is no such name."""
+        self._entries = {one: entry for one, entry in self._entries.items() if one != name}
+
+    def _discover(self) -> None:
+        if not self._complete:
+            for module in pkgutil.iter_modules(importlib.import_module(self._package).__path__):
+                importlib.import_module(f"{self._package}.{module.name}")
+            self._complete = True
+
+    def __getitem__(self, name: str) -> Entry:
+        self._discover()
+        if name not in self._entries:
+            raise KeyError(f"unknown {self._what} '{name}'; known: {', '.join(self._entries)}")
+        return self._entries[name]
+
+    def __iter__(self) -> Iterator[str]:
+        self._discover()
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        self._discover()
+        return len(self._entries)
+
+    def __repr__(self) -> str:
+        return f"<{self._what}s: {', '.join(self)}>"

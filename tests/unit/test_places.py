@@ -1,0 +1,266 @@
+"""Places to touch: a new definition is one file and so is a new mesh type; all that lists them finds it there."""
+
+import importlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springtune
+from springtune.campaign.plan import stages
+from springtune.jobs import dependencies
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
+from springtune.mesh import MESH_TYPES, mesh_type
+from springtune.problem.boundary import held, weights
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
+from springtune.springs import DEFINITIONS, Springs, definition
+
+STEEL = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
+
+RECIPES = {
+    recipe.partition("\n")[0].removeprefix("# src/springtune/"): recipe
+    for recipe in re.findall(
+        r"^```python\n(.*?)^```", (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(), re.DOTALL | re.MULTILINE
+    )
+}
+"""What CONTRIBUTING.md tells to write, by the file's place in the package."""
+
+
+def outside_package(place):
+    """A recipe as it is written outside the package."""
+    package = f"springtune.{place.partition('/')[0]}"
+    text = RECIPES[place].replace("from ..", "from springtune.").replace("from . ", f"from {package} ")
+    return text.replace("from .", f"from {package}.")
+
+
+STUDY = """\
+title: One place
+beams:
+  100x20: {length: 100 mm, height: 20 mm}
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
+outputs: [size]
+grids:
+  all:
+    beam: 100x20
+    mesh_type: [MESH_TYPE, structured]
+    mesh_size: 5 mm
+    material: steel
+    load: traction
+    force: 20 kN
+    definition: [DEFINITION, uniform]
+    sensitivity: false
+"""
+
+REGISTRIES = {"DEFINITIONS": DEFINITIONS, "MESH_TYPES": MESH_TYPES}
+
+
+def displacement(name, type_name="structured"):
+    """What 1 kN of traction does to a beam [m]."""
+    mesh, kind = MESH_TYPES[type_name](0.1, 0.02, 5e-3), LOADS["traction"].kind
+    springs = DEFINITIONS[name].springs(mesh, STEEL, 1e-3)
+    pattern = weights(mesh, kind)
+    network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
+    found = StaticProblem(network, pattern).linear(1e3 / springs.reference)
+    return float((found.displacements * pattern).sum())
+
+
+class TestOutsideThePackage:
+    """A file of one's own, imported: the same decorator, nothing else."""
+
+    @pytest.fixture
+    def outside(self, tmp_path, monkeypatch):
+        """Import a module of some text; what is declared is taken out after the test."""
+        known = {what: set(registry) for what, registry in REGISTRIES.items()}
+        monkeypatch.syspath_prepend(tmp_path)
+        modules = []
+
+        def load(stem, text):
+            (tmp_path / f"{stem}.py").write_text(text)
+            modules.append(stem)
+            return importlib.import_module(stem)
+
+        yield load
+        for what, registry in REGISTRIES.items():
+            for name in set(registry) - known[what]:
+                registry.discard(name)
+        for stem in modules:
+            sys.modules.pop(stem)
+
+    def test_a_definition(self, outside, tmp_path):
+        outside("own_springs", outside_package("springs/twice.py"))
+        names = list(DEFINITIONS)
+        assert names[names.index("lattice") + 1] == "twice"
+        one = DEFINITIONS["twice"]
+        assert one.summary.startswith("Springs twice as stiff") and one.file == tmp_path / "own_springs.py"
+        assert displacement("twice") == pytest.approx(displacement("lattice") / 2, rel=1e-12)
+        digest = dependencies.definition_digest("twice")
+        assert digest not in {dependencies.definition_digest(name) for name in set(names) - {"twice"}}
+
+    def test_a_mesh_type(self, outside):
+        outside("own_mesh", outside_package("mesh/left.py"))
+        names = list(MESH_TYPES)
+        assert names[names.index("right") + 1] == "left"
+        one = MESH_TYPES["left"]
+        assert one.corners == 3 and one.summary == "Squares cut by parallel diagonals, the other way"
+        mesh = one(0.1, 0.02, 5e-3)
+        assert mesh.area == pytest.approx(2e-3)
+        assert displacement("lattice", "left") == pytest.approx(displacement("lattice", "right"), rel=0.01)
+        digest = dependencies.mesh_type_digest("left")
+        assert digest not in {dependencies.mesh_type_digest(name) for name in set(names) - {"left"}}
+
+    def test_what_a_file_imports_from_beside_it_is_part_of_its_digest(self, tmp_path, monkeypatch):
+        text, digests = outside_package("springs/twice.py"), set()
+        text = text.replace("    found =", "    from beside import factor\n\n    found =")
+        for number in "1", "2":
+            folder = tmp_path / number
+            folder.mkdir()
+            (folder / "beside.py").write_text(f"factor = {number}\n")
+            (folder / f"own{number}.py").write_text(text)
+            monkeypatch.syspath_prepend(folder)
+            importlib.import_module(f"own{number}")
+            digests.add(dependencies.definition_digest("twice"))
+            DEFINITIONS.discard("twice")
+            sys.modules.pop(f"own{number}")
+        assert len(digests) == 2
+
+    def test_a_cell_that_runs_again_replaces_what_it_declared(self, outside):
+        del outside  # takes out what is declared here
+        for factor in (1.0, 3.0):
+
+            @definition("cell")
+            def springs(mesh, material, thickness, factor=factor):
+                return Springs(factor, np.ones(len(mesh.edges)))
+
+        assert list(DEFINITIONS)[-1] == "cell"
+        assert DEFINITIONS["cell"].springs(MESH_TYPES["right"](0.1, 0.02, 0.01), STEEL, 1e-3).reference == 3.0
+
+    @pytest.mark.parametrize(
+        ("declare", "name"), [(definition, "lattice"), (mesh_type, "structured")], ids=["definition", "mesh type"]
+    )
+    def test_a_name_that_is_taken_is_refused(self, declare, name):
+        with pytest.raises(ValueError, match=rf"'{name}' is springtune\..* already; choose another name for .*other"):
+
+            @declare(name)
+            def other(*_):
+                """Not to be."""
+
+    @pytest.mark.parametrize("registry", REGISTRIES.values(), ids=REGISTRIES)
+    def test_others_only_read(self, registry):
+        with pytest.raises(TypeError):
+            registry["new"] = None
+        with pytest.raises(KeyError, match="unknown .* 'nothing'; known: "):
+            registry["nothing"]
+        assert "nothing" not in registry and registry.get("nothing") is None
+
+
+REPORT = """
+import json, sys
+from springtune.jobs import dependencies
+from springtune.mesh import MESH_TYPES
+from springtune.springs import DEFINITIONS
+import springtune
+found = {
+    "place": springtune.__file__,
+    "DEFINITIONS": {name: dependencies.definition_digest(name) for name in DEFINITIONS},
+    "MESH_TYPES": {name: dependencies.mesh_type_digest(name) for name in MESH_TYPES},
+    "light": not {"scipy", "h5py", "meshio", "netgen", "xarray", "pydantic"} & set(sys.modules),
+}
+from springtune.campaign import plan
+stages = {one.module: {"definitions": one.definitions, "mesh_types": one.mesh_types} for one in plan.stages()}
+found["stages"] = {stage: dependencies.digest(stage) for stage in stages}
+found["modules"] = {stage: dependencies.modules(stage, **chosen) for stage, chosen in stages.items()}
+print(json.dumps(found))
+"""
+
+SCENES = """
+import operator, sys
+from springtune.kinds import load_study
+print(*map(operator.attrgetter(sys.argv[2]), load_study(sys.argv[1]).scenes))
+"""
+
+
+def python(folder, *arguments):
+    """Run Python with the package of a folder."""
+    environment = os.environ | {"PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        [sys.executable, *map(str, arguments)], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def report(folder):
+    found = json.loads(python(folder, "-c", REPORT))
+    assert Path(found["place"]).is_relative_to(folder)
+    return found
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy of the package that tests may write to, and what it says of itself."""
+    folder = tmp_path_factory.mktemp("copy")
+    source = Path(springtune.__file__).parent
+    shutil.copytree(source, folder / "springtune", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder, report(folder)
+
+
+@pytest.fixture
+def added(copy, request):
+    """The copy with the file of a recipe."""
+    folder, before = copy
+    path = folder / "springtune" / request.param
+    assert not path.exists()
+    path.write_text(RECIPES[request.param])
+    yield folder, path, before, report(folder)
+    path.unlink()
+
+
+def check(added, registry, name, after, choosing):
+    """A file more is one name more, at its place; nothing else is to be computed again."""
+    _, path, before, found = added
+    names = list(before[registry])
+    names.insert(names.index(after) + 1, name)
+    assert list(found[registry]) == names
+    other = {"DEFINITIONS", "MESH_TYPES"} - {registry}
+    assert {one: digest for one, digest in found[registry].items() if one != name} == before[registry]
+    assert found[registry][name] not in before[registry].values()
+    assert all(found[one] == before[one] for one in (*other, "stages"))
+    for stage, modules in found["modules"].items():
+        assert set(modules) - set(before["modules"][stage]) == ({str(path)} if stage in choosing else set()), stage
+    assert found["light"]
+    path.write_text(path.read_text() + "\n# Edited.\n")
+    edited = report(added[0])
+    assert [one for one in edited[registry] if edited[registry][one] != found[registry][one]] == [name]
+    assert edited["stages"] == found["stages"]
+
+
+@pytest.mark.parametrize("added", ["springs/twice.py"], indirect=True)
+def test_a_definition_is_one_file(added, tmp_path):
+    check(added, "DEFINITIONS", "twice", "lattice", {one.module for one in stages() if one.definitions})
+    folder = added[0]
+    assert "twice" in [line.split()[0] for line in python(folder, "-m", "springtune", "definitions").splitlines()]
+    study = tmp_path / "one.yaml"
+    study.write_text(STUDY.replace("DEFINITION", "twice").replace("MESH_TYPE", "free"))
+    assert python(folder, "-m", "springtune", "scenes", study).splitlines()[-1].split()[:2] == ["all", "4"]
+    assert set(python(folder, "-c", SCENES, study, "definition").split()) == {"uniform", "twice"}
+
+
+@pytest.mark.parametrize("added", ["mesh/left.py"], indirect=True)
+def test_a_mesh_type_is_one_file(added, tmp_path):
+    check(added, "MESH_TYPES", "left", "right", {one.module for one in stages() if one.mesh_types})
+    folder = added[0]
+    study = tmp_path / "one.yaml"
+    study.write_text(STUDY.replace("DEFINITION", "lattice").replace("MESH_TYPE", "left"))
+    assert set(python(folder, "-c", SCENES, study, "mesh.mesh_type").split()) == {"structured", "left"}
+    beam = ("--beam", "100x20", "--material", "steel")
+    text = python(folder, "-m", "springtune", "predict", *beam, "--mesh", "left", "--size", "10 mm")
+    assert "left" in text and "recommended" in text
