@@ -13,7 +13,7 @@ study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
 
 test: $(VENV)/.test
-	pytest -n 2 --dist loadfile -m "not slow"
+	pytest -n 2 --dist loadgroup -m "not slow"
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 slow: $(VENV)/.test

@@ -106,7 +106,16 @@ def test_small_strain_is_the_limit_of_any_shape(kind, stress, aspect_ratio):
     assert abs(finite.displacement / small.displacement - 1) <= finite.error_estimate + 1e-5
 
 
-@pytest.mark.parametrize(("nu", "load"), [(0.0, 0.5), (0.3, 1.0), (0.5, 1.0), (0.0, 2.0), (0.5, 2.0), (0.0, 5.0)])
+@pytest.mark.parametrize(
+    ("nu", "load"),
+    [
+        # Each Poisson's ratio once, and the largest loads; smaller ones bend less.
+        (0.3, 1.0),
+        (0.5, 2.0),
+        (0.0, 5.0),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.0, 0.5), (0.5, 1.0), (0.0, 2.0))),
+    ],
+)
 def test_slender_cantilevers_are_elasticas(nu, load):
     """The clamp shortens a beam by up to .014 of its height; as in small strain, which then takes shear along."""
     apart = []

@@ -262,7 +262,7 @@ class TestBands:
 
     @pytest.mark.parametrize("mesh_type", MESH_TYPES)
     def test_particles_are_counted_before_the_mesh_is_made(self, mesh_type):
-        for length, height, size in ((0.2, 0.04, 1e-3), (0.1, 0.1, 2e-3), (0.3, 0.02, 0.5e-3)):
+        for length, height, size in ((0.2, 0.04, 2e-3), (0.1, 0.1, 4e-3), (0.3, 0.02, 1e-3)):
             beam = Beam("b", length, height, 1e-3)
             made = len(MESH_TYPES[mesh_type](length, height, size).points)
             assert particles(mesh_type, beam, size) == pytest.approx(made, rel=0.2)

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from springtune.units import COMMON, KINDS, UnitError, parse
 
+REGISTRY = pint.UnitRegistry()
+
 USUAL = [(kind, unit) for kind, units in COMMON.items() for unit in units]
 
 
@@ -39,7 +41,7 @@ def test_reads_quantities(text, kind, value):
 
 @pytest.mark.parametrize(("kind", "unit"), USUAL)
 def test_table_agrees_with_pint(kind, unit):
-    theirs = pint.UnitRegistry().Quantity(1.0, unit).to(KINDS[kind].unit).magnitude
+    theirs = REGISTRY.Quantity(1.0, unit).to(KINDS[kind].unit).magnitude
     assert math.isclose(parse(f"1 {unit}", kind), theirs, rel_tol=1e-12)
 
 

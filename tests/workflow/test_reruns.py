@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 from springtune.mesh import MESH_TYPES, Mesh
+from springtune.study import StudyError, load_study
 
 STUDY = """
 title: Reruns
@@ -34,10 +35,17 @@ def dataset(run, name):
         return tree.load()
 
 
-def test_only_what_is_new_is_computed(run):
+@pytest.fixture(scope="module")
+def grown(run):
+    """A study of two mesh sizes, run up to its dataset."""
     run.write("grow.yaml", study())
     code, output = run.snakemake("grow.yaml", "--until", "collect")
     assert code == 0, output
+    return run
+
+
+def test_only_what_is_new_is_computed(grown):
+    run = grown
     stored = "results/grow/[mcs]*s/*_*mm.*"
     before = run.times(stored)
     assert len(before) == 2 * 4  # mesh and notes, curves, solutions
@@ -58,12 +66,10 @@ def test_only_what_is_new_is_computed(run):
     assert dataset(run, "grow").mesh_size.values.tolist() == [5e-3, 10e-3]
 
 
-def test_a_deleted_result_is_made_again(run):
-    run.write("lost.yaml", study("10 mm"))
-    assert run.snakemake("lost.yaml")[0] == 0
-    lost = run.folder / "results/lost/meshes/small_structured_10mm.vtu"
+def test_a_deleted_result_is_made_again(grown):
+    lost = grown.folder / "results/grow/meshes/small_structured_10mm.vtu"
     lost.unlink()
-    code, output = run.snakemake("lost.yaml")
+    code, output = grown.snakemake("grow.yaml", "--until", "collect")
     assert code == 0, output
     assert lost.exists()
 
@@ -89,10 +95,10 @@ def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
 
     text = study("5 mm").replace("mesh_type: structured\n    mesh", "mesh_type: own\n    mesh")
     files = "mesh_files: {own: [{file: own.inp, unit: 1 mm, beam: small, mesh_size: 5 mm}]}\n"
-    text = text.replace("grids:", f"{files}outputs: [tables]\ngrids:").replace("[paper, lattice]", "delingette")
+    text = text.replace("grids:", f"{files}grids:").replace("[paper, lattice]", "delingette")
     run.write("own.yaml", text)
     save(mesh)
-    code, output = run.snakemake("own.yaml")
+    code, output = run.snakemake("own.yaml", "--until", "collect")
     assert code == 0, output
     first = dataset(run, "own").to_dataset()
     assert first.mesh_type.values.tolist() == ["own"] and (first.status == 1).all()
@@ -102,7 +108,7 @@ def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
     inside = ((moved > 1e-9) & (moved < [0.05 - 1e-9, 0.02 - 1e-9])).all(axis=1)
     moved[inside] += 3e-4
     save(Mesh(moved, mesh.triangles))
-    assert run.snakemake("own.yaml")[0] == 0
+    assert run.snakemake("own.yaml", "--until", "collect")[0] == 0
     second = dataset(run, "own").to_dataset()
     assert second.displacement.item() != first.displacement.item()
     assert second.displacement.item() == pytest.approx(first.displacement.item(), rel=0.01)
@@ -127,18 +133,27 @@ def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
     ],
     ids=["misspelt key", "stiffness 1000 times too large", "negative", "dimension", "mesh size", "empty", "mesh type"],
 )
-def test_bad_input_is_one_message_and_nothing_written(run, change, words):
+def test_bad_input_is_one_message(run, change, words):
     text = study("5 mm")
     assert change[0] in text
     run.write("bad.yaml", text.replace(*change))
-    code, output = run.snakemake("bad.yaml")
+    with pytest.raises(StudyError) as caught:
+        load_study(run.folder / "bad.yaml")
+    message = str(caught.value)
+    assert "bad.yaml" in message and all(word in message for word in words)
+
+
+def test_bad_input_ends_a_run_with_its_message_and_nothing_written(run):
+    """Whatever the message is: to Snakemake all of them are one error."""
+    run.write("worse.yaml", study("5 mm").replace("beam: small", "beem: small"))
+    with pytest.raises(StudyError) as caught:
+        load_study(run.folder / "worse.yaml")
+    code, output = run.snakemake("worse.yaml")
     assert code == 1
-    message = [line for line in output.splitlines() if "bad.yaml" in line]
-    assert message, output
-    for word in words:
-        assert word in output
+    for line in str(caught.value).splitlines():
+        assert line.partition("worse.yaml")[2] in output
     assert "Traceback" not in output
-    assert not (run.folder / "results/bad").exists()
+    assert not (run.folder / "results/worse").exists()
 
 
 def test_what_differs_by_a_scale_alone_has_one_reference(run):
@@ -168,21 +183,23 @@ def test_what_differs_by_a_scale_alone_has_one_reference(run):
 
 def test_more_cores_make_more_bundles_and_solve_nothing_again(run):
     run.write("spread.yaml", study("10 mm, 5 mm, 4 mm, 2 mm, 1 mm"))
+    # Bundles follow costs: as if scenes were worth two jobs, and not worth three, whatever this machine measures.
+    costs = '{"kinds": {"nonlinear": [1.0, 30.0]}, "start_up": 0.25}'
+    (run.folder / "results").mkdir(exist_ok=True)
 
-    def collected(cores):
-        # As if scenes were worth two jobs, and not worth three, whatever the run before has measured.
-        (run.folder / "results").mkdir(exist_ok=True)
-        run.write("results/costs.json", '{"kinds": {"nonlinear": [1.0, 30.0]}, "start_up": 0.25}')
-        code, output = run.snakemake("spread.yaml", "--cores", cores, "--until", "collect")
+    def solved_on(cores):
+        run.write("results/costs.json", costs)
+        code, output = run.snakemake("spread.yaml", "--cores", cores, "--until", "solve")
         assert code == 0, output
+        assert (run.folder / "results/costs.json").read_text() == costs  # `collect` alone writes what jobs measured
 
-    collected("1")
+    solved_on("1")
     one, solved = run.times("results/spread/tasks/solve_*.json"), run.times("results/spread/solutions/*.h5")
     assert len(one) == 1
-    collected("2")
+    solved_on("2")
     assert len(run.times("results/spread/tasks/solve_*.json")) == 2
     assert run.times("results/spread/solutions/*.h5") == solved
     done = run.times("results/spread/done/*.json")
     for cores in ("2", "1"):  # fewer share what there is
-        collected(cores)
+        solved_on(cores)
         assert run.times("results/spread/done/*.json") == done
