@@ -8,7 +8,7 @@ from snakemake.exceptions import WorkflowError
 
 from springtune.campaign import plan
 from springtune.jobs.dependencies import PACKAGE, modules
-from springtune.kinds import KINDS, kinds, load_study
+from springtune.kinds import KINDS, kinds, load_study, outputs
 from springtune.study import StudyError
 
 # One thread a process: the solvers are sequential, and cores are Snakemake's to share out.

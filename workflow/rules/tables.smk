@@ -1,11 +1,12 @@
 """Tables and pages of text, one rule an output that has any."""
 
 TABLES = []
-PAGE_TABLES = [f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
+PAGE = ["campaign.page", *(f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables)]
 
-for made in plan.outputs():
-    if made.tables(STUDY) and made.name in STUDY.outputs:
-        TABLES += [RESULTS / "tables" / name for name in made.tables(STUDY)]
+for made in outputs().values():
+    files = plan.table_files(made, STUDY)
+    if files and made.name in STUDY.outputs:
+        TABLES += [RESULTS / "tables" / name for name in files]
 
         rule:
             name:
@@ -14,13 +15,13 @@ for made in plan.outputs():
                 f"Writing the tables of {made.name}"
             input:
                 dataset=rules.collect.output,
-                code=modules("campaign.tabulate", made.write, *(PAGE_TABLES if made.write == "campaign.page" else [])),
-                template=PACKAGE / "output/page.html",
+                code=modules("campaign.tabulate", *(PAGE if made.page else [made.write])),
+                template=PACKAGE / "output/page.html" if made.page else [],
             output:
-                [RESULTS / "tables" / name for name in made.tables(STUDY)],
+                [RESULTS / "tables" / name for name in files],
             params:
                 folder=str(RESULTS / "tables"),
-                module=made.write,
+                module=PAGE[0] if made.page else made.write,
             log:
                 RESULTS / "logs" / f"tables_{made.name}.log",
             benchmark:

@@ -22,14 +22,21 @@ def stages():
     return tuple(stage for kind in kinds() for stage in kind.stages)
 
 
-def outputs():
-    """What is made from the dataset, of all study kinds.
+def table_files(output, study):
+    """Files of the tables of an output: where it is the page, each table of all study kinds as CSV, and the page.
+
+    Parameters
+    ----------
+    output : Output
+    study : Study
 
     Returns
     -------
-    tuple of Output
+    list of str
     """
-    return tuple(output for kind in kinds() for output in kind.outputs)
+    if not output.page:
+        return output.tables(study)
+    return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
 
 
 def usual_costs():

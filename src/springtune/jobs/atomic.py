@@ -1,9 +1,24 @@
-"""Text files that appear whole or not at all."""
+"""Files that appear whole or not at all."""
 
 import json
 import os
 from pathlib import Path
 from typing import Any
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write a file; folders are made where they are missing.
+
+    Parameters
+    ----------
+    path : str or Path
+    content : bytes
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(path.name + ".unfinished")
+    unfinished.write_bytes(content)
+    os.replace(unfinished, path)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -22,11 +37,7 @@ def write_text(path: str | Path, text: str) -> None:
     ...     (Path(folder) / "deep/note.txt").read_text()
     'all of it'
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".unfinished")
-    unfinished.write_text(text, encoding="utf-8")
-    os.replace(unfinished, path)
+    write_bytes(path, text.encode())
 
 
 def write_json(path: str | Path, content: Any) -> None:

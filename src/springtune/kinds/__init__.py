@@ -18,18 +18,17 @@ def kinds():
     return tuple(import_module(f".{name}.kind", __name__).KIND for name in KINDS)
 
 
-def page_files(study):
-    """Files of the page of all tables: each table as CSV, and the page.
-
-    Parameters
-    ----------
-    study : Study
+@cache
+def outputs():
+    """What is made from a dataset, of all study kinds.
 
     Returns
     -------
-    list of str
+    dict of str to Output
+        By name.
     """
-    return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
+    modules = [import_module(f".{name}.outputs", __name__) for name in KINDS]
+    return {output.name: output for module in modules for output in module.OUTPUTS}
 
 
 def load_study(path):

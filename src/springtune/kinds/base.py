@@ -4,6 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 
+FORMATS = ("png", "pdf")
+"""Endings of a figure's files."""
+
 
 @dataclass(frozen=True)
 class Output:
@@ -16,13 +19,18 @@ class Output:
     meaning : str
         What it is, for the manual.
     figures : callable, optional
-        Of a study: selections of the figures by the stems of their files.
+        Of a study: labels that each figure selects, a dict, by the stem of its files.
     plot : str
-        Module with ``draw(tree, folder)``, which draws them; from the package on.
+        ``"module:function"`` of what draws the figures, from the package on: a function from a dataset's tree to
+        triples of the stem, the function that plots and its selection.
+    job : str
+        Name of the job that draws; outputs that share it are drawn by one process. By default its own name.
     tables : callable, optional
         Of a study: names of the files of its tables.
     write : str
         Module with ``write(tree, folder)``, which writes them; from the package on.
+    page : bool
+        Whether it is the page of all tables, `springtune.campaign.page`.
     lack : callable, optional
         Of a study: what it would need for this output and has not, with the remedy; empty where it has all.
     usual : bool
@@ -33,10 +41,26 @@ class Output:
     meaning: str
     figures: Callable = lambda study: {}
     plot: str = ""
+    job: str = ""
     tables: Callable = lambda study: []
     write: str = ""
+    page: bool = False
     lack: Callable = lambda study: ""
     usual: bool = False
+
+    @property
+    def drawn_by(self):
+        """Name of the job that draws the figures."""
+        return self.job or self.name
+
+    @property
+    def module(self):
+        """Module that draws the figures, from the package on."""
+        return self.plot.partition(":")[0]
+
+    def stems(self, study):
+        """Stems of the figures of a study, none where it does not ask for the output."""
+        return list(self.figures(study)) if self.name in study.outputs else []
 
 
 @dataclass(frozen=True)
@@ -133,3 +157,28 @@ class Kind:
     def module(self, name):
         """A module of its package."""
         return import_module(f"{self.package}.{name}")
+
+
+def stem(name, selection):
+    """Stem of the files of a figure that has one for each selection."""
+    return "_".join([name, *selection.values()])
+
+
+def distinct(name, labels, cells):
+    """Distinct selections of a study's cells, in order, by stem.
+
+    Parameters
+    ----------
+    name : str
+        First part of the stem.
+    labels : tuple of str
+        Dimensions that a figure selects.
+    cells : iterable of dict
+        Labels of each cell that the study has.
+
+    Returns
+    -------
+    dict of str to dict
+    """
+    chosen = [{label: cell[label] for label in labels} for cell in cells]
+    return {stem(name, one): one for one in chosen}

@@ -3,36 +3,61 @@
 import numpy as np
 
 from ...output import style
+from ...output.selection import cells, choose, group
 
 
-def draw(tree, folder):
-    """Draw the figure ``laying``: one panel a loading and friction, the finest mesh of each definition.
+def laying(tree):
+    """The figure of laid strips.
 
     Parameters
     ----------
     tree : xarray.DataTree
-        With the group ``/laying``.
-    folder : str or Path
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    yield "laying", plot_laying, {}
+
+
+@style.styled
+def plot_laying(data, ax=None, *, loading=None, friction=None):
+    """Strips laid on a trapezoid: a panel a loading and friction, the finest mesh of each definition.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/laying``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as panels; by default a new figure.
+    loading : str, optional
+        One loading in place of all.
+    friction : float, optional
+        One coefficient of friction in place of all.
 
     Returns
     -------
-    list of str
-        Stems of the files written.
+    ndarray of matplotlib.axes.Axes
+        One a panel.
+
+    Raises
+    ------
+    ValueError
+        If nothing has the loading or friction, or ``ax`` is not as many Axes as panels.
     """
-    laid = tree["laying"].to_dataset()
-    cells = [
-        {"loading": loading, "friction": friction}
-        for loading in laid.loading.values
-        for friction in laid.friction.values
-        if (laid.status.sel(loading=loading, friction=friction) != 0).any()
-    ]
-    arguments = {"nrows": len(cells), "squeeze": False, "figsize": (8.0, 0.6 + 2.5 * len(cells))}
-    with style.figure(folder, "laying", **arguments) as (drawn, axes):
-        for panel, cell in zip(axes[:, 0], cells):
-            _panel(panel, laid.sel(cell), cell)
-        height = drawn.get_size_inches()[1]
-        drawn.subplots_adjust(left=0.07, right=0.99, bottom=0.45 / height, top=1 - 0.35 / height, hspace=0.5)
-    return ["laying"]
+    laid = group(data, "laying")
+    for name, label in {"loading": loading, "friction": friction}.items():
+        if label is not None:
+            choose(laid.status != 0, **{name: label})
+            laid = laid.sel({name: [label]})
+    shown = cells(laid.status != 0, ("loading", "friction"))
+    figure, axes = style.panels(ax, nrows=len(shown), figsize=(8.0, 0.6 + 2.5 * len(shown)))
+    axes = axes[:, 0]
+    for panel, cell in zip(axes, shown):
+        _panel(panel, laid.sel(cell), cell)
+    style.arrange(figure, left=0.56, right=0.08, bottom=0.45, top=0.35, hspace=0.5)
+    return axes
 
 
 def _panel(panel, laid, cell):

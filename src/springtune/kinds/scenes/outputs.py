@@ -1,8 +1,15 @@
 """What is made of scenes."""
 
 from ...problem.loads import LOADS
-from .. import page_files
-from ..base import Output
+from ..base import Output, distinct
+
+SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
+"""Dimensions of which a figure of sensitivity curves shows one label."""
+
+SCENE_LABELS = ("mesh_type", "material", "load")
+"""The same for figures of errors against mesh size, and of deformed networks."""
+
+PLOTS = "kinds.scenes.figures"
 
 TABLE = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""
@@ -32,10 +39,43 @@ def _lack_of_pressure(study):
     return "" if pressed(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
 
 
+def _cells(items):
+    for item in items:
+        if item.kinematics == "nonlinear":
+            labels = {"beam": item.mesh.beam.name, "mesh_type": item.mesh.mesh_type}
+            yield labels | {"material": item.material.name, "load": item.load}
+
+
 OUTPUTS = (
-    Output("sensitivity", "figures of sensitivity curves", usual=True),
-    Output("size", "figures of errors against mesh size", usual=True),
-    Output("deformed", "figures of deformed networks (and the group `/fields` behind them)", usual=True),
-    Output("tables", "tables as the paper's, on one page", tables=page_files, write="campaign.page", usual=True),
-    Output("block", "the figure of a pressed face", lack=_lack_of_pressure),
+    Output(
+        "sensitivity",
+        "figures of sensitivity curves",
+        figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, _cells(study.curves)),
+        plot=f"{PLOTS}:sensitivity",
+        usual=True,
+    ),
+    Output(
+        "size",
+        "figures of errors against mesh size",
+        figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
+        plot=f"{PLOTS}:size",
+        job="scenes",
+        usual=True,
+    ),
+    Output(
+        "deformed",
+        "figures of deformed networks (and the group `/fields` behind them)",
+        figures=lambda study: distinct("deformed", SCENE_LABELS, _cells(study.scenes)),
+        plot=f"{PLOTS}:deformed",
+        job="scenes",
+        usual=True,
+    ),
+    Output("tables", "tables as the paper's, on one page", page=True, usual=True),
+    Output(
+        "block",
+        "the figure of a pressed face",
+        figures=lambda study: {"block": {}},
+        plot=f"{PLOTS}:block",
+        lack=_lack_of_pressure,
+    ),
 )

@@ -1,0 +1,91 @@
+"""What of a dataset a figure shows: its group, and the labels that it selects."""
+
+import numpy as np
+import xarray as xr
+
+
+def group(data, name):
+    """Dataset of a group: ``data`` itself unless it is a tree.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+    name : str
+        Such as ``"sensitivity"``; ``"/"`` is the root.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    ValueError
+        If the tree has no such group.
+    """
+    if not isinstance(data, xr.DataTree):
+        return data
+    if name == "/":
+        return data.to_dataset()
+    if name not in data.children:
+        raise ValueError(f"the dataset has no group '/{name}'; it has {_listed(f'/{one}' for one in data.children)}")
+    return data[name].to_dataset()
+
+
+def choose(present, **selection):
+    """Labels that a figure is of: those given, and those that leave no choice.
+
+    Parameters
+    ----------
+    present : xarray.DataArray of bool
+        Cells that the study has.
+    **selection
+        Label by dimension; None where none is given.
+
+    Returns
+    -------
+    dict
+        Label by dimension, in the order given; dimensions that ``present`` does not have are left out.
+
+    Raises
+    ------
+    ValueError
+        If a label is not there, or if none is given and several are there.
+    """
+    chosen = {name: label for name, label in selection.items() if name in present.dims}
+    labels = {name: present[name].values.tolist() for name in chosen}
+    there = present.values
+    for given in (True, False):
+        for name, label in chosen.items():
+            if (selection[name] is not None) is not given:
+                continue
+            axis = present.dims.index(name)
+            places = np.flatnonzero(there.any(axis=tuple(one for one in range(there.ndim) if one != axis)))
+            found = [labels[name][place] for place in places]
+            if given and label not in found:
+                raise ValueError(f"nothing has {name} {label!r}; there is {_listed(found)}")
+            if not found:
+                raise ValueError("nothing to plot: the dataset has no cell of the selection")
+            if not given and len(found) > 1:
+                raise ValueError(f"choose one {name}: {_listed(found)}")
+            chosen[name] = label if given else found[0]
+            # Of the other labels nothing is left, so that later dimensions are seen under this one.
+            kept = np.arange(there.shape[axis]) == labels[name].index(chosen[name])
+            there = there & np.expand_dims(kept, tuple(one for one in range(there.ndim) if one != axis))
+    return chosen
+
+
+def labels_of(present, name):
+    """Labels of a dimension that have any cell present: list, in the dataset's order."""
+    there = present.any([dimension for dimension in present.dims if dimension != name])
+    return there[name].values[there.values].tolist()
+
+
+def cells(present, names):
+    """Labels of every cell present over some dimensions: list of dicts, the last name fastest."""
+    there = present.any([dimension for dimension in present.dims if dimension not in names]).transpose(*names)
+    labels = [there[name].values.tolist() for name in names]
+    return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
+
+
+def _listed(labels):
+    return ", ".join(repr(label) for label in labels) or "nothing"

@@ -1,0 +1,463 @@
+"""Figures: what each plots of a dataset, on which axes, and what it leaves alone."""
+
+import io
+import subprocess
+import sys
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from springtune.campaign import draw
+from springtune.kinds import outputs
+from springtune.kinds.base import FORMATS, Output
+from springtune.kinds.benchmark.figures import (
+    plot_benchmark,
+    plot_benchmark_costs,
+    plot_benchmark_curve,
+    plot_benchmark_rates,
+)
+from springtune.kinds.laying.figures import plot_laying
+from springtune.kinds.moduli.figures import plot_definitions_loads, plot_definitions_size, plot_moduli
+from springtune.kinds.scenes.figures import plot_block, plot_deformed, plot_sensitivity, plot_size
+from springtune.kinds.stability.figures import (
+    PLOTS,
+    plot_stability_buckling,
+    plot_stability_energy,
+    plot_stability_limits,
+    plot_stability_maps,
+    plot_stability_meshes,
+    plot_stability_rest,
+    plot_stability_strains,
+)
+from springtune.output import style
+from springtune.output.canvas import png_and_pdf
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    """No figure opens a window, and those that a test has made are closed after it."""
+    with matplotlib.rc_context():
+        plt.switch_backend("agg")
+        yield
+    plt.close("all")
+
+
+# -- a dataset of which every number is told from the others -----------------------------------------------------------
+
+BEAMS, TYPES, SIZES = ["100x20", "200x40"], ["structured", "free"], [1e-3, 2e-3, 5e-3]
+MATERIALS, LOADS, DEFINITIONS = ["steel", "rubber"], ["traction", "compression", "pressure"], ["paper", "area"]
+SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+LABELS = {
+    "beam": BEAMS,
+    "mesh_type": TYPES,
+    "mesh_size": SIZES,
+    "material": MATERIALS,
+    "load": LOADS,
+    "definition": DEFINITIONS,
+    "kinematics": ["nonlinear", "linear"],
+}
+
+
+def variables(labels, **dimensions):
+    """Dataset of distinct numbers over dimensions: each variable counts on where the one before it ended."""
+    data, start = xr.Dataset(coords=labels), 1
+    for name, dims in dimensions.items():
+        shape = [len(labels[dim]) for dim in dims]
+        count = int(np.prod(shape))
+        data[name] = (dims, 1e-3 * np.arange(start, start + count).reshape(shape))
+        start += count
+    return data
+
+
+def root():
+    load, mesh = ("beam", "material", "load"), ("beam", "mesh_type", "mesh_size", "material", "load")
+    data = variables(
+        LABELS, deformation_error=SCENE, field_error=SCENE, stiffness=SCENE, reference_displacement=load, force=load,
+        paper_displacement=mesh, paper_reference_displacement=mesh, paper_stiffness=mesh,
+        material_young_modulus=("material",), material_poisson_ratio=("material",),
+    )  # fmt: skip
+    return data.assign(status=xr.ones_like(data.deformation_error, dtype=np.int8))
+
+
+def sensitivity():
+    dims = ("beam", "mesh_type", "mesh_size", "material", "load", "kinematics")
+    labels = {name: LABELS[name] for name in dims} | {"stiffness_ratio": [0.5, 0.7, 0.9, 1.1]}
+    curve = (*dims, "stiffness_ratio")
+    data = variables(labels, deformation_error=curve, displacement=curve)
+    data["stiffness"] = 1e3 * data.stiffness_ratio.broadcast_like(data.displacement)
+    data["best_stiffness"] = data.stiffness.isel(stiffness_ratio=0, drop=True) + 300
+    data["predicted_stiffness"] = data.best_stiffness + 50
+    return data.assign(status=xr.ones_like(data.displacement, dtype=np.int8))
+
+
+def fields():
+    places = {"particle": range(4), "outline_point": range(5), "spring": range(3), "coordinate": range(2)}
+    mesh, load = ("beam", "mesh_type", "mesh_size"), ("material", "load")
+    labels = LABELS | places
+    data = variables(
+        labels, x=(*mesh, "particle"), y=(*mesh, "particle"),
+        displacement_x=(*mesh, "definition", *load, "particle"),
+        displacement_y=(*mesh, "definition", *load, "particle"),
+        outline_x=("beam", "outline_point"), outline_y=("beam", "outline_point"),
+        reference_displacement_x=("beam", *load, "outline_point"),
+        reference_displacement_y=("beam", *load, "outline_point"),
+    )  # fmt: skip
+    ends = xr.DataArray([[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]], dims=("end", "spring"))
+    shape = data.x.isel(particle=0, drop=True) * 0
+    return data.assign(spring_first=shape + ends[0], spring_second=shape + ends[1])
+
+
+def block():
+    labels = LABELS | {"face_position": [0.0, 0.5, 1.0], "reference": ["small-strain", "neo-hooke"]}
+    data = variables(
+        labels, face_profile=(*SCENE, "face_position"),
+        reference_face_profile=("beam", "material", "load", "reference", "face_position"),
+    )  # fmt: skip
+    return data
+
+
+def moduli():
+    labels = {name: LABELS[name] for name in ("mesh_type", "definition", "mesh_size")} | {"poisson_ratio": [0.0, 0.3]}
+    data = variables(labels, effective_poisson_ratio=tuple(labels))
+    return data.assign(status=xr.ones_like(data.effective_poisson_ratio, dtype=np.int8))
+
+
+def laying():
+    labels = {"loading": ["gravity", "pressure"], "friction": [0.0, 0.3], "definition": DEFINITIONS, "mesh_size": SIZES}
+    places = {"corner": range(4), "strip_point": range(5), "reference_point": range(5)}
+    cell = ("loading", "friction")
+    every = (*cell, "definition", "mesh_size")
+    data = variables(
+        labels | places, trapezoid_x=("corner",), trapezoid_y=("corner",), strip_x=(*every, "strip_point"),
+        strip_y=(*every, "strip_point"), reference_x=(*cell, "reference_point"), reference_y=(*cell, "reference_point"),
+        reference_elongation=cell, reference_elongation_error_estimate=cell, area_error=every, elongation=every,
+    )  # fmt: skip
+    return data.assign(status=xr.ones_like(data.elongation, dtype=np.int8))
+
+
+def stability():
+    labels = {
+        "definition": DEFINITIONS, "mesh_size": SIZES, "integrator": ["central-difference", "backward-euler"],
+        "damper": ["mass", "springs"], "damping_ratio": [0.0, 0.1], "step_ratio": [0.5, 1.0, 2.0],
+        "map_damping_ratio": [0.1, 1.0], "sample": range(5), "critical_ratio": [0.5, 1.0, 2.0],
+        "cg_iterations": [5, 0], "implicit_steps": [10, 50], "sliver_angle": [30.0, 5.0], "perturbation": [0.0, 0.2],
+        "strain_load": ["axial", "follower-pressure"], "strain": [-0.1, 0.1], "rows": [10, 20], "arch_point": range(4),
+    }  # fmt: skip
+    scheme = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
+    strained = ("strain_load", "definition", "strain")
+    data = variables(
+        labels, dt_limit_predicted=scheme, dt_limit_measured=scheme, omega_max=("definition", "mesh_size"),
+        dt_particle_bound=("definition", "mesh_size"), behaviour=("integrator", "step_ratio", "map_damping_ratio"),
+        step_ratio_predicted=("integrator", "map_damping_ratio"), energy=("integrator", "sample"),
+        energy_drift=("integrator",), steps_to_rest=("critical_ratio",),
+        truncated_error=("cg_iterations", "implicit_steps", "mesh_size"),
+        sliver_step_limit=("definition", "sliver_angle"),
+        perturbed_step_limit=("definition", "perturbation"), perturbed_error=("definition", "perturbation"),
+        strain_status=strained, negative_pivots=strained, strain_load_share=strained,
+        buckling_load=("definition", "rows"), euler_load=("definition",), arch_deflection=("definition", "arch_point"),
+        arch_load=("definition", "arch_point"), arch_negative_pivots=("definition", "arch_point"),
+    )  # fmt: skip
+    data["strain_message"] = xr.full_like(data.strain_status, "", dtype=object)
+    done = ["limits", "maps", "drift", "rest", "slivers", "strains", "buckling"]
+    return data.assign_coords(experiment=done)
+
+
+def benchmark():
+    labels = {
+        "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
+        "mesh_size": SIZES, "curve_count": [1, 11],
+    }  # fmt: skip
+    cell, fit = ("scene", "approach", "mesh_size"), ("scene", "approach")
+    parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorising", "solving")], cell)
+    return variables(
+        labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts, cost_exponent=fit, error_rate=fit,
+        reference_error_estimate=("scene",), reference_seconds=("scene",), separate_seconds=("curve_count",),
+        curve_seconds=("curve_count",),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def tree():
+    groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
+    groups |= {"stability": stability, "benchmark": benchmark}
+    # Groups are written and read one by one, so that labels of one need not be those of another.
+    return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})
+
+
+SCENES = {"mesh_type": "free", "material": "steel", "load": "traction"}
+CURVE = SCENES | {"beam": "200x40"}
+
+EVERY_PLOT = {
+    plot_sensitivity: (CURVE, None),
+    plot_size: (SCENES, 2),
+    plot_deformed: (SCENES | {"definition": "area"}, 2),
+    plot_block: ({"beam": "100x20", "mesh_type": "free", "mesh_size": 2e-3, "material": "steel"}, 2),
+    plot_moduli: ({}, 2),
+    plot_definitions_size: (
+        {"beam": "100x20", "material": "steel", "load": "traction", "kinematics": "linear"},
+        2,
+    ),
+    plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
+    plot_laying: ({}, 4),
+    plot_benchmark: ({"scene": "bending"}, None),
+    plot_benchmark_rates: ({}, 2),
+    plot_benchmark_costs: ({"scene": "bending"}, 2),
+    plot_benchmark_curve: ({}, None),
+    plot_stability_limits: ({}, 2),
+    plot_stability_maps: ({}, 2),
+    plot_stability_energy: ({}, None),
+    plot_stability_rest: ({}, 2),
+    plot_stability_meshes: ({}, 2),
+    plot_stability_strains: ({}, 2),
+    plot_stability_buckling: ({}, 2),
+}
+"""Every function that plots: a selection, and how many axes it returns; None where it returns one by itself."""
+
+each = pytest.mark.parametrize("plot", EVERY_PLOT, ids=lambda plot: plot.__name__)
+
+
+# -- all of them -------------------------------------------------------------------------------------------------------
+
+
+@each
+def test_a_plot_returns_axes_with_something_on_them_and_leaves_settings_as_they_are(tree, plot):
+    selection, count = EVERY_PLOT[plot]
+    settings = dict(matplotlib.rcParams)
+    axes = plot(tree, **selection)
+    assert dict(matplotlib.rcParams) == settings
+    assert isinstance(axes, Axes) if count is None else np.shape(axes) == (count,)
+    for panel in np.ravel(axes):
+        assert panel.has_data() and (panel.get_title("left") or panel.get_title())
+    assert {panel.figure.number for panel in np.ravel(axes)} == set(plt.get_fignums())
+
+
+@each
+def test_a_plot_draws_on_axes_and_figures_that_it_is_given(tree, plot):
+    selection, count = EVERY_PLOT[plot]
+    figure = Figure(figsize=(7, 5))
+    given = figure.subplots(count or 1, squeeze=False)[:, 0]
+    place, size = [panel.get_position().bounds for panel in given], figure.get_size_inches().tolist()
+    axes = plot(tree, given if count else given[0], **selection)
+    assert list(np.ravel(axes)) == list(given) and all(panel.has_data() for panel in given)
+    png_and_pdf(figure)  # nothing that cannot be drawn
+    if not np.any([panel.get_aspect() != "auto" for panel in given]):
+        assert [panel.get_position().bounds for panel in given] == place
+    assert figure.get_size_inches().tolist() == size
+
+    figure = Figure(figsize=(7, 5))
+    axes = plot(tree, figure, **selection)
+    assert all(panel.figure is figure for panel in np.ravel(axes)) and not plt.get_fignums()
+    assert figure.get_size_inches().tolist() == [7, 5]
+
+
+@pytest.mark.parametrize("plot", [plot for plot, (_, count) in EVERY_PLOT.items() if count], ids=lambda p: p.__name__)
+def test_too_few_axes_are_refused(tree, plot):
+    with pytest.raises(ValueError, match=r"panels, ax has 1 Axes"):
+        plot(tree, Figure().subplots(), **EVERY_PLOT[plot][0])
+
+
+def test_importing_figures_chooses_no_backend():
+    modules = sorted({plot.__module__ for plot in EVERY_PLOT})
+    done = subprocess.run(
+        [sys.executable, "-c", f"import {', '.join(modules)}, sys, matplotlib\n"
+         "print('matplotlib.pyplot' in sys.modules, matplotlib.rcParams._get_backend_or_none())\n"
+         "print(matplotlib.rcParams['axes.grid'], matplotlib.rcParams['font.size'])"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == ["False", "None", "False", "10.0"]
+
+
+# -- what they show ----------------------------------------------------------------------------------------------------
+
+
+def drawn(axes, label):
+    """The line of a label."""
+    return next(line for line in axes.get_lines() if line.get_label() == label)
+
+
+def test_a_sensitivity_curve_carries_the_errors_of_the_dataset(tree):
+    axes = plot_sensitivity(tree, **CURVE)
+    curves = tree["sensitivity"].to_dataset().sel(CURVE).sel(kinematics="nonlinear")
+    for size in SIZES:
+        line, curve = drawn(axes, f"{1e3 * size:g} mm"), curves.sel(mesh_size=size)
+        # The minimum stands between two stiffnesses.
+        assert line.get_xdata() == pytest.approx([500, 700, 800, 900, 1100])
+        error = 100 * curve.deformation_error.values
+        assert line.get_ydata() == pytest.approx([error[0], error[1], 0, error[2], error[3]])
+    assert "200x40 mm, free, steel, traction" in axes.get_title("left")
+    reference = tree.reference_displacement.sel(beam="200x40", material="steel", load="traction")
+    assert f"reference {1e3 * float(reference):.4g} mm" in axes.get_title("left")
+
+
+def test_unstable_points_of_a_curve_are_thin(tree):
+    data = tree["sensitivity"].to_dataset()
+    data["status"] = data.status.copy()
+    data.status.loc[{"mesh_size": 2e-3, "stiffness_ratio": 0.5}] = 4
+    axes = plot_sensitivity(data, **CURVE)  # of the group alone
+    stable = drawn(axes, "2 mm").get_ydata()
+    assert np.isnan(stable[0]) and np.isfinite(stable[1:]).all()
+    thin = [line for line in axes.get_lines() if line.get_linewidth() == 0.7 and len(line.get_xdata()) == 5]
+    assert len(thin) == 1 and np.isfinite(thin[0].get_ydata()).tolist() == [True, False, False, False, False]
+
+
+def test_errors_against_mesh_size_are_the_datasets(tree):
+    panels = plot_size(tree, **SCENES)
+    for panel, beam in zip(panels, BEAMS):
+        error = tree.deformation_error.sel(SCENES).sel(beam=beam, kinematics="nonlinear")
+        for definition in DEFINITIONS:
+            line = drawn(panel, definition)
+            assert line.get_xdata() == pytest.approx([1, 2, 5])
+            assert line.get_ydata() == pytest.approx(100 * error.sel(definition=definition).values)
+        assert panel.get_title("left") == f"{beam} mm"
+    (panel,) = plot_size(tree, beam="200x40", **SCENES)
+    assert panel.get_title("left") == "200x40 mm"
+
+
+def test_springs_of_a_deformed_network_join_its_moved_particles(tree):
+    panel = plot_deformed(tree, beam="100x20", definition="area", **SCENES)[0]
+    here = tree["fields"].to_dataset().sel(SCENES).sel(beam="100x20", definition="area", mesh_size=5e-3)
+    title = panel.get_title("left")
+    scale = float(title.rpartition("x ")[2])
+    springs = next(line for line in panel.get_lines() if line.get_linewidth() == 0.5)
+    x = 1e3 * (here.x + scale * here.displacement_x).values
+    assert springs.get_xdata() == pytest.approx(
+        [x[0], x[1], np.nan, x[1], x[2], np.nan, x[2], x[3], np.nan], nan_ok=True
+    )
+    assert "mesh 5 mm" in title  # the coarsest, whose springs can be told
+
+
+def test_a_network_that_is_not_solved_says_so(tree):
+    data = tree.copy()
+    fields = data["fields"].to_dataset()
+    data["fields"] = xr.DataTree(fields.assign(displacement_x=np.nan * fields.displacement_x,
+                                               displacement_y=np.nan * fields.displacement_y))  # fmt: skip
+    panel = plot_deformed(data, beam="100x20", definition="area", **SCENES)[0]
+    assert [text.get_text() for text in panel.texts] == ["not solved"]
+
+
+def test_the_pressed_face_is_the_datasets(tree):
+    chosen = EVERY_PLOT[plot_block][0]
+    left, right = plot_block(tree, **chosen)
+    faces = tree["block"].to_dataset().sel(chosen).sel(load="pressure")
+    for definition, kinematics in (("paper", "nonlinear"), ("area", "linear")):
+        profile = faces.face_profile.sel(definition=definition, kinematics=kinematics)
+        assert drawn(right, f"{definition}, {kinematics}").get_ydata() == pytest.approx(-1e3 * profile.values)
+    assert {"traction", "compression", "pressure"} <= {line.get_label() for line in left.get_lines()}
+
+
+def test_moduli_are_of_the_finest_patch(tree):
+    for panel, mesh_type in zip(plot_moduli(tree), TYPES):
+        for definition in DEFINITIONS:
+            found = tree["moduli"].effective_poisson_ratio.sel(
+                mesh_type=mesh_type, definition=definition, mesh_size=SIZES[0]
+            )
+            assert drawn(panel, definition).get_ydata() == pytest.approx(found.values)
+
+
+def test_a_heat_map_shows_the_finest_mesh_that_was_solved(tree):
+    chosen = EVERY_PLOT[plot_definitions_loads][0]
+    data = tree.to_dataset()
+    data["deformation_error"] = data.deformation_error.copy()
+    data.deformation_error.loc[chosen | {"definition": "area", "mesh_size": 1e-3}] = np.nan
+    panel = plot_definitions_loads(data, materials=["rubber"], **chosen)[0]
+    error = 100 * data.deformation_error.sel(chosen).sel(material="rubber")
+    wanted = [error.sel(definition="paper", mesh_size=1e-3).values, error.sel(definition="area", mesh_size=2e-3).values]
+    assert np.asarray(panel.images[0].get_array()) == pytest.approx(np.log10(np.clip(wanted, 0.1, 100)))
+
+
+def test_an_approach_carries_its_errors_and_seconds(tree):
+    panel = plot_benchmark(tree, scene="bending")
+    here = tree["benchmark"].to_dataset().sel(scene="bending", approach="relaxation")
+    line = drawn(panel, "in motion")
+    assert line.get_xdata() == pytest.approx(here.seconds.values)
+    assert line.get_ydata() == pytest.approx(100 * here.error.values)
+
+
+def test_the_stable_step_carries_the_predicted_limit(tree):
+    _, right = plot_stability_limits(tree)
+    limit = tree["stability"].dt_limit_predicted.sel(
+        definition="area", integrator="central-difference", damper="mass", damping_ratio=0.0
+    )
+    assert drawn(right, "area").get_ydata() == pytest.approx(1e9 * limit.values)
+
+
+# -- what is refused ---------------------------------------------------------------------------------------------------
+
+
+def test_a_choice_that_is_left_is_named_with_its_labels(tree):
+    with pytest.raises(ValueError, match="choose one beam: '100x20', '200x40'"):
+        plot_sensitivity(tree, **SCENES)
+    with pytest.raises(ValueError, match="choose one scene: 'traction', 'bending'"):
+        plot_benchmark(tree)
+
+
+def test_a_label_that_is_not_there_is_answered_with_those_that_are(tree):
+    with pytest.raises(ValueError, match="nothing has load 'torsion'; there is 'traction', 'compression', 'pressure'"):
+        plot_size(tree, **SCENES | {"load": "torsion"})
+
+
+def test_the_only_label_is_taken(tree):
+    data = tree["sensitivity"].to_dataset()
+    data["status"] = data.status.where((data.beam == "200x40") & (data["load"] == "pressure"), 0)
+    axes = plot_sensitivity(data, mesh_type="free", material="rubber")
+    assert axes.get_title("left") == "200x40 mm, free, rubber, pressure"
+
+
+def test_a_group_or_an_experiment_that_is_missing_is_named(tree):
+    with pytest.raises(ValueError, match="no group '/laying'; it has '/moduli'"):
+        plot_laying(xr.DataTree.from_dict({"/moduli": moduli()}))
+    data = tree["stability"].to_dataset().sel(experiment=["limits", "rest"])
+    with pytest.raises(ValueError, match="no experiment 'maps'; it has 'limits', 'rest'"):
+        plot_stability_maps(data)
+
+
+# -- the stage ---------------------------------------------------------------------------------------------------------
+
+
+def test_outputs_are_those_that_a_study_may_name():
+    assert all(isinstance(output, Output) and output.meaning for output in outputs().values())
+    assert {f"plot_{stem}" for stem in PLOTS} == {plot.__name__ for plot in PLOTS.values()}
+
+
+def test_the_stage_draws_what_it_is_told(tree, tmp_path):
+    path = tmp_path / "dataset.nc"
+    chosen = {"beam": ["100x20"], "material": ["steel"], "load": ["traction"]}
+    small, curves = tree.to_dataset().sel(chosen), tree["sensitivity"].to_dataset().sel(chosen)
+    xr.DataTree.from_dict({"/": small, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
+    stems = draw.run(path, tmp_path / "figures", "size", "sensitivity")
+    assert stems == [
+        "size_structured_steel_traction",
+        "size_free_steel_traction",
+        "sensitivity_100x20_structured_steel_traction",
+        "sensitivity_100x20_free_steel_traction",
+    ]
+    files = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert files == sorted(f"{stem}.{ending}" for stem in stems for ending in FORMATS)
+
+
+def test_both_formats_show_the_same_and_are_the_same_again():
+    def made():
+        with matplotlib.rc_context(style.SETTINGS):
+            figure = Figure(figsize=(4, 3))
+            axes = figure.subplots()
+            axes.plot([0, 1], [0, 1], color="#ff0000", linewidth=20)
+            axes.set_title("A title")
+        return png_and_pdf(figure)
+
+    one, two = made(), made()
+    assert one == two
+    picture = Image.open(io.BytesIO(one["png"]))
+    assert picture.size == (600, 450) and picture.info["dpi"] == pytest.approx((150, 150), abs=0.1)
+    pixels = np.asarray(picture)
+    red = (pixels == [255, 0, 0]).all(axis=2)
+    # A diagonal, 20 points wide: from the lower left to the upper right, within the axes.
+    rows, columns = np.nonzero(red)
+    assert np.corrcoef(rows, columns)[0, 1] < -0.9
+    assert np.median(red.sum(axis=0)[red.any(axis=0)]) == pytest.approx(20 * 150 / 72 * np.hypot(1, 0.75), rel=0.25)
+    assert one["pdf"].startswith(b"%PDF") and one["pdf"].rstrip().endswith(b"%%EOF")
