@@ -81,7 +81,7 @@ def predict(beam, thickness, mesh_type, size, unit, material, young, poisson):
             mesh = _asked_mesh(beam, mesh_type, edge, unit)
             about = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
             known = references(beam, material)
-            found = choices(mesh, beam, material, known)
+            found = choices(beam, mesh, material, known)
     except (click.ClickException, DefinitionError, ValueError) as error:
         click.echo(str(getattr(error, "message", error)), err=True)
         raise SystemExit(1) from None
@@ -111,7 +111,7 @@ def _asked_beam(text, thickness):
         raise ValueError(f"--beam: '{text}' is not length x height; give millimetres such as 200x40") from None
     if not (length > 0 and height > 0):
         raise ValueError(f"--beam: '{text}' has a side that is not above zero; give millimetres such as 200x40")
-    return Beam(text, length, height, _quantity("--thickness", thickness, "length"))
+    return Beam(length, height, _quantity("--thickness", thickness, "length"), text)
 
 
 def _asked_material(name, young, poisson):
@@ -131,7 +131,7 @@ def _asked_material(name, young, poisson):
         ratio = float("nan")
     if not 0 <= ratio <= 0.5:
         raise ValueError(f"--poisson: '{poisson}' is out of range; give a number from 0 to 0.5")
-    return Material(name or "material", _quantity("--young", young, "stress"), ratio)
+    return Material(_quantity("--young", young, "stress"), ratio, name=name or "material")
 
 
 def _is_made(mesh_type):

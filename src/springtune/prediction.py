@@ -13,13 +13,13 @@ import numpy as np
 from .linalg.factors import SingularError
 from .mechanics.energies import AreaEnergy
 from .mechanics.moduli import PatchTest
-from .mechanics.network import Network
-from .mechanics.statics import StaticProblem
 from .mesh import MESH_TYPES
-from .problem.boundary import held, weights
 from .problem.loads import LOADS
+from .problem.status import Status
 from .reference.small_strain import ReferenceNotConvergedError, solve_small_strain
-from .springs import DEFINITIONS, DefinitionError, Springs, lattice
+from .scene.curve import face_edge
+from .scene.sheet import Sheet
+from .springs import DefinitionError, Springs, lattice
 from .springs.lattice import uniform
 
 CASES = ("traction", "bending", "shear")
@@ -127,14 +127,14 @@ def references(beam, material):
     return found
 
 
-def predict(mesh, beam, material, known=None):
+def predict(beam, mesh, material, known=None):
     """Choices for a mesh, solved on it, the best one by its worst load first.
 
     Parameters
     ----------
+    beam : Beam
     mesh : Mesh
         That fills the beam.
-    beam : Beam
     material : Material
     known : dict, optional
         What `references` gave for the beam and the material.
@@ -148,6 +148,14 @@ def predict(mesh, beam, material, known=None):
     ------
     DefinitionError
         If none of them can live on the mesh.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam = st.Beam("100 mm", "20 mm")
+    >>> best = st.predict(beam, st.make_mesh(beam, "structured", "5 mm"), st.Material("210 GPa", 0.3))[0]
+    >>> print(f"{best.definition}: {100 * best.worst:.1f} % at worst")
+    patch-area: 6.3 % at worst
     """
     known = references(beam, material) if known is None else known
     sheet, seen, choices, refusals = _Sheet(mesh, beam, material, known), set(), [], []
@@ -238,7 +246,7 @@ def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
     solved = []
     for one in sizes:
         mesh = MESH_TYPES[mesh_type](beam.length, beam.height, one)
-        solved.append({choice.definition: choice for choice in predict(mesh, beam, material, known)})
+        solved.append({choice.definition: choice for choice in predict(beam, mesh, material, known)})
     # The same springs may go by one name on one mesh and by two on another.
     names = [name for name in solved[0] if all(name in one for one in solved)]
     choices = [_band([one[name] for one in solved], sizes, size) for name in names]
@@ -284,15 +292,14 @@ class _Sheet:
 
     def __init__(self, mesh, beam, material, known):
         self.mesh, self.beam, self.material, self.known = mesh, beam, material, known
-        self._patterns, self._found, self._test = {}, {}, PatchTest(mesh)
+        # Loads that hold the same follow each other.
+        self._sheet, self._found, self._test = Sheet(mesh, beam.thickness, networks=1), {}, PatchTest(mesh)
 
     def springs(self, name):
         """Springs of a definition."""
         if name != "uniform":
-            return DEFINITIONS[name].springs(self.mesh, self.material, self.beam.thickness)
-        faces = np.concatenate([self.mesh.outline_edges(1, value) for value in (0.0, self.beam.height)])
-        size = float(np.median(np.abs(np.diff(self.mesh.points[faces, 0]))))
-        return Springs(lattice.predicted_stiffness(self.material, self.beam, size), uniform(self.mesh))
+            return self._sheet.derive(name, self.material)[0]
+        return Springs(lattice.predicted_stiffness(self.material, self.beam, face_edge(self.mesh)), uniform(self.mesh))
 
     @staticmethod
     def key(springs):
@@ -320,10 +327,10 @@ class _Sheet:
         """Displacement of each load for unit force over reference stiffness [1]; E and nu; what has none and why."""
         key = self.key(springs)
         if key not in self._found:
-            displacements, moduli, failures, networks = {}, (nan, nan), {}, {}
+            displacements, moduli, failures = {}, (nan, nan), {}
             for load in CASES:
                 try:
-                    displacements[load] = self._displacement(springs, LOADS[load].kind, networks)
+                    displacements[load] = self._displacement(springs, LOADS[load].kind)
                 except SingularError as error:
                     failures[load] = str(error)
             try:
@@ -333,22 +340,14 @@ class _Sheet:
             self._found[key] = displacements, moduli, failures
         return self._found[key]
 
-    def _displacement(self, springs, kind, networks):
-        directions, pattern = held(self.mesh, kind), weights(self.mesh, kind)
-        name = directions.tobytes()
-        if name not in networks:  # two loads hold the same
-            like = self._patterns.get(name)
-            networks[name] = Network(self.mesh, directions, springs.relative, springs.energies, like)
-            self._patterns.setdefault(name, networks[name])
-        problem = StaticProblem(networks[name], pattern)
+    def _displacement(self, springs, kind):
         try:
-            found = problem.linear(1.0)
-            status, message, _ = problem.judge(1.0, found)
+            found = self._sheet.solve(kind, springs, springs.reference, "linear")
         except SingularError as error:
             raise SingularError(f"unstable: {error}") from None
-        if status != "solved":
-            raise SingularError(message)
-        return float(np.tensordot(found.displacements, pattern, axes=2))
+        if found.status is not Status.SOLVED:
+            raise SingularError(found.message)
+        return found.displacement
 
     def _parts(self, name, springs):
         """Stiffness of sides inside and on the outline, and in words what else there is."""

@@ -36,10 +36,11 @@ from mechanics import (
     spring_forces,
     squares_forces,
 )
-from springtune.kinds.scenes.solve import Solver
+from springtune.kinds.scenes.solve import solve as solve_scene
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
+from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
 
 PROMISED = 1e-6
@@ -78,7 +79,7 @@ class Scene:
 
     @property
     def material(self):
-        return Material("drawn", self.young_modulus, self.poisson_ratio)
+        return Material(self.young_modulus, self.poisson_ratio, name="drawn")
 
 
 @dataclass
@@ -255,11 +256,6 @@ def merged_modes(body, unknowns, force, masses):
     return fluttering, {mode: ratio for mode, ratio in needed.items() if mode not in fluttering}
 
 
-class _NoReferences:
-    def field(self, reference):
-        return None
-
-
 def solve(scene, mesh, force, stiffness):
     """The scene's result by the recipe of a study's jobs."""
     task = {
@@ -272,7 +268,7 @@ def solve(scene, mesh, force, stiffness):
         "reference": None,
         "stiffness": stiffness,
     }
-    return Solver(mesh, scene.thickness, _NoReferences(), keep_fields=True).solve(task, {})
+    return solve_scene(Sheet(mesh, scene.thickness), task, keep_fields=True)
 
 
 def audit(scene, path=True):
@@ -320,7 +316,7 @@ def audit(scene, path=True):
             force = (body.critical(guess, sound if body.follower else None) or guess / 1.6) * scene.level
     verdict.force = force = float(force)
     result = solve(scene, mesh, force, stiffness)
-    verdict.status, verdict.message = result["status"], result["message"]
+    verdict.status, verdict.message = str(result["status"]), result["message"]
     if scene.kinematics == "linear":
         _check_linear(verdict, body, force, result)
     else:

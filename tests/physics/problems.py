@@ -2,20 +2,18 @@
 
 import numpy as np
 
-from springtune.mechanics.network import Network
-from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, lattice
-from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL
+from springtune.scene.sheet import Sheet
+from springtune.springs import Springs
 from springtune.springs.lattice import uniform
 
 
 def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, relative=None, kind=AXIAL):
     """A clamped beam pulled at its end: the problem and the weights of its mean end displacement."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
-    pattern = weights(mesh, kind)
-    stiffness = uniform(mesh) if relative is None else relative(mesh)
-    return StaticProblem(Network(mesh, held(mesh, kind), stiffness), pattern), pattern
+    sheet = Sheet(mesh, 1.0)
+    return sheet.problem(kind, Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
 
 
 def roller_patch(cells, rows, stiffness):
@@ -31,7 +29,7 @@ def roller_patch(cells, rows, stiffness):
     held = np.zeros((len(mesh.points), 2), dtype=bool)
     held[ends, 0] = True
     held[0, 1] = True
-    network = Network(mesh, held, stiffness(mesh))
+    network = Sheet(mesh, 1.0).network(held, Springs(1.0, stiffness(mesh)))
     given = np.zeros(mesh.points.shape)
     given[ends, 0] = strain * mesh.points[ends, 0]
     displacements = given + network.expand(network.factorize().solve(-network.linear_resistance(given)))

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from springtune.kinds.benchmark import measure as benchmark
-from springtune.kinds.benchmark.approaches import METHODS
-from springtune.kinds.benchmark.measure import Scene
+from springtune.kinds.benchmark.approaches import APPROACHES
+from springtune.kinds.benchmark.measure import LoadedBeam
 from springtune.kinds.benchmark.names import RIVALS, method_names
 from springtune.kinds.benchmark.tables import comparison
 from springtune.linalg import factors
@@ -22,15 +22,16 @@ from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL
 from springtune.problem.materials import Material
+from springtune.problem.status import Status
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import half_weight
 
-BEAM = Beam("100x20", 0.1, 0.02, 1e-3)
+BEAM = Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {
-    "traction": Scene(BEAM, Material("steel", 210e9, 0.3, 7850.0), "traction", 20e3),
-    "bending": Scene(BEAM, Material("steel", 210e9, 0.3, 7850.0), "bending", 200.0),
-    "block": Scene(BEAM, Material("rubber", 1e6, 0.49, 1000.0), "pressure", -10.0),
+    "traction": LoadedBeam(BEAM, Material(210e9, 0.3, 7850.0, "steel"), "traction", 20e3),
+    "bending": LoadedBeam(BEAM, Material(210e9, 0.3, 7850.0, "steel"), "bending", 200.0),
+    "block": LoadedBeam(BEAM, Material(1e6, 0.49, 1000.0, "rubber"), "pressure", -10.0),
 }
 CLOSE = {
     # largest error at 2 mm, ten rows: linear triangles; quadratic; constant boundary elements; no physics
@@ -41,7 +42,7 @@ CLOSE = {
 
 
 def answer(scene, method, size=2e-3):
-    return METHODS[method](scene, size, benchmark._Clock())
+    return APPROACHES[method](scene, size, benchmark._Clock())
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +103,7 @@ def test_a_race_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
 
 def test_errors_are_checked_on_a_second_beam():
     """A definition's error there is what a race of that beam has, and the assured error is the largest of all."""
-    second = Beam("60x15", 0.06, 0.015, 1e-3)
+    second = Beam(0.06, 0.015, 1e-3, "60x15")
     methods, sizes = ("lattice/structured", "linear-triangles"), (2e-3, 5e-3)
     found = benchmark.run(SCENES["block"], methods, sizes, 10.0, second_beam=second)
     there = benchmark.run(replace(SCENES["block"], beam=second), methods, sizes, 10.0)
@@ -123,7 +124,7 @@ def test_an_error_that_crosses_zero_or_stays_has_no_order():
 
 def test_a_case_that_fails_is_stored_with_its_message():
     found = benchmark.run(SCENES["traction"], ("van-gelder/braced",), (5e-3,), 1.0)
-    assert found["status"][0, 0] == 5 and found["message"][0, 0]
+    assert found["status"][0, 0] == Status.FAILED and found["message"][0, 0]
 
 
 def test_comparison_flags_what_became_slower():
@@ -162,7 +163,7 @@ def test_multigrid_gives_what_the_factorisation_gives(monkeypatch):
         monkeypatch.setattr(network_module, "LARGE", largest)
         problem = StaticProblem(Network(mesh, held(mesh, AXIAL), half_weight(mesh)), pattern)
         found = problem.linear(1e-3)
-        assert found.converged and problem.judge(1e-3, found)[0] == "solved"
+        assert found.converged and problem.judge(1e-3, found)[0] is Status.SOLVED
         answers.append((found.factor.name, float(np.tensordot(found.displacements, pattern, axes=2))))
     assert [name for name, _ in answers] == ["SuperLU", "multigrid"]
     assert answers[1][1] == pytest.approx(answers[0][1], rel=1e-9)

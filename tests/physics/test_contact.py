@@ -17,7 +17,7 @@ from springtune.problem.loads import REFERENCE_SIZES
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
-RUBBER, STEEL = Material("rubber", 1e6, 0.49), Material("steel", 210e9, 0.3)
+RUBBER, STEEL = Material(1e6, 0.49, name="rubber"), Material(210e9, 0.3, name="steel")
 STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)
 
 
@@ -26,7 +26,7 @@ def block(mesh_type, size, bottom, modulus=1e6, pressure=0.0, moves_little=True)
     made = MESH_TYPES[mesh_type](0.02, 0.01, size)
     mesh = Mesh(made.points + [0, bottom], made.triangles, made.quads)
     definition = "area" if len(mesh.quads) else "delingette"
-    springs = DEFINITIONS[definition].springs(mesh, Material("any", modulus, 0.3), 1e-3)
+    springs = DEFINITIONS[definition].springs(mesh, Material(modulus, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.argmin(mesh.points.sum(axis=1)), 0] = True
     top = mesh.outline_edges(1, mesh.points[:, 1].max())
@@ -97,7 +97,7 @@ def half_disc(edge, largest=0.12, grading=0.3):
 def hertz(edge, half_width=0.06, **mesh):
     """Peak pressure and half width of a disc on a flat over Hertz's, E = 1, plane stress."""
     mesh = half_disc(edge, **mesh)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material("unit", 1.0, 0.3), 1.0)
+    springs = DEFINITIONS["delingette"].springs(mesh, Material(1.0, 0.3, name="unit"), 1.0)
     held = np.zeros(mesh.points.shape, dtype=bool)
     top = mesh.outline_edges(1, 1.0)
     held[top, 0] = True
@@ -265,7 +265,7 @@ def pressed(mesh_type, size, obstacle, pressure):
     """A block of 20 x 10 mm whose upper face keeps its x, pressed on an obstacle, not quite in its middle."""
     made = MESH_TYPES[mesh_type](0.02, 0.01, size)
     mesh = Mesh(made.points - [0.01 - 0.13e-3, 0], made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material("any", 1e6, 0.3), 1e-3)
+    springs = DEFINITIONS["delingette"].springs(mesh, Material(1e6, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     top = mesh.outline_edges(1, mesh.points[:, 1].max())
     held[np.unique(top), 0] = True
@@ -309,7 +309,7 @@ def draped(corners, size):
     """A sheet of 60 x 4 mm draped over a segment of a circle by its weight."""
     made = MESH_TYPES["structured"](0.06, 0.004, size)
     mesh = Mesh(made.points - [0.03, 0], made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material("any", 1e6, 0.3), 1e-3)
+    springs = DEFINITIONS["delingette"].springs(mesh, Material(1e6, 0.3, name="any"), 1e-3)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.abs(mesh.points).sum(axis=1).argmin(), 0] = True
     weights = -0.3 * mesh.particle_areas / mesh.area
@@ -365,7 +365,7 @@ def test_a_force_along_the_floor_slips_at_the_limit():
 def test_sliding_friction_is_the_normal_force_times_the_coefficient(way):
     """A block pressed down by its upper face and pushed aside: all of the force that Coulomb allows, against it."""
     made = MESH_TYPES["structured"](0.02, 0.004, 2e-3)
-    springs = DEFINITIONS["delingette"].springs(made, Material("any", 1e6, 0.3), 1e-3)
+    springs = DEFINITIONS["delingette"].springs(made, Material(1e6, 0.3, name="any"), 1e-3)
     top = made.points[:, 1] > 0.004 - 1e-9
     held = np.repeat(top[:, None], 2, axis=1)
     prescribed = np.where(held, [way * 1e-3, -2e-5], 0.0)
@@ -388,7 +388,7 @@ def capstan(friction, wrap, size, radius=1e-2, thickness=4e-4, ratio=0.2):
     out, over = radius * (1 + 1e-6) + made.points[:, 1], along - angle * radius
     points = np.stack([out * np.sin(angle) + over * np.cos(angle), out * np.cos(angle) - over * np.sin(angle)], axis=1)
     mesh = Mesh(points, made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, Material("any", 1e6, 0.3), 1e-3)
+    springs = DEFINITIONS["delingette"].springs(mesh, Material(1e6, 0.3, name="any"), 1e-3)
     held = np.repeat((along < along.min() + 1e-9)[:, None], 2, axis=1)
     end = np.flatnonzero(along > along.max() - 1e-9)
     end = end[np.argsort(made.points[end, 1])]

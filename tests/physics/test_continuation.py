@@ -12,6 +12,7 @@ from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
+from springtune.problem.status import Status
 from springtune.reference.limits import elastica
 from springtune.springs import DEFINITIONS
 
@@ -31,7 +32,7 @@ def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
     """A small beam under a load of about a strain, and that load over the reference stiffness."""
     length = aspect * HEIGHT
     mesh = MESH_TYPES[mesh_type](length, HEIGHT, HEIGHT / rows)
-    springs = DEFINITIONS[definition].springs(mesh, Material("sheet", 1e6, nu), 1e-3)
+    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="sheet"), 1e-3)
     network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
     side = {AXIAL: HEIGHT, BENDING: HEIGHT**2 / length / 6, FACE: length, SHEAR: length}[kind]
     return StaticProblem(network, weights(mesh, kind)), strain * 1e6 * 1e-3 * side / springs.reference
@@ -61,7 +62,7 @@ def test_a_load_beyond_the_limit_point_is_not_solved():
 def test_a_slender_column_buckles_at_eulers_load(definition):
     """Clamped-free, 200 x 10 mm in ten rows: linear triangles are 1 % too stiff in bending."""
     mesh = MESH_TYPES["structured"](0.2, 0.01, 1e-3)
-    springs = DEFINITIONS[definition].springs(mesh, Material("steel", 210e9, 0.3), 1e-3)
+    springs = DEFINITIONS[definition].springs(mesh, Material(210e9, 0.3, name="steel"), 1e-3)
     network = Network(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.01**3 / 12 / (4 * 0.2**2)
     found = buckling_load(StaticProblem(network, weights(mesh, AXIAL)), -euler / springs.reference)
@@ -126,7 +127,7 @@ def test_a_small_residual_of_an_ill_conditioned_network_is_not_taken_for_a_small
     mesh = MESH_TYPES["structured"](length, 0.02, 5e-3)
     problem = StaticProblem(Network(mesh, held(mesh, kind), 0.5 * mesh.cells_per_edge), weights(mesh, kind))
     found = problem.linear(1e-6)
-    assert found.converged and problem.judge(1e-6, found)[0] == "solved"
+    assert found.converged and problem.judge(1e-6, found)[0] is Status.SOLVED
     assert relative_error(problem, 1e-6, found) <= 2 * max(found.error_estimate, 1e-12)
 
 
@@ -204,7 +205,7 @@ def test_just_above_the_critical_load_nothing_is_solved_that_is_unstable(mesh_ty
         status, message, pivots = problem.judge(load, found)
         if found.converged:
             assert (np.linalg.eigvalsh(problem.network.tangent(found.displacements).toarray())[0] > 0) == (pivots == 0)
-        assert (status == "solved") == stable
+        assert (status is Status.SOLVED) == stable
 
 
 @pytest.mark.parametrize("definition", ["delingette", "lattice"])
@@ -217,13 +218,13 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     height = 0.02
     length = slenderness * height
     mesh = MESH_TYPES["structured"](length, height, height / 4)
-    springs = DEFINITIONS[definition].springs(mesh, Material("sheet", 1e6, 0.3), 1e-3)
+    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="sheet"), 1e-3)
     pattern = weights(mesh, BENDING)
     problem = StaticProblem(Network(mesh, held(mesh, BENDING), springs.relative, springs.energies), pattern)
     linear = float(np.tensordot(problem.slope, pattern, axes=2))
     s = ratio * length / (3 * linear)  # deflection F L^3 / 3 EI
     found = problem.nonlinear(s)
-    assert problem.judge(s, found)[0] == "solved" and found.error_estimate <= 1e-6
+    assert problem.judge(s, found)[0] is Status.SOLVED and found.error_estimate <= 1e-6
     deflection = float(np.tensordot(found.displacements, pattern, axes=2)) / length
     # Shear and stretch are of the order of (H / L)^2, strains of up to ratio H / 2 L of their square.
     assert deflection == pytest.approx(elastica(ratio), rel=(5 + ratio**2) / slenderness**2)

@@ -21,7 +21,7 @@ from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import uniform
 
-STEEL = Material("steel", 210e9, 0.3)
+STEEL = Material(210e9, 0.3, name="steel")
 DENSITY = 7850.0
 THICKNESS = 1e-3
 

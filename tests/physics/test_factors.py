@@ -12,6 +12,7 @@ from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, measured, weights
 from springtune.problem.loads import AXIAL
+from springtune.problem.status import Status
 from springtune.springs.lattice import half_weight
 
 FORCE_OVER_STIFFNESS = 2e-4
@@ -44,7 +45,7 @@ def test_scenes_have_the_same_answer(both, mesh_type):
     def solve():
         problem = problem_on(mesh)
         found = [problem.linear(FORCE_OVER_STIFFNESS), problem.nonlinear(FORCE_OVER_STIFFNESS)]
-        assert all(problem.judge(FORCE_OVER_STIFFNESS, one)[0] == "solved" for one in found)
+        assert all(problem.judge(FORCE_OVER_STIFFNESS, one)[0] is Status.SOLVED for one in found)
         return found
 
     ours, theirs = both(solve)

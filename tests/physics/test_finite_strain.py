@@ -13,7 +13,7 @@ from springtune.reference.finite_strain import FiniteStrainError, NeoHooke, solv
 from springtune.reference.limits import elastica
 from springtune.reference.small_strain import solve_small_strain
 
-BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
+BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")
 
 gradients = st.tuples(*[st.floats(-0.25, 0.25)] * 4).map(lambda values: np.eye(2) + np.reshape(values, (2, 2)))
 
@@ -70,7 +70,7 @@ def test_stress_and_tangent_are_derivatives(nu, plane, f, d):
 
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
 def test_small_strain_is_the_limit(nu):
-    material = Material("any", 1e6, nu)
+    material = Material(1e6, nu, name="any")
     for kind, force in ((FACE, -2e-3), (AXIAL, 4e-5), (AXIAL, -4e-5), (BENDING, 4e-6), (SHEAR, 2e-3)):
         finite = solve_neo_hooke(BLOCK, material, force, kind=kind)
         small = solve_small_strain(BLOCK, material, force, kind=kind)
@@ -79,7 +79,7 @@ def test_small_strain_is_the_limit(nu):
 
 
 def test_traction_of_calculix():
-    found = solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), 0.4, kind=AXIAL)
+    found = solve_neo_hooke(BLOCK, Material(1e6, 0.49, name="rubber"), 0.4, kind=AXIAL)
     # CPS8 of 2 mm, neo-Hooke, NLGEOM: 2.00747 mm, 1e-4 too stiff at the corners as in small strain.
     assert found.displacement == pytest.approx(2.00747e-3, rel=2e-4)
     assert found.error_estimate <= 1e-4
@@ -87,20 +87,20 @@ def test_traction_of_calculix():
 
 def test_incompressible_bar_stretches_as_by_hand():
     """Far from the clamp uniaxial tension: P = E/3 (l - l^-2); clamped at one end of a long bar."""
-    bar = Beam("bar", 0.08, 0.01, 1e-3)
+    bar = Beam(0.08, 0.01, 1e-3, "bar")
     stretch = 1.5
     force = 1e6 / 3 * (stretch - stretch**-2) * bar.height * bar.thickness
-    found = solve_neo_hooke(bar, Material("rubber", 1e6, 0.5), force, kind=AXIAL)
+    found = solve_neo_hooke(bar, Material(1e6, 0.5, name="rubber"), force, kind=AXIAL)
     assert found.displacement == pytest.approx(0.5 * bar.length, rel=0.02)
 
 
 @pytest.mark.parametrize(("kind", "stress"), [(AXIAL, 4e-6), (BENDING, 1e-9), (SHEAR, 1e-6)])
 @pytest.mark.parametrize("aspect_ratio", [1, 30])
 def test_small_strain_is_the_limit_of_any_shape(kind, stress, aspect_ratio):
-    beam = Beam("any", aspect_ratio * 0.01, 0.01, 1e-3)
+    beam = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any")
     force = stress * 1e6 * beam.thickness * (beam.length if kind == SHEAR else beam.height)
-    finite = solve_neo_hooke(beam, Material("any", 1e6, 0.3), force, kind=kind)
-    small = solve_small_strain(beam, Material("any", 1e6, 0.3), force, kind=kind)
+    finite = solve_neo_hooke(beam, Material(1e6, 0.3, name="any"), force, kind=kind)
+    small = solve_small_strain(beam, Material(1e6, 0.3, name="any"), force, kind=kind)
     assert finite.displacement == pytest.approx(small.displacement, rel=1e-4)
     # It is an estimate of the elements' error; strains and turns of the order of 1e-6 come to 1e-6 besides.
     assert abs(finite.displacement / small.displacement - 1) <= finite.error_estimate + 1e-5
@@ -120,7 +120,7 @@ def test_slender_cantilevers_are_elasticas(nu, load):
     """The clamp shortens a beam by up to .014 of its height; as in small strain, which then takes shear along."""
     apart = []
     for slenderness in (25, 50):
-        beam, material = Beam("b", slenderness * 0.01, 0.01, 1e-3), Material("any", 1e9, nu)
+        beam, material = Beam(slenderness * 0.01, 0.01, 1e-3, "b"), Material(1e9, nu, name="any")
         force = load * material.young_modulus * beam.thickness * beam.height**3 / 12 / beam.length**2
         finite = solve_neo_hooke(beam, material, force, kind=BENDING)
         small = solve_small_strain(beam, material, force, kind=BENDING)
@@ -133,14 +133,16 @@ def test_slender_cantilevers_are_elasticas(nu, load):
 
 
 def test_bending_is_odd_in_the_force():
-    up, down = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.45), force, kind=BENDING) for force in (0.02, -0.02))
+    up, down = (
+        solve_neo_hooke(BLOCK, Material(1e6, 0.45, name="rubber"), force, kind=BENDING) for force in (0.02, -0.02)
+    )
     assert up.displacement == pytest.approx(-down.displacement, rel=1e-8)
     assert up.positions[[0, -1]].tolist() == [0, 1] and len(up.profile) == len(up.positions)
 
 
 def test_a_wide_block_is_in_simple_shear():
     """Neo-Hooke's shear stress is linear in the shear: what is left of a tenth is its square, where the ends are."""
-    wide, material = Beam("wide", 0.1, 0.01, 1e-3), Material("any", 1e6, 0.3)
+    wide, material = Beam(0.1, 0.01, 1e-3, "wide"), Material(1e6, 0.3, name="any")
     force = 0.1 * 1e6 / 2.6 * wide.length * wide.thickness
     finite, small = (solve(wide, material, force, kind=SHEAR) for solve in (solve_neo_hooke, solve_small_strain))
     assert finite.displacement == pytest.approx(0.1 * wide.height, rel=0.06)
@@ -148,7 +150,7 @@ def test_a_wide_block_is_in_simple_shear():
 
 
 def test_compression_shortens_more_than_it_stretches():
-    pulled, pushed = (solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.5), f, kind=AXIAL) for f in (1.0, -1.0))
+    pulled, pushed = (solve_neo_hooke(BLOCK, Material(1e6, 0.5, name="rubber"), f, kind=AXIAL) for f in (1.0, -1.0))
     # P = E/3 (l - 1/l^2) = E (e - e^2 + ...): the even part of e(P) is + P^2 in tension, so -P is shorter by less.
     stress = 1.0 / (1e6 * 0.04e-3)
     even = (pulled.displacement + pushed.displacement) / 2 / BLOCK.length
@@ -156,7 +158,7 @@ def test_compression_shortens_more_than_it_stretches():
 
 
 def test_profile_is_symmetric_and_holds_both_displacements():
-    found = solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), -20.0, follower=True)
+    found = solve_neo_hooke(BLOCK, Material(1e6, 0.49, name="rubber"), -20.0, follower=True)
     assert found.positions[[0, -1]].tolist() == [0, 1]
     assert np.allclose(found.profile, found.profile[::-1], rtol=1e-12)
     assert found.displacement == found.profile[len(found.profile) // 2]
@@ -165,6 +167,6 @@ def test_profile_is_symmetric_and_holds_both_displacements():
 
 def test_what_cannot_be_solved_says_so():
     with pytest.raises(ValueError, match="plane strain of 'rubber' needs a Poisson's ratio below 0.5"):
-        solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.5), -20.0, plane="strain")
+        solve_neo_hooke(BLOCK, Material(1e6, 0.5, name="rubber"), -20.0, plane="strain")
     with pytest.raises(FiniteStrainError, match=r"200x40, rubber: no equilibrium beyond .* % of the load"):
-        solve_neo_hooke(BLOCK, Material("rubber", 1e6, 0.49), 1e5, kind=AXIAL)
+        solve_neo_hooke(BLOCK, Material(1e6, 0.49, name="rubber"), 1e5, kind=AXIAL)

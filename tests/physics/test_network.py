@@ -13,7 +13,7 @@ from springtune.springs.lattice import COEFFICIENT, uniform
 
 from problems import beam_problem, roller_patch
 
-STEEL = Material("steel", 210e9, 0.3)
+STEEL = Material(210e9, 0.3, name="steel")
 
 
 def half_outline(mesh):

@@ -15,6 +15,7 @@ from springtune.problem.compare import best_stiffness
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
+from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import COEFFICIENT, uniform
 
@@ -51,7 +52,7 @@ def on_the_path(problem, weights, s):
     A separate solve; where that finds an equilibrium that the beam leaves, by arc length.
     """
     found = problem.nonlinear(s)
-    if problem.judge(s, found)[0] == "solved":
+    if problem.judge(s, found)[0] is Status.SOLVED:
         return float(np.tensordot(found.displacements, weights, axes=2))
     for length in (0.02, 0.2):  # short of the turn, long of the way beyond it
         increment = length * abs(s) * np.linalg.norm(problem.slope)
@@ -155,13 +156,15 @@ def test_best_stiffness_is_of_a_stable_equilibrium(mesh_type, best):
     problem, weights = beam_problem(mesh_type, 0.06, 0.02, 2.5e-3)
     force, stiffness = -0.548311, RATIOS * COEFFICIENT * 1e3
     path = StablePath(problem, weights, force / stiffness)
-    reference = solve_small_strain(Beam("60x20", 0.06, 0.02, 1e-3), Material("rubber", 1e6, 0.5), force).displacement
+    reference = solve_small_strain(
+        Beam(0.06, 0.02, 1e-3, "60x20"), Material(1e6, 0.5, name="rubber"), force
+    ).displacement
     solve = lambda stiffness: path.value(force / stiffness)  # noqa: E731
     found = best_stiffness(stiffness, path.values, path.stable, reference, solve)
     if best is None:
-        assert (found.status, path.end) == ("unstable", "unstable") and np.isnan(found.stiffness)
+        assert (found.status, path.end) == (Status.UNSTABLE, "unstable") and np.isnan(found.stiffness)
         return
-    assert found.status == "solved" and found.stiffness == pytest.approx(best, abs=5e-3)
+    assert found.status is Status.SOLVED and found.stiffness == pytest.approx(best, abs=5e-3)
     assert on_the_path(problem, weights, force / found.stiffness) == pytest.approx(reference, rel=1e-6)
 
 

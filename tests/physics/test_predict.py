@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from springtune.kinds.scenes.solve import Solver
+from springtune.kinds.scenes.solve import solve
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.moduli import axial_moduli
 from springtune.mechanics.network import Network
@@ -15,7 +15,9 @@ from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
+from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
+from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError, Springs
 from springtune.springs.lattice import uniform
 
@@ -45,10 +47,10 @@ def random_beam(random):
     """Beam, material, mesh type and mesh: aspects of .5 to 20, one to fourteen cells across, every nu."""
     height = np.exp(random.uniform(np.log(5e-3), np.log(0.1)))
     length = height * np.exp(random.uniform(np.log(0.5), np.log(20)))
-    beam = Beam("any", length, height, random.uniform(1e-4, 1e-2))
-    material = Material("any", np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5))
+    beam = Beam(length, height, random.uniform(1e-4, 1e-2), "any")
+    material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5), name="any")
     if random.random() < 0.3:
-        material = Material("any", material.young_modulus, float(random.choice([0.0, 1 / 3, 0.5])))
+        material = Material(material.young_modulus, float(random.choice([0.0, 1 / 3, 0.5])), name="any")
     mesh_type = str(random.choice(list(MESH_TYPES)))
     size = min(length, height) / np.exp(random.uniform(0, np.log(14)))
     while particles(mesh_type, beam, size) > 300:  # dense matrices are of twice as many unknowns
@@ -59,7 +61,7 @@ def random_beam(random):
 def check(beam, material, mesh):
     """Every number of a prediction, and its order, against dense solutions."""
     known = references(beam, material)
-    choices = predict(mesh, beam, material, known)
+    choices = predict(beam, mesh, material, known)
     worst = []
     for choice in choices:
         if "springs" in choice.failures:
@@ -109,27 +111,22 @@ def replaced():
 
 class TestWhatClosedFormsGotWrong:
     def choices(self, mesh_type, nu, length=0.1, height=0.02, size=5e-3):
-        beam, material = Beam("b", length, height, 1e-3), Material("m", 1e9, nu)
+        beam, material = Beam(length, height, 1e-3, "b"), Material(1e9, nu, name="m")
         mesh = MESH_TYPES[mesh_type](length, height, size)
-        found = {choice.definition: choice for choice in predict(mesh, beam, material)}
+        found = {choice.definition: choice for choice in predict(beam, mesh, material)}
         assert list(found) == sorted(found, key=lambda name: found[name].worst)
         return beam, material, mesh, found
 
     def through_the_stage(self, beam, material, mesh, definition, load):
         """Error by the stage that solves scenes of studies."""
-
-        class NoFields:
-            def field(self, reference):
-                return None
-
         scene = {
             "material": {"name": "m", "young_modulus": 1e9, "poisson_ratio": material.poisson_ratio},
             "definition": definition, "kind": LOADS[load].kind.name, "follower": False, "force": 3.0,
             "kinematics": "linear",
             "reference": {},
         }  # fmt: skip
-        result = Solver(mesh, beam.thickness, NoFields(), False).solve(scene, {})
-        assert result["status"] == "solved"
+        result = solve(Sheet(mesh, beam.thickness), scene)
+        assert result["status"] == Status.SOLVED
         return result["displacement"] / solve_small_strain(beam, material, 3.0, kind=LOADS[load].kind).displacement - 1
 
     @pytest.mark.parametrize(
@@ -204,14 +201,14 @@ class TestWhatClosedFormsGotWrong:
         assert list(found)[-2:] == ["area", "patch-area"] and found["area"].worst == np.inf
 
     def test_no_reference_no_number(self):
-        beam, material = Beam("b", 0.1, 0.02, 1e-3), Material("m", 1e9, 0.3)
+        beam, material = Beam(0.1, 0.02, 1e-3, "b"), Material(1e9, 0.3, name="m")
         known = references(beam, material) | {"bending": "it did not converge"}
         mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-        choices = predict(mesh, beam, material, known)
+        choices = predict(beam, mesh, material, known)
         for choice in choices:
             assert np.isnan(choice.bending) and not choice.failures
             assert choice.worst == max(abs(choice.traction), abs(choice.shear))
-        nothing = predict(mesh, beam, material, dict.fromkeys(CASES, "none"))
+        nothing = predict(beam, mesh, material, dict.fromkeys(CASES, "none"))
         assert all(choice.worst == np.inf for choice in nothing)
 
     def test_cells_that_no_definition_takes_are_refused(self):
@@ -219,8 +216,8 @@ class TestWhatClosedFormsGotWrong:
         mesh = MESH_TYPES["braced"](0.1, 0.02, 5e-3)
         half = mesh.points[mesh.quads].mean(axis=1)[:, 0] < 0.05
         triangles = np.vstack([mesh.quads[half][:, [0, 1, 2]], mesh.quads[half][:, [0, 2, 3]]])
-        beam, material = Beam("b", 0.1, 0.02, 1e-3), Material("m", 1e9, 0.3)
-        choices = predict(type(mesh)(mesh.points, triangles, mesh.quads[~half]), beam, material)
+        beam, material = Beam(0.1, 0.02, 1e-3, "b"), Material(1e9, 0.3, name="m")
+        choices = predict(beam, type(mesh)(mesh.points, triangles, mesh.quads[~half]), material)
         assert choices[0].definition == "element-fit" and choices[0].worst < 1
         assert [("needs rectangles" in one.failures.get("springs", "")) for one in choices] == [False, True, True, True]
 
@@ -240,14 +237,14 @@ class TestBands:
     @pytest.mark.parametrize("mesh_type", MESH_TYPES)
     def test_hold_on_meshes_that_are_too_large(self, mesh_type):
         """With a limit an eighth of the real one, two meshes beyond it; wide only where rows are few."""
-        beam, material = Beam("b", 0.08, 0.03, 1e-3), Material("m", 1e9, 0.3)
+        beam, material = Beam(0.08, 0.03, 1e-3, "b"), Material(1e9, 0.3, name="m")
         known = references(beam, material)
         for size in (0.95e-3, 0.8e-3):
             mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
             assert len(mesh.points) > 2500
             bands, sizes = extrapolate(mesh_type, size, beam, material, known, most=1200)
             assert size < min(sizes) and max(sizes) <= 2.3 * min(sizes)
-            found = {one.definition: one for one in predict(mesh, beam, material, known)}
+            found = {one.definition: one for one in predict(beam, mesh, material, known)}
             assert {band.definition for band in bands} == set(found)
             for band in bands:
                 for part in (*CASES, "young_modulus_error", "poisson_ratio"):
@@ -258,11 +255,11 @@ class TestBands:
 
     def test_a_slender_beam_has_none(self):
         with pytest.raises(ValueError, match="too large to be solved here, .* less than 4 cells across beam 'b'; make"):
-            extrapolate("right", 1e-4, Beam("b", 2.0, 0.01, 1e-3), Material("m", 1e9, 0.3))
+            extrapolate("right", 1e-4, Beam(2.0, 0.01, 1e-3, "b"), Material(1e9, 0.3, name="m"))
 
     @pytest.mark.parametrize("mesh_type", MESH_TYPES)
     def test_particles_are_counted_before_the_mesh_is_made(self, mesh_type):
         for length, height, size in ((0.2, 0.04, 2e-3), (0.1, 0.1, 4e-3), (0.3, 0.02, 1e-3)):
-            beam = Beam("b", length, height, 1e-3)
+            beam = Beam(length, height, 1e-3, "b")
             made = len(MESH_TYPES[mesh_type](length, height, size).points)
             assert particles(mesh_type, beam, size) == pytest.approx(made, rel=0.2)

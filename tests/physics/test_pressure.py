@@ -12,16 +12,17 @@ from springtune.problem.boundary import held, loaded_edges, measured, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import FACE
 from springtune.problem.materials import Material
+from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs import DEFINITIONS
 
-BLOCK = Beam("200x40", 0.2, 0.04, 1e-3)
+BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")
 FORCE = -20.0  # .1 MPa on 200 x 1 mm
 
 
 def block(definition, nu=0.5, size=2e-3, stiffness=None, mesh_type="structured", follower=False):
     mesh = MESH_TYPES[mesh_type](0.2, 0.04, size)
-    springs = DEFINITIONS[definition].springs(mesh, Material("rubber", 1e6, nu), 1e-3, stiffness)
+    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="rubber"), 1e-3, stiffness)
     network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
     turning = FollowerPressure(mesh, *loaded_edges(mesh, FACE)) if follower else None
     return StaticProblem(network, weights(mesh, FACE), turning), FORCE / springs.reference, measured(mesh, FACE)
@@ -32,7 +33,7 @@ def middle(found, field):
 
 
 def test_reference_of_the_block():
-    solution = solve_small_strain(BLOCK, Material("rubber", 1e6, 0.5), FORCE, kind=FACE)
+    solution = solve_small_strain(BLOCK, Material(1e6, 0.5, name="rubber"), FORCE, kind=FACE)
     # CalculiX and the paper: 3.144 and 3.14 mm at the middle, 3.31 mm sideways at the upper corners.
     assert solution.displacement == pytest.approx(-3.144e-3, rel=1e-4)
     assert np.abs(solution.displacements[..., 0]).max() == pytest.approx(3.31e-3, rel=3e-3)
@@ -43,7 +44,7 @@ def test_reference_of_the_block():
 @pytest.mark.parametrize("definition", ["area", "delingette"])
 def test_one_set_of_parameters_serves_the_block_too(definition, nu):
     problem, s, field = block(definition, nu)
-    reference = solve_small_strain(BLOCK, Material("rubber", 1e6, nu), FORCE, kind=FACE)
+    reference = solve_small_strain(BLOCK, Material(1e6, nu, name="rubber"), FORCE, kind=FACE)
     assert middle(problem.linear(s), field) == pytest.approx(reference.displacement, rel=0.01)
 
 
@@ -109,7 +110,7 @@ def test_few_newton_steps_under_follower_pressure():
 def column(definition, length, height, size, follower, mesh_type="structured"):
     """A sheet that stands on its lower side, and the force over stiffness that would strain it by 1."""
     mesh = MESH_TYPES[mesh_type](length, height, size)
-    springs = DEFINITIONS[definition].springs(mesh, Material("rubber", 1e6, 0.3), 1e-3)
+    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="rubber"), 1e-3)
     network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
     turning = FollowerPressure(mesh, *loaded_edges(mesh, FACE)) if follower else None
     return StaticProblem(network, weights(mesh, FACE), turning), -1e6 * 1e-3 * length / springs.reference
@@ -135,7 +136,7 @@ def test_a_tall_sheet_under_a_follower_pressure_is_solved_only_where_it_does_not
     assert found.converged and pivots == 0  # inertia has nothing to say
     lowest = frequencies(problem, strain * unit, found.displacements)[:MODES]
     flutters = (np.abs(lowest.imag) > 1e-6 * np.abs(lowest)).any()
-    assert status == ("unstable" if flutters else "solved")
+    assert status == (Status.UNSTABLE if flutters else Status.SOLVED)
     assert ("flutters" in message) == flutters
     modes = problem.modes(strain * unit, found.displacements, found.factor)
     assert np.sort(np.abs(modes)) == pytest.approx(np.abs(lowest), rel=1e-6)
@@ -146,11 +147,11 @@ def test_a_slender_column_flutters_at_becks_load():
 
     def critical(follower, low, high):
         problem, unit = column("delingette", 0.01, 0.2, 2.5e-3, follower)
-        assert problem.judge(low * unit, problem.nonlinear(low * unit))[0] == "solved"
-        assert problem.judge(high * unit, problem.nonlinear(high * unit))[0] == "unstable"
+        assert problem.judge(low * unit, problem.nonlinear(low * unit))[0] is Status.SOLVED
+        assert problem.judge(high * unit, problem.nonlinear(high * unit))[0] is Status.UNSTABLE
         while high - low > 2e-3 * high:
             middle = 0.5 * (low + high)
-            stable = problem.judge(middle * unit, problem.nonlinear(middle * unit))[0] == "solved"
+            stable = problem.judge(middle * unit, problem.nonlinear(middle * unit))[0] is Status.SOLVED
             low, high = (middle, high) if stable else (low, middle)
         return high
 

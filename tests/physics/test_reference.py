@@ -18,13 +18,13 @@ from springtune.problem.materials import Material
 from springtune.reference.field import outline
 from springtune.reference.small_strain import FIRST_LEVEL, ReferenceNotConvergedError, UnitLevel, solve_small_strain
 
-STEEL = Material("steel", 210e9, 0.3)
-RUBBER = Material("rubber", 1e6, 0.5)
+STEEL = Material(210e9, 0.3, name="steel")
+RUBBER = Material(1e6, 0.5, name="rubber")
 
 
 def beam(length, height):
     """A beam of 1 mm thickness from its sides in mm."""
-    return Beam(f"{length:g}x{height:g}", length / 1e3, height / 1e3, 1e-3)
+    return Beam(length / 1e3, height / 1e3, 1e-3, f"{length:g}x{height:g}")
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_rubber_beams_of_the_paper(length, height, force, expected):
 
 @pytest.mark.parametrize(("length", "height"), [(200, 40), (100, 20), (30, 60)])
 def test_without_lateral_contraction_the_bar_is_uniform(length, height):
-    result = solve_small_strain(beam(length, height), Material("cork", 2e7, 0.0), -35.0)
+    result = solve_small_strain(beam(length, height), Material(2e7, 0.0, name="cork"), -35.0)
     strain = -35.0 / (2e7 * height / 1e3 * 1e-3)
     # The space contains the answer: what is left is round-off, which the estimate must own up to.
     assert result.displacement == pytest.approx(strain * length / 1e3, rel=1e-10)
@@ -115,8 +115,8 @@ def test_without_lateral_contraction_the_bar_is_uniform(length, height):
 
 @pytest.mark.parametrize(("aspect_ratio", "nu"), [(1, 0.5), (2, 0.3)])
 def test_agrees_with_quadratic_elements_graded_towards_the_corners(aspect_ratio, nu):
-    body = Beam("unit", 2 * aspect_ratio, 2.0, 1.0)
-    result = solve_small_strain(body, Material("unit", 1.0, nu), 2.0)
+    body = Beam(2 * aspect_ratio, 2.0, 1.0, "unit")
+    result = solve_small_strain(body, Material(1.0, nu, name="unit"), 2.0)
     independent = quadratic(aspect_ratio, nu, 20, 3)
     # Cubed coordinates restore the quadratic elements' full rate, the 4th power of their number: 6.1e-6 of the limit
     # is missing at 10 elements and 4.7e-7 at 20, for nu = .5.
@@ -127,9 +127,9 @@ def test_agrees_with_quadratic_elements_graded_towards_the_corners(aspect_ratio,
 @pytest.mark.parametrize("kind", [BENDING, SHEAR])
 @pytest.mark.parametrize(("aspect_ratio", "nu"), [(2, 0.5), (1.5, 0.3)])
 def test_transverse_loads_agree_with_quadratic_elements(kind, aspect_ratio, nu):
-    body = Beam("unit", 2 * aspect_ratio, 2.0, 1.0)
+    body = Beam(2 * aspect_ratio, 2.0, 1.0, "unit")
     side = 2.0 * aspect_ratio if kind == SHEAR else 2.0
-    result = solve_small_strain(body, Material("unit", 1.0, nu), side, kind=kind)
+    result = solve_small_strain(body, Material(1.0, nu, name="unit"), side, kind=kind)
     independent = quadratic(aspect_ratio, nu, 12, 3, kind)
     # 12 cubed elements a half height: from 6 to 12 they gain 15 times what they then lack.
     assert result.displacement == pytest.approx(independent, rel=2e-5)
@@ -140,7 +140,7 @@ def test_transverse_loads_agree_with_quadratic_elements(kind, aspect_ratio, nu):
 def test_slender_beams_by_hand(kind):
     """Timoshenko's cantilever, and a block so wide that its ends do not count."""
     aspect_ratio, nu = 20.0, 0.3
-    result = solve_small_strain(Beam("b", aspect_ratio, 1.0, 1.0), Material("unit", 1.0, nu), 1.0, kind=kind)
+    result = solve_small_strain(Beam(aspect_ratio, 1.0, 1.0, "b"), Material(1.0, nu, name="unit"), 1.0, kind=kind)
     if kind == BENDING:
         expected = 4 * aspect_ratio**3 + 1.2 * 2 * (1 + nu) * aspect_ratio
         assert result.displacement == pytest.approx(expected, rel=1e-3)
@@ -164,8 +164,8 @@ def interior(nu):
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 @pytest.mark.parametrize("aspect_ratio", [40, 100, 300, 1000, 3000])
 def test_slender_cantilevers_follow_the_cubic_of_short_ones(aspect_ratio, nu):
-    body = Beam("slender", aspect_ratio * 0.01, 0.01, 1e-3)
-    result = solve_small_strain(body, Material("any", 3e9, nu), 7.0, kind=BENDING)
+    body = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "slender")
+    result = solve_small_strain(body, Material(3e9, nu, name="any"), 7.0, kind=BENDING)
     exact = np.polyval(interior(nu), aspect_ratio) * 7.0 / (2 * 3e9 * 1e-3)
     assert result.error_estimate <= 1e-6
     # The cubic's own error: that of level 8 at the corners, some 1e-12.
@@ -187,7 +187,7 @@ def test_rounding_of_slender_cantilevers_is_bounded(aspect_ratio, nu, degree):
 def test_rounding_out_of_reach_is_an_error_that_says_so():
     message = r"bending reference, 100000 times as long as high, .*: relative rounding error .* beam theory"
     with pytest.raises(ReferenceNotConvergedError, match=message):
-        solve_small_strain(Beam("hair", 1e3, 0.01, 1e-3), STEEL, 1.0, kind=BENDING)
+        solve_small_strain(Beam(1e3, 0.01, 1e-3, "hair"), STEEL, 1.0, kind=BENDING)
 
 
 # -- convergence ----------------------------------------------------------------------------------------------------
@@ -196,7 +196,7 @@ def test_rounding_out_of_reach_is_an_error_that_says_so():
 @settings(max_examples=12, deadline=None)
 @given(aspect_ratio=st.floats(0.2, 30), nu=st.floats(0, 0.5), kind=st.sampled_from(list(LOAD_KINDS.values())))
 def test_error_estimate_is_honest(aspect_ratio, nu, kind):
-    body, material = Beam("any", aspect_ratio * 0.01, 0.01, 1e-3), Material("any", 3e9, nu)
+    body, material = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any"), Material(3e9, nu, name="any")
     result = solve_small_strain(body, material, 7.0, kind=kind)
     assert result.error_estimate <= 1e-4
     # Level 7 has smaller elements at the corners and polynomials of a higher degree than what converged.
@@ -243,7 +243,7 @@ def test_tolerance_out_of_reach_is_an_error_with_level_and_estimate():
 @pytest.mark.parametrize("nu", [0.51, 1.0, -1.0, float("nan")])
 def test_impossible_poisson_ratio_is_an_error(nu):
     with pytest.raises(ValueError, match="Poisson's ratio of 'odd'"):
-        solve_small_strain(beam(200, 40), Material("odd", 1e6, nu), 1.0)
+        solve_small_strain(beam(200, 40), Material(1e6, nu, name="odd"), 1.0)
 
 
 # -- the field ------------------------------------------------------------------------------------------------------
@@ -259,8 +259,8 @@ def test_proportional_to_the_force(solution):
 
 
 def test_thickness_and_young_modulus_divide(solution):
-    thick = Beam("200x40", 0.2, 0.04, 4e-3)
-    soft = Material("soft", STEEL.young_modulus / 2, STEEL.poisson_ratio)
+    thick = Beam(0.2, 0.04, 4e-3, "200x40")
+    soft = Material(STEEL.young_modulus / 2, STEEL.poisson_ratio, name="soft")
     assert solve_small_strain(thick, soft, 400e3).displacement == pytest.approx(solution.displacement / 2, rel=1e-14)
 
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from springtune.problem.compare import best_stiffness, deformation_error
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
+from springtune.problem.status import Status
 from springtune.springs.calibrated import calibrate
 from springtune.springs.lattice import predicted_stiffness
 
@@ -36,7 +37,7 @@ def test_best_stiffness_of_a_known_curve(best, bend, sign):
     if bend < 0 and -2 * bend / best > 0.9:
         return  # the curve turns back and meets the value twice
     met = found(lambda k: sign * (1 / k + bend / k**2), sign * (1 / best + bend / best**2))
-    assert (met.status, met.message) == ("solved", "")
+    assert (met.status, met.message) == (Status.SOLVED, "")
     assert met.stiffness == pytest.approx(best, rel=1e-9)
 
 
@@ -47,7 +48,7 @@ def test_best_stiffness_is_of_a_stable_point(place, first_stable):
     met = found(lambda k: 1 / k, 1 / place, first_stable)
     if abs(place / first_stable - 1) < 1e-4:
         return  # the search ends before the very end of the stable part
-    assert met.status == ("solved" if place > first_stable else "unstable")
+    assert met.status == (Status.SOLVED if place > first_stable else Status.UNSTABLE)
     assert met.stiffness == pytest.approx(place if place > first_stable else np.nan, rel=1e-9, nan_ok=True)
 
 
@@ -62,17 +63,17 @@ def test_best_stiffness_in_a_gap_is_solved_for_or_missing_with_a_reason():
     displacement[STIFFNESS < 0.6] = 1 / STIFFNESS[STIFFNESS < 0.6]
     stable = STIFFNESS >= 0.781
     met = best_stiffness(STIFFNESS, displacement, stable, solve(0.777), solve)
-    assert met.status == "solved" and met.stiffness == pytest.approx(0.777, rel=1e-9)
+    assert met.status == Status.SOLVED and met.stiffness == pytest.approx(0.777, rel=1e-9)
     nothing = best_stiffness(STIFFNESS, displacement, stable, solve(0.777), lambda stiffness: np.nan)
-    assert np.isnan(nothing.stiffness) and nothing.status == "not_converged" and "gap" in nothing.message
+    assert np.isnan(nothing.stiffness) and nothing.status == Status.NOT_CONVERGED and "gap" in nothing.message
 
 
 def test_best_stiffness_is_nan_where_there_is_none():
     for reference in (100.0, np.nan):
         met = found(lambda k: 1 / k, reference)
-        assert np.isnan(met.stiffness) and met.status == "failed" and met.message
+        assert np.isnan(met.stiffness) and met.status == Status.FAILED and met.message
     empty = best_stiffness(STIFFNESS, np.full(61, np.nan), np.zeros(61, dtype=bool), 1.0, lambda k: np.nan)
-    assert np.isnan(empty.stiffness) and empty.status == "not_converged"
+    assert np.isnan(empty.stiffness) and empty.status == Status.NOT_CONVERGED
 
 
 def test_holes_of_a_curve_do_not_spoil_its_best_stiffness():
@@ -92,5 +93,5 @@ def test_calibration_is_the_mean_and_refuses_a_missing_curve():
 
 @pytest.mark.parametrize(("size", "expected"), [(1e-3, 176.8e6), (2e-3, 171.9e6), (5e-3, 158.9e6)])
 def test_predicted_stiffness_of_the_calibration_beam(size, expected):
-    steel, beam = Material("steel", 210e9, 0.3), Beam("200x30", 0.2, 0.03, 1e-3)
+    steel, beam = Material(210e9, 0.3, name="steel"), Beam(0.2, 0.03, 1e-3, "200x30")
     assert predicted_stiffness(steel, beam, size) == pytest.approx(expected, rel=5e-4)

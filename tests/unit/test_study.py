@@ -104,8 +104,8 @@ class TestExpansion:
 
     def test_values_are_si(self, load):
         study = load(SMALL)
-        long, short = Beam("long", 0.2, 0.03, 0.001), Beam("short", 0.1, 0.02, 0.002)
-        steel = Material("steel", 210e9, 0.3)
+        long, short = Beam(0.2, 0.03, 0.001, "long"), Beam(0.1, 0.02, 0.002, "short")
+        steel = Material(210e9, 0.3, name="steel")
         assert study.scenes[0] == Scene(
             MeshSpec(long, "structured", 0.002), steel, "traction", 300e3, "paper", "nonlinear"
         )
@@ -351,7 +351,7 @@ class TestMeshFiles:
     def test_is_a_mesh_type_of_its_own(self, load, tmp_path):
         (tmp_path / "own.msh").write_text("any")
         study = load(self.TEXT + self.GRID)
-        short = Beam("short", 0.1, 0.02, 0.002)
+        short = Beam(0.1, 0.02, 0.002, "short")
         mesh = MeshSpec(short, "own", 0.003, tmp_path / "own.msh", 1e-3)
         assert study.meshes[-1] == mesh and mesh.name == "short_own_3mm"
         assert study.axes["mesh_type"] == ("structured", "free", "own")

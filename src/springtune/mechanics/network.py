@@ -111,6 +111,29 @@ class Network:
             pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
         return pull[:, None] * vectors
 
+    def spring_forces(self, displacements, linear=False):
+        """Axial force of each spring over the reference stiffness, energies' part left out.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        linear : bool, optional
+            Whether the network is linear in the displacements.
+
+        Returns
+        -------
+        ndarray of float, shape (n_springs,)
+            Positive in tension [m].
+        """
+        relative = self.stretch(displacements)
+        if linear:
+            return self.stiffness * np.einsum("ij,ij->i", self.rest_vectors, relative) / self.rest_lengths
+        vectors = self.rest_vectors + relative
+        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+        squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
+        return self.stiffness * squares / (lengths + self.rest_lengths)
+
     def rounding(self, displacements, linear=False):
         """Size of the rounding errors in the resistance to displacements [m], shape (unknowns,).
 

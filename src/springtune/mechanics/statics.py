@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..linalg.factors import SingularError
+from ..problem.status import Status
 from .series import Expansion
 
 TOLERANCE = 1e-10
@@ -317,28 +318,32 @@ class StaticProblem:
 
         Returns
         -------
-        status : str
-            ``"solved"``, ``"unstable"`` or ``"not_converged"``.
+        status : Status
+            Solved, unstable or not converged.
         message : str
             Why it is not solved; empty where it is.
         negative_pivots : int or float
             Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
         """
         if not found.converged:
-            return "not_converged", f"{found.reason}; last residual {found.residual:.1e}", np.nan
+            return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
         try:
             pivots, flutters = self.stability(s, found.displacements, found.factor)
         except SingularError:
-            return "unstable", "limit point: the tangent is singular", np.nan
+            return Status.UNSTABLE, "limit point: the tangent is singular", np.nan
         if pivots:
             many = "s" if pivots > 1 else ""
-            return "unstable", f"unstable equilibrium: the tangent has {pivots} negative pivot{many}", pivots
+            return Status.UNSTABLE, f"unstable equilibrium: the tangent has {pivots} negative pivot{many}", pivots
         if flutters:
-            return "unstable", "unstable equilibrium: it flutters, two modes have merged into a complex pair", pivots
+            return (
+                Status.UNSTABLE,
+                "unstable equilibrium: it flutters, two modes have merged into a complex pair",
+                pivots,
+            )
         if found.unstable_share < 1:
             share = f"{100 * found.unstable_share:.3g} %"
-            return "unstable", f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
-        return "solved", "", pivots
+            return Status.UNSTABLE, f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
+        return Status.SOLVED, "", pivots
 
     def nonlinear(self, s):
         """Equilibrium of the network with its springs' full length law.

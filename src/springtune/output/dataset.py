@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-STATUS = ("not_requested", "solved", "linear_only", "not_converged", "unstable", "failed")
+from ..problem.status import Status
+
+STATUS = tuple(map(str, Status))
 """Meanings of the flags of `status`; a flag's value is its place here."""
 
 DIMENSIONS = {

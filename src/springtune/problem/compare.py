@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from .status import Status
+
 ROOT = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""
 
@@ -41,15 +43,15 @@ class Best:
     ----------
     stiffness : float
         [N/m]; NaN where there is none.
-    status : str
-        ``"solved"``; ``"unstable"`` where the curve meets the reference where it is unstable alone;
-        ``"not_converged"`` where it may in a gap; ``"failed"`` where it does not, or there is no reference.
+    status : Status
+        Solved; unstable where the curve meets the reference where it is unstable alone; not converged where it may in a
+        gap; failed where it does not, or there is no reference.
     message : str
         Why there is none; empty where there is one.
     """
 
     stiffness: float
-    status: str
+    status: Status
     message: str = ""
 
 
@@ -85,7 +87,7 @@ def best_stiffness(
         The stiffest where the curve meets the reference more than once.
     """
     if not np.isfinite(reference):
-        return Best(np.nan, "failed", "the reference has no displacement")
+        return Best(np.nan, Status.FAILED, "the reference has no displacement")
     softness, error = 1.0 / np.asarray(stiffness)[::-1], np.asarray(displacement)[::-1] - reference
     solved = np.asarray(stable)[::-1] & np.isfinite(error)
     met = (np.sign(error[:-1]) * np.sign(error[1:]) <= 0) & np.isfinite(error[:-1] * error[1:])
@@ -93,27 +95,27 @@ def best_stiffness(
         if solved[place] and solved[place + 1]:
             if met[place]:
                 ends = *softness[place : place + 2], *error[place : place + 2]
-                return Best(_root(solve, reference, *ends), "solved")
+                return Best(_root(solve, reference, *ends), Status.SOLVED)
         elif solved[place] and (met[place] or not np.isfinite(error[place + 1])):
             gap = np.flatnonzero(np.isfinite(error[place + 1 :]))
             end = softness[place + 1 + gap[0]] if len(gap) else softness[-1]
             found = _last_root(solve, reference, softness[place], end, error[place])
             if found is not None:
-                return Best(found, "solved")
+                return Best(found, Status.SOLVED)
     if len(error) == 1 and solved[0] and error[0] == 0:
-        return Best(float(stiffness[0]), "solved")
+        return Best(float(stiffness[0]), Status.SOLVED)
     if met.any():
         place = int(np.argmax(met))
         between = f"{1 / softness[place + 1]:.6g} and {1 / softness[place]:.6g} N/m"
-        return Best(np.nan, "unstable", f"the curve meets the reference where it is unstable, between {between}")
+        return Best(np.nan, Status.UNSTABLE, f"the curve meets the reference where it is unstable, between {between}")
     known = np.flatnonzero(np.isfinite(error))
     across = [pair for pair in zip(known[:-1], known[1:]) if error[pair[0]] * error[pair[1]] <= 0]
     if not len(known) or across or len(known) < len(error) and known[-1] < len(error) - 1:
         first, last = across[0] if across else (known[-1] if len(known) else 0, len(error) - 1)
         between = f"between {1 / softness[last]:.6g} and {1 / softness[first]:.6g} N/m"
-        return Best(np.nan, "not_converged", f"the curve may meet the reference in its gap {between}")
+        return Best(np.nan, Status.NOT_CONVERGED, f"the curve may meet the reference in its gap {between}")
     asked = f"from {stiffness[0]:.6g} to {stiffness[-1]:.6g} N/m"
-    return Best(np.nan, "failed", f"the curve does not meet the reference {asked}; widen `sensitivity`")
+    return Best(np.nan, Status.FAILED, f"the curve does not meet the reference {asked}; widen `sensitivity`")
 
 
 def _root(solve, reference, first, last, error_first, error_last):

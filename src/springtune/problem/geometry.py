@@ -2,23 +2,41 @@
 
 from dataclasses import dataclass
 
+from .quantities import positive
+
 
 @dataclass(frozen=True)
 class Beam:
     """A rectangular sheet, its lower left corner at the origin.
 
-    Attributes
+    Parameters
     ----------
-    name : str
-        Label of the beam, e.g. ``"200x40"``.
-    length, height, thickness : float
-        Extent along x, along y and out of the plane [m].
+    length, height, thickness : float or str
+        Extent along x, along y and out of the plane [m], or texts with their unit.
+    name : str, optional
+        Label of the beam; its length and height in mm without, e.g. ``"200x40"``.
+
+    Raises
+    ------
+    ValueError
+        If a length is not above zero, or a text no length.
+
+    Examples
+    --------
+    >>> Beam("200 mm", "40 mm")
+    Beam(length=0.2, height=0.04, thickness=0.001, name='200x40')
     """
 
-    name: str
     length: float
     height: float
-    thickness: float
+    thickness: float = 1e-3
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for side in ("length", "height", "thickness"):
+            object.__setattr__(self, side, positive(getattr(self, side), "length", side))
+        if not self.name:
+            object.__setattr__(self, "name", f"{1e3 * self.length:g}x{1e3 * self.height:g}")
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,49 @@
 """Materials: isotropic, linearly elastic."""
 
 from dataclasses import dataclass
+from numbers import Real
+
+from .quantities import positive
 
 
 @dataclass(frozen=True)
 class Material:
     """An isotropic linearly elastic material.
 
-    Attributes
+    Parameters
     ----------
+    young_modulus : float or str
+        Young's modulus E [Pa], or a text with its unit.
+    poisson_ratio : float
+        Poisson's ratio nu [1], above -1 and at most 0.5, which is legal, since sheets are in plane stress.
+    density : float, str or None
+        Density rho [kg/m3], or a text with its unit; statics need none.
     name : str
         Label of the material, e.g. ``"steel"``.
-    young_modulus : float
-        Young's modulus E [Pa].
-    poisson_ratio : float
-        Poisson's ratio nu [1]; 0.5 is legal, since sheets are in plane stress.
-    density : float or None
-        Density rho [kg/m3]; statics need none.
+
+    Raises
+    ------
+    ValueError
+        If a quantity is not above zero or of another kind, or Poisson's ratio out of its range.
+
+    Examples
+    --------
+    >>> Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+    Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel')
     """
 
-    name: str
     young_modulus: float
     poisson_ratio: float
     density: float | None = None
+    name: str = "material"
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__  # of a frozen class
+        set_(self, "young_modulus", positive(self.young_modulus, "stress", "Young's modulus"))
+        if self.density is not None:
+            set_(self, "density", positive(self.density, "density", "density"))
+        if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
+            raise ValueError(
+                f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}: isotropic materials have -1 < nu <= 0.5; "
+                "give a number in that range"
+            )

@@ -186,7 +186,7 @@ def solve_small_strain(
     --------
     >>> from springtune.problem.geometry import Beam
     >>> from springtune.problem.materials import Material
-    >>> solution = solve_small_strain(Beam("200x40", 0.2, 0.04, 0.001), Material("steel", 210e9, 0.3), 400e3)
+    >>> solution = solve_small_strain(Beam(0.2, 0.04), Material(210e9, 0.3), 400e3)
     >>> round(solution.displacement * 1e3, 3)
     9.501
     """

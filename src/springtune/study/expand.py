@@ -56,9 +56,9 @@ def declared(config):
     Declared
     """
     return Declared(
-        {name: Beam(name, beam.length, beam.height, beam.thickness) for name, beam in config.beams.items()},
+        {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
         {
-            name: Material(name, material.young_modulus, material.poisson_ratio, material.density)
+            name: Material(material.young_modulus, material.poisson_ratio, material.density, name)
             for name, material in config.materials.items()
         },
     )

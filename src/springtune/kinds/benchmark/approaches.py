@@ -4,37 +4,39 @@ Each takes a scene and a mesh size and returns the displacement of the loaded si
 a clock which part of the work it is at. All are linear.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...linalg.factors import factorised
-from ...mechanics.dynamics import Motion, masses, relax
-from ...mechanics.network import Network
-from ...mechanics.statics import StaticProblem
+from ...mechanics.dynamics import relax
 from ...mesh import structured
 from ...problem.boundary import held, measured, weights
 from ...reference import calculix
-from ...springs import DEFINITIONS
-from .names import OTHER_APPROACHES
+from ...scene.motion import motion_of
+from ...scene.sheet import Sheet
 
 
 def network(scene, mesh, definition, clock):
     """A definition, linear."""
     with clock("assembling"):
-        problem, reference, seen = _problem(scene, mesh, definition)
+        sheet, springs, problem = _problem(scene, mesh, definition)
         problem.network.tangent()
     with clock("factorizing"):
         problem.rest_factor  # noqa: B018  factorised when first asked for
     with clock("solving"):
-        found = problem.linear(scene.force / reference)
+        found = problem.linear(scene.force / springs.reference)
     if not found.converged:
         raise ArithmeticError(found.reason)
-    return float(np.tensordot(found.displacements, seen, axes=2)), problem.network.unknowns
+    return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
 
 
 def _problem(scene, mesh, definition):
-    springs = DEFINITIONS[definition].springs(mesh, scene.material, scene.beam.thickness)
-    net = Network(mesh, held(mesh, scene.kind), springs.relative, springs.energies)
-    return StaticProblem(net, weights(mesh, scene.kind)), springs.reference, measured(mesh, scene.kind)
+    """Sheet, springs and static problem; forces that a definition adds to a load are left out."""
+    sheet = Sheet(mesh, scene.beam.thickness)
+    springs = replace(sheet.derive(definition, scene.material)[0], lateral=0.0)
+    sheet.measured(scene.kind)
+    return sheet, springs, sheet.problem(scene.kind, springs)
 
 
 def relaxation(scene, size, clock):
@@ -42,13 +44,13 @@ def relaxation(scene, size, clock):
     with clock("meshing"):
         mesh = _mesh(scene, size)
     with clock("assembling"):
-        problem, reference, seen = _problem(scene, mesh, "delingette")
+        sheet, springs, problem = _problem(scene, mesh, "delingette")
     with clock("solving"):
-        load = scene.force / reference * weights(mesh, scene.kind)
+        load = scene.force / springs.reference * sheet.weights(scene.kind)
         found = relax(problem.network, load, linear=True, tolerance=1e-8)
     if found.status != "rest":
         raise ArithmeticError(found.message)
-    return float(np.tensordot(found.displacements, seen, axes=2)), problem.network.unknowns
+    return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
 
 
 def backward_euler(scene, size, clock, iterations=None):
@@ -56,15 +58,13 @@ def backward_euler(scene, size, clock, iterations=None):
     with clock("meshing"):
         mesh = _mesh(scene, size)
     with clock("assembling"):
-        problem, reference, seen = _problem(scene, mesh, "delingette")
-        inertia = masses(mesh, scene.material.density, scene.beam.thickness) / reference
-        load = scene.force / reference * weights(mesh, scene.kind)
-        motion = Motion(problem.network, inertia, load, linear=True)
+        sheet, springs, problem = _problem(scene, mesh, "delingette")
+        motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force, linear=True)
     with clock("solving"):
         found = motion.run("backward-euler", 0.01, 500, rest=1e-6, iterations=iterations)
     if found.status != "rest":
         raise ArithmeticError(found.message)
-    return float(np.tensordot(found.displacements, seen, axes=2)), problem.network.unknowns
+    return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
 
 
 def truncated_backward_euler(scene, size, clock):
@@ -192,13 +192,13 @@ def condensation(scene, size, clock):
     with clock("meshing"):
         mesh = _mesh(scene, size)
     with clock("assembling"):
-        problem, reference, seen = _problem(scene, mesh, "delingette")
+        sheet, springs, problem = _problem(scene, mesh, "delingette")
         problem.network.tangent()
     with clock("factorizing"):
         net, factor = problem.network, problem.rest_factor
         loaded = np.flatnonzero(problem.load)
         responses = np.zeros((len(loaded), len(loaded)))
-        watched = net.reduce(seen)
+        watched = net.reduce(sheet.measured(scene.kind))
         unit = np.zeros(net.unknowns)
         of_watched = np.zeros(len(loaded))
         for number, place in enumerate(loaded):
@@ -207,7 +207,7 @@ def condensation(scene, size, clock):
             responses[:, number], of_watched[number] = answer[loaded], watched @ answer
             unit[place] = 0.0
     with clock("solving"):
-        forces = scene.force / reference * problem.load[loaded]
+        forces = scene.force / springs.reference * problem.load[loaded]
         responses @ forces
         displacement = float(of_watched @ forces)
     return displacement, len(loaded)
@@ -334,5 +334,17 @@ def calculix_cps8(scene, size, clock):
     return float(moved @ shares), int((~clamp).sum())
 
 
-METHODS = {name: globals()[name.replace("-", "_")] for name in OTHER_APPROACHES}
-"""Function of each method."""
+APPROACHES = {
+    "relaxation": relaxation,
+    "backward-euler": backward_euler,
+    "truncated-backward-euler": truncated_backward_euler,
+    "linear-triangles": linear_triangles,
+    "quadratic-triangles": quadratic_triangles,
+    "tensor-mass": tensor_mass,
+    "condensation": condensation,
+    "boundary-elements": boundary_elements,
+    "free-form": free_form,
+    "calculix-cps3": calculix_cps3,
+    "calculix-cps8": calculix_cps8,
+}
+"""Approaches besides definitions, by their names in `springtune.kinds.benchmark.names`."""

@@ -1,7 +1,7 @@
-"""Run time against error: definitions on all mesh types, and their rivals.
+"""Run time against error: definitions on all mesh types, and other approaches.
 
 Every case runs in a process of its own, forked warm, several times; the first run, which also imports and reads what
-the method needs, is told apart. The machine's load and the largest memory are noted beside the seconds.
+the approach needs, is told apart. The machine's load and the largest memory are noted beside the seconds.
 """
 
 import multiprocessing
@@ -15,21 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...linalg import SOLVERS, factors
-from ...mechanics.dynamics import Motion, masses
-from ...mechanics.network import Network
 from ...mechanics.series import trace
-from ...mechanics.statics import StaticProblem
 from ...mesh import MESH_TYPES
-from ...problem.boundary import held, weights
+from ...problem.boundary import weights
 from ...problem.compare import assured, unbeaten
 from ...problem.geometry import Beam
 from ...problem.loads import LOADS
 from ...problem.materials import Material
+from ...problem.status import Status
 from ...reference.calculix import installed
 from ...reference.small_strain import solve_small_strain
-from ...springs import DEFINITIONS, DefinitionError
-from ...springs.lattice import COEFFICIENT, half_weight
-from .approaches import METHODS, network
+from ...scene.motion import motion_of
+from ...scene.sheet import Sheet
+from ...springs import DefinitionError, Springs
+from ...springs.lattice import COEFFICIENT, half_weight, uniform
+from .approaches import APPROACHES, network
 from .names import CURVE_COUNTS
 
 PARTS = ("meshing", "assembling", "factorizing", "solving")
@@ -44,7 +44,7 @@ LONG = 0.4
 
 
 @dataclass(frozen=True)
-class Scene:
+class LoadedBeam:
     """A beam under a load, see `springtune.problem.loads`."""
 
     beam: Beam
@@ -76,29 +76,29 @@ class _Clock:
         self.seconds[part] += time.perf_counter() - begin
 
 
-def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0, second_beam=None):
-    """All methods on all sizes, from coarse to fine, as long as a run is not expected to take too long.
+def run(scene, approaches, sizes, most_seconds, thorough=(), most_thorough=0.0, second_beam=None):
+    """All approaches on all sizes, from coarse to fine, as long as a run is not expected to take too long.
 
     Parameters
     ----------
-    scene : Scene
-    methods : sequence of str
-        Names as `springtune.kinds.benchmark.names.method_names` gives them.
+    scene : LoadedBeam
+    approaches : sequence of str
+        Names as `springtune.kinds.benchmark.names.approach_names` gives them.
     sizes : sequence of float
         Lengths of an edge [m], ascending.
     most_seconds : float
-        Seconds that one run may take; finer sizes of a method that would take longer are left out.
+        Seconds that one run may take; finer sizes of an approach that would take longer are left out.
     thorough : sequence of str, optional
-        Methods that may take more,
+        Approaches that may take more,
     most_thorough : float, optional
         so many seconds.
     second_beam : Beam, optional
-        Another beam, on which each case that was raced is solved once more, for its error alone.
+        Another beam, on which each case that was solved is solved once more, for its error alone.
 
     Returns
     -------
     dict of str to ndarray
-        Variables of `springtune.output.dataset.BENCHMARK_VARIABLES` over method and mesh size.
+        Variables of `springtune.output.dataset.BENCHMARK_VARIABLES` over approach and mesh size.
     """
     begin = time.perf_counter()
     reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
@@ -108,49 +108,49 @@ def run(scene, methods, sizes, most_seconds, thorough=(), most_thorough=0.0, sec
         "reference_seconds": time.perf_counter() - begin,
         "machine_load": os.getloadavg()[0],
     }
-    shape = len(methods), len(sizes)
+    shape = len(approaches), len(sizes)
     names = ("displacement", "seconds", "seconds_spread", "cold_seconds", "peak_memory", "unknowns")
     arrays = {name: np.full(shape, np.nan) for name in (*names, *(f"{part}_seconds" for part in PARTS))}
     status, message = np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
     meshes = {}
-    for mesh_type in {method.partition("/")[2] for method in methods if "/" in method}:
+    for mesh_type in {approach.partition("/")[2] for approach in approaches if "/" in approach}:
         MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
     for j in reversed(range(len(sizes))):
-        for i, method in enumerate(methods):
+        for i, approach in enumerate(approaches):
             before = arrays["seconds"][i, j + 1 :]
-            most = most_thorough if method in thorough else most_seconds
+            most = most_thorough if approach in thorough else most_seconds
             if len(before) and np.isfinite(before[0]) and before[0] * _growth(before, sizes[j:]) > most:
                 message[i, j] = f"left out: more than {most:g} s to be expected"
                 continue
             if message[i, j + 1 :].any():
                 message[i, j] = message[i, j + 1]
                 continue
-            if method.startswith("calculix") and not installed():
+            if approach.startswith("calculix") and not installed():
                 message[i, j] = "left out: CalculiX (ccx) is not on this machine"
                 continue
-            found = _in_process(scene, method, sizes[j], meshes)
+            found = _in_process(scene, approach, sizes[j], meshes)
             if "message" in found:
                 status[i, j], message[i, j] = found["status"], found["message"]
                 continue
-            status[i, j] = 1
+            status[i, j] = Status.SOLVED
             for name, values in arrays.items():
                 values[i, j] = found[name]
     result |= arrays | {"status": status, "message": message}
     result["error"] = (arrays["displacement"] - reference.displacement) / abs(reference.displacement)
-    result["second_error"] = _second(scene, second_beam, methods, sizes, status == 1)
+    result["second_error"] = _second(scene, second_beam, approaches, sizes, status == Status.SOLVED)
     result["assured_error"] = assured(result["error"], result["second_error"])
     return result | _rates(result, sizes)
 
 
-def _second(scene, beam, methods, sizes, raced):
-    """Errors on another beam of the cases that were raced [1]; NaN without one."""
-    errors = np.full(raced.shape, np.nan)
+def _second(scene, beam, approaches, sizes, solved):
+    """Errors on another beam of the cases that were solved [1]; NaN without one."""
+    errors = np.full(solved.shape, np.nan)
     if beam is None:
         return errors
     scene, meshes = replace(scene, beam=beam), {}
     reference = solve_small_strain(beam, scene.material, scene.force, kind=scene.kind).displacement
-    for i, j in np.argwhere(raced):
-        found = _in_process(scene, methods[i], sizes[j], meshes, once=True)
+    for i, j in np.argwhere(solved):
+        found = _in_process(scene, approaches[i], sizes[j], meshes, once=True)
         errors[i, j] = found.get("displacement", np.nan) / reference - 1
     return errors * np.sign(reference)
 
@@ -164,11 +164,11 @@ def _growth(seconds, sizes):
     return particles ** float(np.clip(exponent, 1.0, 2.0))
 
 
-def _in_process(scene, method, size, meshes, once=False):
+def _in_process(scene, approach, size, meshes, once=False):
     """Result of a case from a process of its own; the mesh of a definition is made before, and its time counted."""
     mesh, meshing = None, 0.0
-    if method not in METHODS:
-        mesh_type = method.partition("/")[2]
+    if approach not in APPROACHES:
+        mesh_type = approach.partition("/")[2]
         if (mesh_type, size) not in meshes:
             begin = time.perf_counter()
             made = MESH_TYPES[mesh_type](scene.beam.length, scene.beam.height, size)
@@ -177,27 +177,27 @@ def _in_process(scene, method, size, meshes, once=False):
         mesh, meshing = meshes[mesh_type, size]
     context = multiprocessing.get_context("fork")
     receive, send = context.Pipe(duplex=False)
-    process = context.Process(target=_repeat, args=(send, scene, method, size, mesh, meshing, once))
+    process = context.Process(target=_repeat, args=(send, scene, approach, size, mesh, meshing, once))
     process.start()
     send.close()
     try:
         return receive.recv()
     except EOFError:
-        return {"status": 5, "message": "the process died, of lack of memory most likely"}
+        return {"status": Status.FAILED, "message": "the process died, of lack of memory most likely"}
     finally:
         process.join()
 
 
-def _repeat(send, scene, method, size, mesh, meshing, once):
+def _repeat(send, scene, approach, size, mesh, meshing, once):
     base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     seconds, parts = [], []
     try:
         while True:
             clock, begin = _Clock(), time.perf_counter()
             if mesh is None:
-                displacement, unknowns = METHODS[method](scene, size, clock)
+                displacement, unknowns = APPROACHES[approach](scene, size, clock)
             else:
-                displacement, unknowns = network(scene, mesh, method.partition("/")[0], clock)
+                displacement, unknowns = network(scene, mesh, approach.partition("/")[0], clock)
             seconds.append(time.perf_counter() - begin + meshing)
             parts.append(clock.seconds | ({"meshing": meshing} if mesh is not None else {}))
             # The first run is cold, which a long one does not feel.
@@ -205,10 +205,10 @@ def _repeat(send, scene, method, size, mesh, meshing, once):
             if len(seconds) >= wanted:
                 break
     except DefinitionError as error:
-        send.send({"status": 5, "message": str(error)})
+        send.send({"status": Status.FAILED, "message": str(error)})
         return
     except Exception as error:  # the other cases shall still be measured
-        send.send({"status": 3, "message": f"{type(error).__name__}: {error}"})
+        send.send({"status": Status.NOT_CONVERGED, "message": f"{type(error).__name__}: {error}"})
         return
     warm, of_warm = (seconds[1:], parts[1:]) if len(seconds) > 1 else (seconds, parts)
     here, there = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -246,11 +246,11 @@ def curves(scene, size):
     dict of str to ndarray, shape (n_counts,)
     """
     mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
-    directions, pattern = held(mesh, scene.kind), weights(mesh, scene.kind)
+    pattern = weights(mesh, scene.kind)
     membrane = scene.material.young_modulus * scene.beam.thickness
 
     def problem():
-        return StaticProblem(Network(mesh, directions, np.ones(len(mesh.edges))), pattern)
+        return Sheet(mesh, scene.beam.thickness).problem(scene.kind, Springs(1.0, uniform(mesh)))
 
     together, apart = np.zeros(len(CURVE_COUNTS)), np.zeros(len(CURVE_COUNTS))
     for number, count in enumerate(CURVE_COUNTS):
@@ -277,7 +277,8 @@ def solvers(scene, sizes, most_seconds):
             coarser = first[solver, number + 1 :]
             if name == "Cholesky" and not factors.CHOLESKY or np.nanmax(coarser, initial=0.0) * 8 > most_seconds:
                 continue
-            springs = Network(mesh, held(mesh, scene.kind), half_weight(mesh))
+            sheet = Sheet(mesh, scene.beam.thickness)
+            springs = sheet.network(sheet.held(scene.kind), Springs(1.0, half_weight(mesh)))
             matrix, right = springs.tangent(), np.ones(springs.unknowns)
             for seconds in (first, again):
                 begin = time.perf_counter()
@@ -297,9 +298,9 @@ def explicit(scene, size):
     dict of str to float
     """
     mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
-    springs = DEFINITIONS["lattice"].springs(mesh, scene.material, scene.beam.thickness)
-    inertia = masses(mesh, scene.material.density, scene.beam.thickness) / springs.reference
-    motion = Motion(Network(mesh, held(mesh, scene.kind), springs.relative), inertia)
+    sheet = Sheet(mesh, scene.beam.thickness)
+    springs, _ = sheet.derive("lattice", scene.material)
+    motion = motion_of(sheet, scene.kind, springs, scene.material.density, load=None)
     step = 0.9 * motion.step_limit("central-difference")
     motion.run("central-difference", step, 10)  # compiled
     steps = 2000

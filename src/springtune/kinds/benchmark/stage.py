@@ -34,7 +34,7 @@ def run(tasks, done):
 
 
 def _case(task):
-    scene = benchmark.Scene(Beam(**task["beam"]), Material(**task["material"]), task["load"], task["force"])
+    scene = benchmark.LoadedBeam(Beam(**task["beam"]), Material(**task["material"]), task["load"], task["force"])
     second = Beam(**task["second_beam"]) if task["second_beam"] else None
     limits = task["most_seconds"], task["thorough"], task["most_thorough"]
     found = benchmark.run(scene, task["approaches"], task["mesh_sizes"], *limits, second)

@@ -5,8 +5,9 @@ from collections import defaultdict
 import numpy as np
 
 from ...jobs import store
-from ...output.dataset import STATUS, Filler
+from ...output.dataset import Filler
 from ...problem.compare import band
+from ...problem.status import Status
 from . import plan
 from .variables import LAYING
 
@@ -36,7 +37,7 @@ def _strip(one, result, laid):
     """Put the result of a strip of springs."""
     labels = {"definition": one.definition, "mesh_size": one.mesh_size}
     labels |= {"loading": one.loading, "friction": one.friction}
-    values = {"status": STATUS.index(result["status"]), "message": result["message"]}
+    values = {"status": result["status"], "message": result["message"]}
     if "area" in result:
         values |= {
             "load_share": result["load_share"],
@@ -45,7 +46,7 @@ def _strip(one, result, laid):
             "skipped": result["skipped"],
             "penetration": result["penetration"],
         }
-    if result["status"] == "solved":
+    if result["status"] == Status.SOLVED:
         values |= {
             "area_under_strip": result["area"],
             "area_error": result["area"] / one.trapezoid.area - 1,
@@ -60,12 +61,12 @@ def _strip(one, result, laid):
 def _reference(meshes, labels, laid):
     """Put the result of finite elements on several meshes: that of the first, with a band of all."""
     result = meshes[0]
-    if result["status"] != "solved":
+    if result["status"] != Status.SOLVED:
         return
     values = {}
     for name in ("area", "elongation"):
         values[f"reference_{name}"] = result[name]
-        others = [mesh[name] if mesh["status"] == "solved" else np.nan for mesh in meshes]
+        others = [mesh[name] if mesh["status"] == Status.SOLVED else np.nan for mesh in meshes]
         values[f"reference_{name}_error_estimate"] = band(others)
     laid.put(values, **labels)
     laid.put_rows({"reference_x": result["outline"][:, 0], "reference_y": result["outline"][:, 1]}, **labels)

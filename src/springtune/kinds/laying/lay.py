@@ -19,10 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanics.contact import Body, Contact, ContactError, Obstacle
-from ...mechanics.network import Network
 from ...mechanics.statics import FollowerPressure
 from ...mesh import MESH_TYPES, Mesh
-from ...springs import DEFINITIONS
+from ...scene.sheet import Sheet
 
 RIGID = 1e4
 """Ratio of Young's moduli from which the trapezoid counts as rigid."""
@@ -137,7 +136,8 @@ def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="str
 def _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pressure):
     made = MESH_TYPES[mesh_type](strip.length, strip.height, size)
     mesh = Mesh(made.points + [-0.5 * strip.length, trapezoid.height], made.triangles, made.quads)
-    springs = DEFINITIONS[definition].springs(mesh, material, strip.thickness)
+    sheet = Sheet(mesh, strip.thickness)
+    springs, _ = sheet.derive(definition, material)
     held = np.zeros(mesh.points.shape, dtype=bool)
     # Without friction nothing else keeps the strip from sliding off to one side.
     held[np.abs(mesh.points[:, 0]) <= 1e-9 * strip.length, 0] = True
@@ -153,8 +153,7 @@ def _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pre
         ends = low & (np.abs(np.abs(mesh.points[:, 0]) - 0.5 * strip.length) <= 1e-9 * strip.length)
         held[ends, 1] = True
         arguments = {"prescribed": np.where(ends[:, None], [0.0, -trapezoid.height], 0.0)}
-    network = Network(mesh, held, springs.relative, springs.energies)
-    return Body(network, springs.reference, **arguments), mesh
+    return Body(sheet.network(held, springs), springs.reference, **arguments), mesh
 
 
 def _support(strip, trapezoid, material, size):
@@ -167,7 +166,8 @@ def _support(strip, trapezoid, material, size):
     y = made.points[:, 1]
     width = trapezoid.lower_base + (trapezoid.upper_base - trapezoid.lower_base) * y / trapezoid.height
     mesh = Mesh(np.stack([(made.points[:, 0] / mean - 0.5) * width, y], axis=1), made.triangles)
-    springs = DEFINITIONS["delingette"].springs(mesh, material, strip.thickness)
+    sheet = Sheet(mesh, strip.thickness)
+    springs, _ = sheet.derive("delingette", material)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[np.lexsort((np.abs(mesh.points[:, 0]), y))[0], 0] = True
-    return Body(Network(mesh, held, springs.relative, springs.energies), springs.reference, moves_little=True)
+    return Body(sheet.network(held, springs), springs.reference, moves_little=True)

@@ -9,6 +9,7 @@ from ...jobs import atomic, store
 from ...jobs.spent import Spent
 from ...problem.geometry import Strip, Trapezoid
 from ...problem.materials import Material
+from ...problem.status import Status
 from ...springs import DefinitionError
 from .cost import cost_units
 from .lay import lay
@@ -44,10 +45,10 @@ def _lay(task):
             pressure=task["pressure"], friction=task["friction"],
         )  # fmt: skip
     except DefinitionError as error:
-        return {"status": "failed", "message": f"{task['definition']}: {error}"}
+        return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
     except Exception as error:  # the other strips shall still arrive
-        return {"status": "failed", "message": f"{type(error).__name__}: {error}"}
-    return asdict(found) | {"status": "not_converged" if found.message else "solved"}
+        return {"status": Status.FAILED, "message": f"{type(error).__name__}: {error}"}
+    return asdict(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from collections import defaultdict
 
 from ...jobs import store
-from ...output.dataset import STATUS, Filler
+from ...output.dataset import Filler
 from . import plan
 from .variables import MODULI
 
@@ -20,7 +20,6 @@ def groups(study, folder):
     for patch, names in patches.items():
         for name, result in store.read(folder / "moduli" / f"{patch}.h5", names).items():
             one = names[name]
-            values = result | {"status": STATUS.index(result["status"])}
             labels = {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "poisson_ratio": one.poisson_ratio}
-            moduli.put(values, definition=one.definition, **labels)
+            moduli.put(result, definition=one.definition, **labels)
     return {MODULI.name: moduli.data}

@@ -70,7 +70,7 @@ def _expand(config, declared):
             found |= dict.fromkeys(product(derived, grid.mesh_type, grid.mesh_size, ratios))
     if not found:
         return None
-    box = Beam("patch", config.patch.length, config.patch.height, 1.0)
+    box = Beam(config.patch.length, config.patch.height, 1.0, "patch")
     return Moduli(box, tuple(Measurement(*labels) for labels in found))
 
 

@@ -6,10 +6,11 @@ from scipy.interpolate import CubicSpline
 
 from ...jobs import atomic, store
 from ...mesh import read_mesh
-from ...output.dataset import STATUS, Filler
+from ...output.dataset import Filler
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
 from ...problem.loads import LOADS
+from ...problem.status import Status
 from ...reference.field import outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
@@ -155,10 +156,10 @@ def _scenes(study, folder, root, block, fields, objections):
         results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), arrays)
         for scene, name in zip(scenes, names):
             result = results[name]
-            values = {"status": STATUS.index(result["status"]), "solve_seconds": result["seconds"]}
+            values = {"status": result["status"], "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
             why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]
-            if why and result["status"] in ("solved", "unstable"):
+            if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
                 values["message"] = "; ".join(filter(None, (values.get("message"), why)))
             labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
             labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
@@ -198,8 +199,8 @@ def _sensitivity(study, folder, displacements, axes):
             result, stiffness = results[name], np.array(plan.stiffnesses(study, curve))
             displacement = result["displacement"]
             reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
-            solved, unstable, missing = map(STATUS.index, ("solved", "unstable", "not_converged"))
-            status = np.where(np.isnan(displacement), missing, np.where(result["stable"], solved, unstable))
+            status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
+            status = np.where(np.isnan(displacement), Status.NOT_CONVERGED, status)
             curves.put(
                 {
                     "stiffness": stiffness,
@@ -208,7 +209,7 @@ def _sensitivity(study, folder, displacements, axes):
                     "status": status,
                     "message": result["message"],
                     "best_stiffness": result["best_stiffness"],
-                    "best_stiffness_status": STATUS.index(result["best_status"]),
+                    "best_stiffness_status": result["best_status"],
                     "best_stiffness_message": result["best_message"],
                     "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
                     "curve_seconds": result["seconds"],

@@ -11,15 +11,11 @@ import numpy as np
 
 from ...jobs import atomic, store
 from ...jobs.spent import Spent
-from ...mechanics.network import Network
-from ...mechanics.series import LinearPath, StablePath
-from ...mechanics.statics import StaticProblem
 from ...mesh import read_mesh
-from ...problem.boundary import held, measured, weights
-from ...problem.compare import Best, best_stiffness
 from ...problem.loads import LOAD_KINDS
 from ...reference.limits import objection
-from ...springs.lattice import uniform
+from ...scene.curve import ending, follow, meeting
+from ...scene.sheet import Sheet
 from . import stored_reference as references
 
 
@@ -44,25 +40,24 @@ def run(tasks, done):
             continue
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
         results = {}
-        for name in {curve["kind"]: None for curve in missing}:
-            kind = LOAD_KINDS[name]
-            problem = StaticProblem(Network(mesh, held(mesh, kind), uniform(mesh)), weights(mesh, kind))
-            alike = [curve for curve in missing if curve["kind"] == name]
-            results |= _trace(problem, measured(mesh, kind), alike, tasks["references"])
+        sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
+        for kind in {curve["kind"]: None for curve in missing}:
+            alike = [curve for curve in missing if curve["kind"] == kind]
+            results |= _trace(sheet, LOAD_KINDS[kind], alike, tasks["references"])
         store.add(path, results)
         for result in results.values():
             spent.add("curve", len(mesh.points), result["seconds"])
     atomic.write_json(done, spent.summary())
 
 
-def _trace(problem, weights, curves, folder):
-    """Results of the curves of a network by key; those under loads of one sign lie on one path."""
+def _trace(sheet, kind, curves, folder):
+    """Results of the curves of a kind of load by key; those under loads of one sign lie on one path."""
     results = {}
     for kinematics, sign in {(curve["kinematics"], np.sign(curve["force"])): None for curve in curves}:
         begin = time.perf_counter()
         alike = [curve for curve in curves if (curve["kinematics"], np.sign(curve["force"])) == (kinematics, sign)]
         loads = [curve["force"] / np.array(curve["stiffnesses"]) for curve in alike]
-        path = (LinearPath if kinematics == "linear" else StablePath)(problem, weights, np.concatenate(loads))
+        path = follow(sheet, kind, kinematics, np.concatenate(loads))
         parts = np.cumsum([len(each) for each in loads])[:-1]
         found = zip(alike, np.split(path.values, parts), np.split(path.stable, parts))
         of_these = {curve["key"]: _result(path, curve, *values, folder) for curve, *values in found}
@@ -72,28 +67,19 @@ def _trace(problem, weights, curves, folder):
 
 
 def _result(path, curve, displacement, stable, folder):
-    force, stiffnesses = curve["force"], np.array(curve["stiffnesses"])
+    force, stiffness = curve["force"], np.array(curve["stiffnesses"])
     reference = references.read(folder, curve["reference"])
     why = objection(reference, force, curve["kinematics"])
-    if why:
-        best = Best(np.nan, "failed", f"{why}; take a smaller force or linear kinematics")
-    else:
-        asked = force * reference["displacement"]
-        best = best_stiffness(stiffnesses, displacement, stable, asked, lambda stiffness: path.value(force / stiffness))
+    wanted = force * reference.get("displacement", np.nan)
+    best = meeting(path, force, stiffness, displacement, stable, wanted, why)
     return {
         "displacement": displacement,
         "stable": stable,
-        "message": "" if stable.all() else _ending(path, force),
+        "message": ending(path, force, stable),
         "best_stiffness": best.stiffness,
         "best_status": best.status,
         "best_message": best.message,
     }
-
-
-def _ending(path, force):
-    """Why a curve is not solved throughout."""
-    reason = path.end or "not followed through its turn"
-    return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
 
 
 if __name__ == "__main__":

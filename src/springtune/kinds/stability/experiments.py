@@ -11,21 +11,20 @@ import numpy as np
 
 from ...linalg.factors import SingularError
 from ...mechanics.arc_length import buckling_load, follow
-from ...mechanics.dynamics import Motion, masses, relax
+from ...mechanics.dynamics import Motion, relax
 from ...mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS
 from ...mechanics.moduli import PatchTest
-from ...mechanics.network import Network
-from ...mechanics.statics import FollowerPressure, StaticProblem
+from ...mechanics.statics import StaticProblem
 from ...mesh import MESH_TYPES, Mesh, corner_angles
-from ...problem.boundary import held, loaded_edges, weights
+from ...problem.boundary import weights
 from ...problem.geometry import Beam
 from ...problem.loads import AXIAL, FACE
 from ...problem.materials import Material
-from ...springs import DEFINITIONS, DefinitionError
+from ...problem.status import Status
+from ...scene.motion import motion_of
+from ...scene.sheet import Sheet
+from ...springs import DefinitionError, Springs
 from .names import AXES
-
-STATUS = {"solved": 1, "not_converged": 3, "unstable": 4, "failed": 5}
-"""Flags of a dataset's status."""
 
 GROWTH_STEPS = 2000
 """Steps of each run that measures a limit."""
@@ -67,24 +66,34 @@ class Setup:
 
     def springs(self, mesh):
         """Springs of the definition."""
-        return DEFINITIONS[self.definition].springs(mesh, self.material, self.beam.thickness)
+        return self.sheet(mesh).derive(self.definition, self.material)[0]
 
-    def network(self, mesh, kind=AXIAL):
-        """Network and its reference stiffness."""
-        springs = self.springs(mesh)
-        return Network(mesh, held(mesh, kind), springs.relative, springs.energies), springs.reference
+    def plain_springs(self, mesh):
+        """As `springs`, without forces that the definition adds to a load: experiments are on the network itself."""
+        return replace(self.springs(mesh), lateral=0.0)
 
-    def problem(self, mesh, kind=AXIAL):
+    @cached_property
+    def _sheets(self):
+        return {}
+
+    def sheet(self, mesh):
+        """Sheet of a mesh; the last one is kept."""
+        if id(mesh) not in self._sheets:
+            self._sheets.clear()
+            self._sheets[id(mesh)] = Sheet(mesh, self.beam.thickness)  # which keeps the mesh, and so its identity
+        return self._sheets[id(mesh)]
+
+    def problem(self, mesh, kind=AXIAL, follower=False):
         """Static problem and its reference stiffness."""
-        network, reference = self.network(mesh, kind)
-        return StaticProblem(network, weights(mesh, kind)), reference
+        springs = self.plain_springs(mesh)
+        return self.sheet(mesh).problem(kind, springs, follower), springs.reference
 
     def motion(self, mesh, **options):
         """The beam under its force, free of damping."""
-        network, reference = self.network(mesh)
-        inertia = masses(mesh, self.material.density, self.beam.thickness) / reference
-        load = self.force / reference * weights(mesh, AXIAL)
-        return Motion(network, inertia, **({"load": load, "linear": True} | options))
+        options = {"linear": True} | options
+        return motion_of(
+            self.sheet(mesh), AXIAL, self.plain_springs(mesh), self.material.density, self.force, **options
+        )
 
 
 def changed(motion, **options):
@@ -96,22 +105,6 @@ def changed(motion, **options):
 def _noise(motion, size=1e-6, seed=0):
     random = np.random.default_rng(seed).standard_normal(motion.network.held.shape)
     return size * random * ~motion.network.held
-
-
-def run(name, setup):
-    """Results of an experiment.
-
-    Parameters
-    ----------
-    name : str
-        Key of `springtune.kinds.stability.names.EXPERIMENTS`.
-    setup : Setup
-
-    Returns
-    -------
-    dict of str to float or ndarray
-    """
-    return globals()[name](setup)
 
 
 # -- steps in time -----------------------------------------------------------------------------------------------------
@@ -207,17 +200,15 @@ def drift(setup):
     motion = setup.motion(setup.coarse, linear=False)
     if motion.network.energies:  # not compiled, and the same schemes
         motion = changed(motion, linear=True)
-    problem = StaticProblem(motion.network, weights(setup.coarse, AXIAL))
+    problem, _ = setup.problem(setup.coarse)
     pulled = (problem.linear if motion.linear else problem.nonlinear)(motion.load.sum()).displacements
     free = changed(motion, load=np.zeros_like(motion.load))
     step = 0.5 * free.step_limit("central-difference")
     samples = len(AXES["sample"])
     energies = np.full((len(INTEGRATORS), samples), np.nan)
     drifts, swings, lost = (np.full(len(INTEGRATORS), np.nan) for _ in range(3))
-    floating = Motion(
-        Network(setup.coarse, np.zeros_like(motion.network.held), motion.network.stiffness, motion.network.energies),
-        motion.inertia[:, 0], linear=motion.linear,
-    )  # fmt: skip
+    unheld = setup.sheet(setup.coarse).network(np.zeros_like(motion.network.held), setup.springs(setup.coarse))
+    floating = Motion(unheld, motion.inertia[:, 0], linear=motion.linear)
     kick = np.random.default_rng(1).standard_normal(motion.load.shape)
     for i, integrator in enumerate(INTEGRATORS):
         steps = 100_000 if integrator in EXPLICIT else 4_000
@@ -249,8 +240,9 @@ def rest(setup):
     relaxed = np.full(len(setup.mesh_sizes), np.nan)
     relax_steps = np.full(len(setup.mesh_sizes), np.nan)
     for i, size in enumerate(setup.mesh_sizes):
-        motion = setup.motion(setup.mesh(size))
-        static = StaticProblem(motion.network, weights(motion.network.mesh, AXIAL)).linear(motion.load.sum())
+        mesh = setup.mesh(size)
+        motion = setup.motion(mesh)
+        static = setup.problem(mesh)[0].linear(motion.load.sum())
         largest = np.abs(static.displacements).max()
         for j, iterations in enumerate(AXES["cg_iterations"]):
             u = v = None
@@ -310,15 +302,16 @@ def slivers(setup):
 
 def contrast(setup):
     """Error of the linear solution where every other part of the beam is stiffer, against extended precision."""
-    network, reference = setup.network(setup.coarse)
+    whole, reference = setup.problem(setup.coarse)
+    network = whole.network
     middle = setup.coarse.points[setup.coarse.edges].mean(axis=1)[:, 0]
     soft = middle // setup.beam.height % 2 == 0
     ratios = AXES["stiffness_contrast"]
     result = _statics(len(ratios)) | {"error": np.full(len(ratios), np.nan), "estimate": np.full(len(ratios), np.nan)}
     base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
     for i, ratio in enumerate(ratios):
-        stiffer = Network(setup.coarse, network.held, base * np.where(soft, 1.0, ratio), like=network)
-        problem, s = StaticProblem(stiffer, weights(setup.coarse, AXIAL)), setup.force / reference
+        stiffer = Springs(reference, base * np.where(soft, 1.0, ratio))
+        problem, s = setup.sheet(setup.coarse).problem(AXIAL, stiffer), setup.force / reference
         found = problem.linear(s)
         _noted(result, i, lambda problem=problem, s=s, found=found: (problem, s, found))
         exact = _refined(problem, s, found.displacements)
@@ -385,7 +378,7 @@ def sizes(setup):
         one = replace(setup, beam=beam, force=setup.force * ratio**2, mesh_sizes=(size,))
         motion = one.motion(one.coarse, linear=False)
         motion = changed(motion, mass_damping=motion.loaded_frequency)
-        static = StaticProblem(motion.network, weights(one.coarse, AXIAL)).nonlinear(motion.load.sum())
+        static = one.problem(one.coarse)[0].nonlinear(motion.load.sum())
         limits[i] = motion.step_limit("central-difference") / size
         for j, kind in enumerate(kinds):
             found = motion.run("central-difference", 0.9 * limits[i] * size, 60_000, precision=kind)
@@ -412,12 +405,12 @@ def _noted(result, place, solve):
         problem, s, found = solve()
         status, message, pivots = problem.judge(s, found)
     except DefinitionError as error:
-        found, status, message, pivots = None, "failed", str(error), np.nan
+        found, status, message, pivots = None, Status.FAILED, str(error), np.nan
     except (SingularError, ArithmeticError, ValueError) as error:
-        found, status, message, pivots = None, "failed", f"{type(error).__name__}: {error}", np.nan
-    result["status"][place], result["message"][place] = STATUS[status], message
+        found, status, message, pivots = None, Status.FAILED, f"{type(error).__name__}: {error}", np.nan
+    result["status"][place], result["message"][place] = status, message
     result["negative_pivots"][place] = pivots
-    return found if status in ("solved", "unstable") else None
+    return found if status in (Status.SOLVED, Status.UNSTABLE) else None
 
 
 def strains(setup):
@@ -433,9 +426,8 @@ def strains(setup):
         for j, strain in enumerate(values):
 
             def experiment(place=(i, j), kind=kind, side=side, strain=strain, pattern=pattern, load=load):
-                network, reference = setup.network(mesh, kind)
-                turning = FollowerPressure(mesh, *loaded_edges(mesh, kind)) if load != "axial" else None
-                problem, s = StaticProblem(network, pattern, turning), strain * membrane * side / reference
+                problem, reference = setup.problem(mesh, kind, load != "axial")
+                s = strain * membrane * side / reference
                 found = problem.nonlinear(s)
                 result["load_share"][place] = found.load_share
                 return problem, s, found
@@ -481,7 +473,7 @@ def perturbation(setup):
         found = problem.newton(s, start, 40)
         near = found.converged and np.abs(found.displacements - whole.displacements).max() <= 1e-6 * abs(answer)
         right += near
-        wrong += found.converged and not near and problem.judge(s, found)[0] == "solved"
+        wrong += found.converged and not near and problem.judge(s, found)[0] is Status.SOLVED
     return {f"perturbed_{name}": values for name, values in result.items()} | {
         "inverted_starts_right": right / trials,
         "inverted_starts_wrong": wrong / trials,
@@ -530,10 +522,42 @@ def _arch(setup):
         springs = setup.springs(mesh)
     except DefinitionError:
         return None, None, np.nan
-    network = Network(mesh, directions, springs.relative, springs.energies)
+    network = setup.sheet(mesh).network(directions, springs)
     inertia = setup.material.young_modulus * setup.beam.thickness * height**3
     s = -40 * inertia * rise / length**3 / springs.reference
     problem = StaticProblem(network, pattern)
     increment = 0.05 * rise * np.sqrt(network.unknowns)
     path = follow(problem, 10 * s, increment=increment, most_points=200, limit=1.8 * rise * np.sqrt(network.unknowns))
     return path, path.displacements[:, middle, 1], springs.reference
+
+
+RUN = {
+    "limits": limits,
+    "maps": maps,
+    "drift": drift,
+    "rest": rest,
+    "slivers": slivers,
+    "contrast": contrast,
+    "poisson": poisson,
+    "sizes": sizes,
+    "strains": strains,
+    "perturbation": perturbation,
+    "buckling": buckling,
+}
+"""Experiments by their names in `springtune.kinds.stability.names.EXPERIMENTS`."""
+
+
+def run(name, setup):
+    """Results of an experiment.
+
+    Parameters
+    ----------
+    name : str
+        Key of `springtune.kinds.stability.names.EXPERIMENTS`.
+    setup : Setup
+
+    Returns
+    -------
+    dict of str to float or ndarray
+    """
+    return RUN[name](setup)

@@ -1,0 +1,74 @@
+"""Quantities that a person gives: a text with its unit, or a number in SI units."""
+
+import math
+
+
+def quantity(value, kind: str, name: str) -> float:
+    """Number in SI units of a text with its unit, or of a number that is in SI units already.
+
+    Parameters
+    ----------
+    value : str or float
+        E.g. ``"200 mm"`` or ``0.2``.
+    kind : str
+        Key of `springtune.units.KINDS`.
+    name : str
+        What it is, for messages.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If it is no finite quantity of that kind; the message says what to give instead.
+
+    Examples
+    --------
+    >>> quantity("200 mm", "length", "length"), quantity(0.2, "length", "length")
+    (0.2, 0.2)
+    """
+    if isinstance(value, str):
+        from ..units import UnitError, parse  # here, since a study's numbers are in SI units
+
+        try:
+            return parse(value, kind)
+        except UnitError as error:
+            raise ValueError(f"{name}: {error}") from None
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{name}: {value!r} is not a finite number; {_remedy(kind)}")
+    return number
+
+
+def positive(value, kind: str, name: str) -> float:
+    """As `quantity`, of one that has to be above zero.
+
+    Parameters
+    ----------
+    value, kind, name
+        As of `quantity`.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        As `quantity`, and if it is not above zero.
+    """
+    number = quantity(value, kind, name)
+    if not number > 0:
+        raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")
+    return number
+
+
+def _remedy(kind):
+    from ..units import KINDS
+
+    return f"give a {kind} such as '{KINDS[kind].example}', or a number in {KINDS[kind].unit}"

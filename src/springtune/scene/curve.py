@@ -1,0 +1,211 @@
+"""Displacement over uniform stiffness: one equilibrium path serves all stiffnesses and forces of one sign."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..mechanics.series import LinearPath, StablePath
+from ..mesh import Mesh
+from ..problem.compare import Best, best_stiffness, deformation_error
+from ..problem.loads import LoadKind
+from ..problem.status import Status
+from ..springs import Springs
+from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
+from .sheet import Sheet
+
+if TYPE_CHECKING:
+    from .single import Scene
+
+RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
+"""Stiffnesses of a curve over E t [1], where none are given."""
+
+
+def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> Any:
+    """Equilibrium path of springs of one stiffness, as far as loads need it.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    kind : LoadKind
+    kinematics : str
+        ``"linear"`` or ``"nonlinear"``.
+    loads : ndarray of float, shape (n,)
+        Force over stiffness, all of one sign [m].
+
+    Returns
+    -------
+    LinearPath or StablePath
+        Of the displacement of the load.
+    """
+    problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
+    return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
+
+
+def meeting(path: Any, force: float, stiffness: np.ndarray, displacement: np.ndarray, stable: np.ndarray,
+            reference: float, objection: str) -> Best:  # fmt: skip
+    """Stiffness at which a curve meets its reference.
+
+    Parameters
+    ----------
+    path : LinearPath or StablePath
+    force : float
+        [N]
+    stiffness, displacement, stable : ndarray, shape (n,)
+        The curve [N/m, m], and whether its equilibria are stable.
+    reference : float
+        Displacement of the reference [m].
+    objection : str
+        Why the network is not to be fitted to it; empty where it is.
+
+    Returns
+    -------
+    Best
+    """
+    if objection:
+        return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")
+    return best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
+
+
+def ending(path: Any, force: float, stable: np.ndarray) -> str:
+    """Why a curve is not solved throughout; empty where it is."""
+    if stable.all():
+        return ""
+    reason = path.end or "not followed through its turn"
+    return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
+
+
+def face_edge(mesh: Mesh) -> float:
+    """Length of an edge on the lower and the upper side of a mesh, by their median [m]."""
+    y = mesh.points[:, 1]
+    faces = np.concatenate([mesh.outline_edges(1, value) for value in (0.0, y.max())])
+    return float(np.median(np.abs(np.diff(mesh.points[faces, 0]))))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A sensitivity curve: displacement of a scene over uniform stiffness.
+
+    Attributes
+    ----------
+    stiffness : ndarray of float, shape (n,)
+        [N/m]
+    displacement : ndarray of float, shape (n,)
+        Of the load [m]; NaN where the path from rest does not get there.
+    error : ndarray of float, shape (n,)
+        Signed deformation error [1].
+    stable : ndarray of bool, shape (n,)
+        Whether the path from rest gets there and is stable all the way.
+    message : str
+        Why it is not; empty where all are stable.
+    best_stiffness : float
+        Where a stable equilibrium has no error [N/m]; NaN where there is none.
+    best_status : Status
+    best_message : str
+        Why there is none.
+    predicted_stiffness : float
+        By closed form [N/m], of rows of equilateral triangles; NaN for loads that have none.
+    title : str
+        Of its plot.
+    """
+
+    stiffness: np.ndarray
+    displacement: np.ndarray
+    error: np.ndarray
+    stable: np.ndarray
+    message: str
+    best_stiffness: float
+    best_status: Status
+    best_message: str
+    predicted_stiffness: float
+    title: str
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the error over the stiffness.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; on new axes without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from .drawing import axes
+
+        ax = axes(ax)
+        ax.axhline(0.0, color="0.6", linewidth=0.8)
+        unstable = np.where(self.stable, np.nan, 100 * self.error)
+        ax.plot(self.stiffness, np.where(self.stable, 100 * self.error, np.nan), label="network")
+        if np.isfinite(unstable).any():
+            ax.plot(self.stiffness, unstable, linestyle=":", color="0.4", label="not stable")
+        for value, label, style in (
+            (self.best_stiffness, "best", "-"),
+            (self.predicted_stiffness, "closed form", "--"),
+        ):
+            if np.isfinite(value):
+                ax.axvline(value, color="0.3", linewidth=0.8, linestyle=style, label=f"{label}, {value:.4g} N/m")
+        ax.set(xlabel="stiffness [N/m]", ylabel="deformation error [%]", title=self.title)
+        ax.legend()
+        return ax
+
+
+def sensitivity(scene: "Scene", stiffness_ratios: Any = None) -> Curve:
+    """Displacement of a scene over uniform stiffness, and where it meets the reference.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its definition plays no part; a force that follows its side, in nonlinear kinematics, has no curve.
+    stiffness_ratios : array_like of float, optional
+        Stiffnesses over E t [1], above zero; 61 from 0.4 to 1.6 times sqrt(3)/2 without.
+
+    Returns
+    -------
+    Curve
+        By ascending stiffness.
+
+    Raises
+    ------
+    ValueError
+        If a stiffness is not above zero, or the force follows its side.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam = st.Beam("200 mm", "30 mm")
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> curve = st.sensitivity(st.Scene(beam, mesh, st.Material("210 GPa", 0.3), "traction", "300 kN"))
+    >>> print(f"{curve.best_stiffness:.3g} N/m, closed form {curve.predicted_stiffness:.3g} N/m")
+    1.6e+08 N/m, closed form 1.59e+08 N/m
+    """
+    if scene.follower:
+        raise ValueError(
+            f"load: {scene.load!r} turns with its side, and stiffness enters as force over stiffness only where forces "
+            "keep their direction; take 'pressure' or linear kinematics"
+        )
+    ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
+    if not len(ratios) or not (np.isfinite(ratios) & (ratios > 0)).all():
+        raise ValueError("stiffness_ratios: not all above zero; give stiffnesses over E t such as [0.5, 0.8, 1.1]")
+    beam, kind, force = scene.beam, scene.kind, scene.force
+    stiffness = ratios * scene.material.young_modulus * beam.thickness
+    path = follow(scene.sheet, kind, scene.kinematics, force / stiffness)
+    displacement, stable = path.values, path.stable
+    try:
+        reference, objection = scene.reference().displacement, scene.objection
+    except RuntimeError as error:
+        reference, objection = np.nan, f"no reference: {error}"
+    best = meeting(path, force, stiffness, displacement, stable, reference, objection)
+    return Curve(
+        stiffness,
+        displacement,
+        deformation_error(displacement, reference),
+        stable,
+        ending(path, force, stable),
+        best.stiffness,
+        best.status,
+        best.message,
+        predicted_stiffness(scene.material, beam, face_edge(scene.mesh), scene.load),
+        f"{beam.name} mm, {scene.load} of {abs(force):g} N",
+    )

@@ -1,0 +1,46 @@
+"""A sheet in time: the masses of its particles, and its load switched on at rest."""
+
+from typing import Any
+
+from ..mechanics.dynamics import Motion, masses
+from ..problem.loads import LoadKind
+from ..springs import Springs
+from .sheet import Sheet
+
+
+def motion_of(
+    sheet: Sheet, kind: LoadKind, springs: Springs, density: float, force: float = 0.0, **options: Any
+) -> Motion:
+    """Springs of a sheet with their masses, under a load.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    kind : LoadKind
+        Which directions are held, and where the force acts.
+    springs : Springs
+    density : float
+        Of the material [kg/m3].
+    force : float, optional
+        With its sign [N].
+    **options
+        As `springtune.mechanics.dynamics.Motion` takes them, in the place of the load, too.
+
+    Returns
+    -------
+    Motion
+
+    Examples
+    --------
+    >>> from springtune.mesh import MESH_TYPES
+    >>> from springtune.problem.loads import LOADS
+    >>> from springtune.problem.materials import Material
+    >>> sheet = Sheet(MESH_TYPES["structured"](0.1, 0.02, 5e-3), 1e-3)
+    >>> springs, _ = sheet.derive("lattice", Material(210e9, 0.3))
+    >>> found = motion_of(sheet, LOADS["traction"].kind, springs, 7850.0, linear=True)
+    >>> f"{1e9 * found.step_limit('central-difference'):.0f} ns"
+    '602 ns'
+    """
+    inertia = masses(sheet.mesh, density, sheet.thickness) / springs.reference
+    load = {} if "load" in options else {"load": force / springs.reference * sheet.pattern(kind, springs)}
+    return Motion(sheet.problem(kind, springs).network, inertia, **(load | options))

@@ -1,0 +1,317 @@
+"""A meshed sheet and its networks: the recipe mesh, springs, network, problem, solve, judge."""
+
+import hashlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..mechanics.moduli import lateral_forces
+from ..mechanics.network import Network
+from ..mechanics.statics import Equilibrium, FollowerPressure, StaticProblem
+from ..mesh import Mesh
+from ..problem.boundary import held, loaded_edges, measured, weights
+from ..problem.loads import LoadKind
+from ..problem.materials import Material
+from ..problem.status import Status
+from ..springs import DEFINITIONS, DefinitionError, Springs
+from ..springs.identification import Case, patch_cases
+
+NETWORKS = 6
+"""Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""
+
+
+@dataclass(frozen=True)
+class OwnDefinition:
+    """A function of one's own in the place of a definition of `springtune.springs.DEFINITIONS`.
+
+    Attributes
+    ----------
+    function : callable
+        (mesh, material, thickness) -> Springs.
+    """
+
+    function: Callable[[Mesh, Material, float], Springs]
+    uniform: bool = False
+    uniaxial: bool = False
+    needs: str = ""
+
+    @property
+    def name(self) -> str:
+        """What it is called in messages."""
+        return getattr(self.function, "__name__", type(self.function).__name__)
+
+    def springs(self, mesh: Mesh, material: Material, thickness: float, given: Any = None) -> Springs:
+        """Springs of a mesh, checked."""
+        found = self.function(mesh, material, thickness)
+        if not isinstance(found, Springs):
+            raise DefinitionError(f"returns {type(found).__name__}; return springtune.Springs(reference, relative)")
+        if np.shape(found.relative) != (len(mesh.edges),) or not found.reference > 0:
+            raise DefinitionError(
+                f"returns {np.shape(found.relative)} stiffnesses over {found.reference!r} N/m; return one for each of "
+                f"the {len(mesh.edges)} edges of the mesh, over a reference stiffness above zero"
+            )
+        return found
+
+
+def definition_of(definition: Any) -> Any:
+    """Definition by its name, or of a function of one's own.
+
+    Parameters
+    ----------
+    definition : str, Definition or callable
+        Key of `springtune.springs.DEFINITIONS`, or (mesh, material, thickness) -> Springs.
+
+    Returns
+    -------
+    Definition or OwnDefinition
+
+    Raises
+    ------
+    ValueError
+        If there is no definition of that name.
+
+    Examples
+    --------
+    >>> definition_of("lattice").name
+    'lattice'
+    """
+    if hasattr(definition, "springs"):
+        return definition
+    if callable(definition):
+        return OwnDefinition(definition)
+    return chosen(DEFINITIONS, definition, "definition")
+
+
+def chosen(known: Any, name: Any, what: str) -> Any:
+    """Entry of a mapping, or an error that says what there is.
+
+    Parameters
+    ----------
+    known : mapping
+    name : str
+    what : str
+        What is chosen, for the message.
+
+    Raises
+    ------
+    ValueError
+        If there is no such entry.
+    """
+    if isinstance(name, str) and name in known:
+        return known[name]
+    near = get_close_matches(str(name), list(known), n=1, cutoff=0.6)
+    meant = f"did you mean {near[0]!r}? " if near else ""
+    raise ValueError(f"{what}: {name!r} is unknown; {meant}Known: {', '.join(known)}")
+
+
+@dataclass(frozen=True)
+class Solution:
+    """An equilibrium of a network, judged.
+
+    Attributes
+    ----------
+    problem : StaticProblem
+    load : float
+        Force over the reference stiffness [m].
+    equilibrium : Equilibrium
+    status : Status
+    message : str
+        Why it is not solved; empty where it is.
+    negative_pivots : int or float
+        Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
+    displacement : float
+        Of the load [m]; NaN where there is no equilibrium.
+    """
+
+    problem: StaticProblem
+    load: float
+    equilibrium: Equilibrium
+    status: Status
+    message: str
+    negative_pivots: float
+    displacement: float
+
+
+class Sheet:
+    """A meshed sheet on which scenes are solved.
+
+    Networks that differ in their reference stiffness alone are assembled and factorised once; networks with the same
+    directions held share their numbering of unknowns; the springs derived last are kept for further loads.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    thickness : float
+        Of the sheet [m].
+    networks : int, optional
+        Networks that are kept.
+
+    Attributes
+    ----------
+    held, weights, measured : callable
+        Of a kind of load, see `springtune.problem.boundary`: directions held, pattern of the forces, and weights of the
+        displacements that make its displacement; each computed once.
+    deriving : float
+        Seconds that deriving springs has taken so far.
+
+    Examples
+    --------
+    >>> from springtune.mesh import MESH_TYPES
+    >>> from springtune.problem.loads import LOADS
+    >>> sheet = Sheet(MESH_TYPES["structured"](0.1, 0.02, 5e-3), 1e-3)
+    >>> springs, _ = sheet.derive("lattice", Material(210e9, 0.3))
+    >>> found = sheet.solve(LOADS["traction"].kind, springs, 20e3, "linear")
+    >>> f"{found.status}: {1e3 * found.displacement:.3f} mm"
+    'solved: 0.447 mm'
+    """
+
+    def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS) -> None:
+        self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
+        self.held = cache(lambda kind: held(mesh, kind))
+        self.weights = cache(lambda kind: weights(mesh, kind))
+        self.measured = cache(lambda kind: measured(mesh, kind))
+        self._most, self._derived = networks, None
+        self._patterns, self._networks = {}, {}
+
+    def derive(
+        self,
+        definition: Any,
+        material: Material,
+        stiffness: float | None = None,
+        case: tuple[LoadKind, float, np.ndarray | None] | None = None,
+    ) -> tuple[Springs, float]:
+        """Springs of a definition.
+
+        Parameters
+        ----------
+        definition : str, Definition or callable
+            See `definition_of`.
+        material : Material
+        stiffness : float, optional
+            Uniform stiffness [N/m], for definitions that are told one.
+        case : tuple of LoadKind, float and ndarray, optional
+            For definitions that are told cases: load, force [N] and displacements for 1 N that the network should have
+            [m/N], shape (n_points, 2), or None where there are none; even tension and shear of the mesh itself without.
+
+        Returns
+        -------
+        springs : Springs
+        seconds : float
+            That deriving them took, now or before.
+
+        Raises
+        ------
+        DefinitionError
+            If the definition cannot live on the mesh or with the material, or is not told what it needs.
+        """
+        definition = definition_of(definition)
+        key, given = (definition, material, stiffness), stiffness
+        if definition.needs == "cases":
+            given = patch_cases(self.mesh, material, self.thickness) if case is None else self._cases(*case)
+            key += case[:2] if case else ()
+        elif definition.needs == "stiffness" and stiffness is None:
+            raise DefinitionError("needs a uniform stiffness, and there is none; give one in N/m")
+        if self._derived is None or self._derived[0] != key:
+            begin = time.perf_counter()
+            springs = definition.springs(self.mesh, material, self.thickness, given)
+            seconds = time.perf_counter() - begin
+            self.deriving += seconds
+            self._derived = key, springs, seconds
+        return self._derived[1:]
+
+    def _cases(self, kind, force, field):
+        if field is None:
+            raise DefinitionError("needs the reference's displacements, and there are none")
+        return [Case(self.held(kind), force * self.weights(kind), force * field)]
+
+    def network(self, directions: np.ndarray, springs: Springs) -> Network:
+        """Network of springs, some of its directions held.
+
+        Parameters
+        ----------
+        directions : ndarray of bool, shape (n_points, 2)
+            True where a particle cannot move in x or y.
+        springs : Springs
+
+        Returns
+        -------
+        Network
+        """
+        return self._known(directions, springs)[0]
+
+    def _known(self, directions, springs):
+        """Network, and its problems so far."""
+        parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
+        name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
+        network, problems = self._networks.pop(name, (None, {}))
+        if network is None:
+            like = self._patterns.get(directions.tobytes())
+            network = Network(self.mesh, directions, springs.relative, springs.energies, like)
+            self._patterns.setdefault(directions.tobytes(), network)
+        while len(self._networks) >= self._most:
+            self._networks.pop(next(iter(self._networks)))
+        self._networks[name] = network, problems  # the last one used is the last one to go
+        return network, problems
+
+    def pattern(self, kind: LoadKind, springs: Springs) -> np.ndarray:
+        """Forces of a load of 1, those that go with the springs included [1], shape (n_points, 2)."""
+        pattern = self.weights(kind)
+        if springs.lateral:
+            pattern = pattern + springs.lateral / np.ptp(self.mesh.points[:, 1]) * lateral_forces(self.mesh)
+        return pattern
+
+    def problem(self, kind: LoadKind, springs: Springs, follower: bool = False) -> StaticProblem:
+        """Static problem of springs under a load.
+
+        Parameters
+        ----------
+        kind : LoadKind
+        springs : Springs
+        follower : bool, optional
+            Whether the force turns and grows with the side that it acts on.
+
+        Returns
+        -------
+        StaticProblem
+        """
+        network, problems = self._known(self.held(kind), springs)
+        label = (kind, springs.lateral, follower)
+        if label not in problems:
+            turning = FollowerPressure(self.mesh, *loaded_edges(self.mesh, kind)) if follower else None
+            problems[label] = StaticProblem(network, self.pattern(kind, springs), turning)
+        return problems[label]
+
+    def solve(
+        self, kind: LoadKind, springs: Springs, force: float, kinematics: str, follower: bool = False
+    ) -> Solution:
+        """Equilibrium of springs under a force, judged.
+
+        Parameters
+        ----------
+        kind : LoadKind
+        springs : Springs
+        force : float
+            With its sign [N].
+        kinematics : str
+            ``"linear"`` or ``"nonlinear"``.
+        follower : bool, optional
+            As of `problem`.
+
+        Returns
+        -------
+        Solution
+        """
+        problem, load = self.problem(kind, springs, follower), force / springs.reference
+        found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
+        status, message, pivots = problem.judge(load, found)
+        displacement = self.displacement(kind, found.displacements) if found.converged else np.nan
+        return Solution(problem, load, found, status, message, pivots, displacement)
+
+    def displacement(self, kind: LoadKind, displacements: np.ndarray) -> float:
+        """Displacement of a load [m] from those of the particles [m], shape (n_points, 2)."""
+        return float(np.tensordot(displacements, self.measured(kind), axes=2))

@@ -1,0 +1,388 @@
+"""One scene: a meshed beam of springs under a load, its equilibrium, and the finite-element answer beside it."""
+
+import time
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..linalg.factors import SingularError
+from ..mechanics.network import Network
+from ..mechanics.statics import Equilibrium, StaticProblem
+from ..mesh import Mesh
+from ..problem.compare import deformation_error
+from ..problem.geometry import Beam
+from ..problem.loads import LOADS, LoadKind
+from ..problem.materials import Material
+from ..problem.quantities import positive
+from ..problem.status import Status
+from ..springs import Springs
+from .sheet import Sheet, chosen, definition_of
+
+if TYPE_CHECKING:
+    from ..mechanics.dynamics import Motion
+    from ..reference.small_strain import ReferenceSolution
+
+KINEMATICS = ("nonlinear", "linear")
+"""Kinematics of a network."""
+
+FILLED = 1e-6
+"""What a mesh may miss of its beam, over the beam's extent."""
+
+
+class Scene:
+    """A boundary-value problem: a beam, meshed by springs of a definition, under a load.
+
+    Parameters
+    ----------
+    beam : Beam
+    mesh : Mesh
+        That fills the beam, see `springtune.make_mesh` and `springtune.read_mesh`.
+    material : Material
+    load : str
+        Key of `springtune.LOADS`: what is held, and where the force acts.
+    force : float or str
+        Size of the force [N], above zero, or a text with its unit; its direction is the load's.
+    definition : str, Definition or callable, optional
+        Key of `springtune.DEFINITIONS`, or a function (mesh, material, thickness) -> `springtune.Springs`.
+    kinematics : str, optional
+        ``"nonlinear"``: springs keep their length law; or ``"linear"``.
+    stiffness : float or str, optional
+        Uniform stiffness [N/m], or a text with its unit, for definitions that are told one.
+    sheet : Sheet, optional
+        Of another scene of the same mesh and thickness: what the two have in common is then computed once.
+
+    Raises
+    ------
+    ValueError
+        If an argument is unknown or out of its range, or the mesh does not fill the beam; the message says which one
+        and what to give.
+
+    Attributes
+    ----------
+    sheet : Sheet
+        What scenes of the same mesh and thickness can share.
+    kind : LoadKind
+    follower : bool
+        Whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> result = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="patch").solve()
+    >>> print(f"{result.status}: {1e3 * result.displacement:.2f} mm, error {100 * result.error:+.1f} %")
+    solved: 9.51 mm, error +0.1 %
+    """
+
+    def __init__(
+        self,
+        beam: Beam,
+        mesh: Mesh,
+        material: Material,
+        load: str,
+        force: float | str,
+        *,
+        definition: Any = "patch",
+        kinematics: str = "nonlinear",
+        stiffness: float | str | None = None,
+        sheet: Sheet | None = None,
+    ) -> None:
+        _is(beam, Beam, "beam", "springtune.Beam('200 mm', '40 mm')")
+        _is(mesh, Mesh, "mesh", "springtune.make_mesh(beam, 'structured', '5 mm')")
+        _is(material, Material, "material", "springtune.Material('210 GPa', 0.3)")
+        _fills(mesh, beam)
+        about = chosen(LOADS, load, "load")
+        self.beam, self.mesh, self.material = beam, mesh, material
+        self.load, self.kind = load, about.kind
+        self.force = about.sign * positive(force, "force", "force")
+        self.definition = definition_of(definition)
+        if self.definition.uniaxial and not self.kind.uniaxial:
+            raise ValueError(
+                f"definition: {self.definition.name!r} is not for {load!r}; take it for traction or compression"
+            )
+        if kinematics not in KINEMATICS:
+            raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
+        self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
+        self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
+        if (self.definition.needs == "stiffness") != (stiffness is not None):
+            if stiffness is None:
+                raise ValueError(
+                    f"stiffness: definition {self.definition.name!r} needs a uniform one; give a stiffness such as "
+                    "'170e6 N/m'"
+                )
+            raise ValueError(
+                f"stiffness: {stiffness!r} is not used, since definition {self.definition.name!r} derives its own; "
+                "leave it out, or choose 'paper'"
+            )
+        self.sheet = Sheet(mesh, beam.thickness) if sheet is None else sheet
+        if self.sheet.mesh is not mesh or self.sheet.thickness != beam.thickness:
+            raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
+
+    def __repr__(self) -> str:
+        return (
+            f"Scene({self.beam.name} mm, {len(self.mesh.points)} particles, {self.material.name}, {self.load} of "
+            f"{abs(self.force):g} N, {self.definition.name}, {self.kinematics})"
+        )
+
+    @cached_property
+    def _derived(self) -> tuple[Springs, float]:
+        case = None
+        if self.definition.needs == "cases":
+            case = self.kind, self.force, _reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
+        return self.sheet.derive(self.definition, self.material, self.uniform_stiffness, case)
+
+    @property
+    def springs(self) -> Springs:
+        """Springs of the definition: stiffnesses over a reference stiffness, and energies besides them."""
+        return self._derived[0]
+
+    @property
+    def network(self) -> Network:
+        """Network of the springs, held as the load holds them; everything over the reference stiffness."""
+        return self.sheet.network(self.sheet.held(self.kind), self.springs)
+
+    @property
+    def problem(self) -> StaticProblem:
+        """Network under the pattern of the load."""
+        return self.sheet.problem(self.kind, self.springs, self.follower)
+
+    def solve(self) -> "Result":
+        """Equilibrium under the force.
+
+        Returns
+        -------
+        Result
+            Its status says whether there is one and whether it is stable.
+
+        Raises
+        ------
+        DefinitionError
+            If the definition cannot live on the mesh or with the material.
+        """
+        springs, derived = self._derived
+        begin = time.perf_counter()
+        try:
+            solution = self.sheet.solve(self.kind, springs, self.force, self.kinematics, self.follower)
+        except SingularError as error:
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, time.perf_counter() - begin, derived)
+        return Result(
+            self,
+            solution.equilibrium,
+            solution.status,
+            solution.message,
+            solution.negative_pivots,
+            solution.displacement,
+            time.perf_counter() - begin,
+            derived,
+        )
+
+    def reference(self) -> "ReferenceSolution":
+        """Converged finite-element solution in small strain, under the same force.
+
+        Returns
+        -------
+        ReferenceSolution
+
+        Raises
+        ------
+        ReferenceNotConvergedError
+            If its error estimate stays above the tolerance.
+        """
+        return _reference(self.beam, self.material, self.kind, self.force)
+
+    @property
+    def objection(self) -> str:
+        """Why a small-strain reference does not apply to the network; empty where it does, as in linear kinematics."""
+        if self.kinematics == "linear":
+            return ""
+        from ..reference.limits import beyond_linear
+
+        found = self.reference()
+        return beyond_linear(found.rotation, found.strain)
+
+    def motion(self, **options: Any) -> "Motion":
+        """The scene in time, its force switched on at rest and kept; free of damping.
+
+        Parameters
+        ----------
+        **options
+            ``mass_damping``, ``dampers`` and others as `springtune.mechanics.dynamics.Motion` takes them.
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        ValueError
+            If the material has no density.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "1 kN")
+        >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
+        622 ns
+        """
+        if self.material.density is None:
+            name = self.material.name
+            raise ValueError(f"density: material {name!r} has none; give a density such as '7850 kg/m^3'")
+        from .motion import motion_of
+
+        options = {"linear": self.kinematics == "linear"} | options
+        return motion_of(self.sheet, self.kind, self.springs, self.material.density, self.force, **options)
+
+    def buckling_load(self) -> float:
+        """Size of the force at which the path from rest loses its stability, by bifurcation.
+
+        Returns
+        -------
+        float
+            [N]; NaN where there is none up to a hundred times the scene's force, or none that could be proved.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> column, steel = st.Beam("100 mm", "4 mm"), st.Material("210 GPa", 0.3)
+        >>> mesh = st.make_mesh(column, "structured", "0.5 mm")
+        >>> scene = st.Scene(column, mesh, steel, "compression", "200 N", definition="delingette")
+        >>> print(f"{scene.buckling_load():.0f} N")
+        283 N
+        """
+        from ..mechanics.arc_length import buckling_load
+
+        reference = self.springs.reference
+        return float(abs(buckling_load(self.problem, self.force / reference)) * reference)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of a scene.
+
+    Attributes
+    ----------
+    scene : Scene
+    equilibrium : Equilibrium or None
+        What the solve found, over the reference stiffness.
+    status : Status
+        Whether there is an equilibrium and whether it is stable.
+    message : str
+        Why it is not solved; empty where it is.
+    negative_pivots : int or float
+        Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
+    displacement : float
+        Displacement of the load [m]: the mean one of the loaded side along the force, or that of a pressed side's
+        middle; NaN where there is no equilibrium.
+    seconds : float
+        That the solve took, springs not included.
+    definition_seconds : float
+        That deriving the springs took.
+    """
+
+    scene: Scene = field(repr=False)
+    equilibrium: Equilibrium | None = field(repr=False)
+    status: Status
+    message: str
+    negative_pivots: float
+    displacement: float
+    seconds: float
+    definition_seconds: float
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """Displacement of each particle [m], shape (n_points, 2); NaN where there is no equilibrium."""
+        if self.equilibrium is None or not self.equilibrium.converged:
+            return np.full(self.scene.mesh.points.shape, np.nan)
+        return self.equilibrium.displacements
+
+    @property
+    def iterations(self) -> int:
+        """Newton steps."""
+        return self.equilibrium.iterations if self.equilibrium else 0
+
+    @property
+    def residual(self) -> float:
+        """Out-of-balance force over the load [1]."""
+        return self.equilibrium.residual if self.equilibrium else np.nan
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Stiffness of each spring [N/m], shape (n_springs,); springs whose law is part of an energy have none here."""
+        return self.scene.springs.reference * self.scene.springs.relative
+
+    @property
+    def spring_forces(self) -> np.ndarray:
+        """Axial force of each spring [N], tension positive, shape (n_springs,); energies' part left out."""
+        forces = self.scene.network.spring_forces(self.displacements, self.scene.kinematics == "linear")
+        return self.scene.springs.reference * forces
+
+    def reference(self) -> "ReferenceSolution":
+        """As `Scene.reference`."""
+        return self.scene.reference()
+
+    @property
+    def error(self) -> float:
+        """Signed deformation error against the reference, (network - reference) / abs(reference) [1].
+
+        `Scene.objection` says where the reference of small strain does not apply.
+        """
+        return float(deformation_error(self.displacement, self.reference().displacement))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the springs where they have come to, coloured by their force.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; on new axes without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ValueError
+            If there is no equilibrium.
+        """
+        from .drawing import draw_springs
+
+        if not np.isfinite(self.displacement):
+            raise ValueError(f"there is no equilibrium to draw: {self.message}")
+        ax = draw_springs(ax, self.scene.mesh, self.displacements, self.spring_forces)
+        ax.set_title(f"{self.scene.load} of {abs(self.scene.force):g} N: {1e3 * self.displacement:.4g} mm")
+        return ax
+
+
+@lru_cache(maxsize=32)
+def _solve_unit(*problem):
+    from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
+
+    return solve_unit(*problem)
+
+
+def _reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
+    """Reference under a force, solved once for all beams, materials and forces that differ by factors."""
+    from ..reference.similarity import unit_problem, unit_scales
+
+    length, displacement = unit_scales(beam, material, kind)
+    return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)
+
+
+def _is(value, wanted, name, example):
+    if not isinstance(value, wanted):
+        raise ValueError(f"{name}: {value!r} is not a {wanted.__name__}; give one such as {example}")
+
+
+def _fills(mesh, beam):
+    low, high, box = mesh.points.min(axis=0), mesh.points.max(axis=0), np.array([beam.length, beam.height])
+    if np.abs(np.concatenate([low, high - box])).max() > FILLED * box.max():
+        shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
+        raise ValueError(
+            f"mesh: extends over {shown} mm, its beam over {1e3 * beam.length:.6g} x {1e3 * beam.height:.6g} mm "
+            "from the origin; make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
+        )

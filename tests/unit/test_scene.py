@@ -1,0 +1,255 @@
+"""The library: one scene in six lines, what scenes share, and errors that say what to do."""
+
+import subprocess
+import sys
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.kinds.scenes.solve import solve
+from springtune.problem.loads import LOADS
+from springtune.reference.similarity import unit_problem, unit_scales
+from springtune.scene.sheet import Sheet
+
+BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+
+
+def scene(mesh_type="structured", load="traction", force="20 kN", size="5 mm", **options):
+    return st.Scene(BEAM, st.make_mesh(BEAM, mesh_type, size), STEEL, load, force, **options)
+
+
+class TestSixLines:
+    def test_a_scene(self):
+        beam = st.Beam("200 mm", "40 mm", thickness="1 mm")
+        mesh = st.make_mesh(beam, "structured", "5 mm")
+        scene = st.Scene(beam, mesh, st.Material("210 GPa", 0.3), "traction", "400 kN", definition="patch")
+        result = scene.solve()
+        assert result.status is st.Status.SOLVED and result.message == "" and result.negative_pivots == 0
+        assert result.displacements.shape == mesh.points.shape and result.residual <= 1e-10 and result.iterations
+        assert result.stiffness.shape == (len(mesh.edges),) and result.seconds > 0 and result.definition_seconds > 0
+        # The paper's finite elements give 9.49 mm.
+        assert result.reference().displacement == pytest.approx(9.49e-3, rel=2e-3)
+        assert result.error == pytest.approx(result.displacement / result.reference().displacement - 1)
+        assert abs(result.error) < 5e-3 and scene.objection == ""
+
+    def test_texts_and_numbers_are_one(self):
+        assert st.Beam("200 mm", "4 cm", "1 mm") == st.Beam(0.2, 0.04) and st.Beam(0.2, 0.04).name == "200x40"
+        assert st.Material("210 GPa", 0.3, "7850 kg/m^3") == st.Material(210e9, 0.3, 7850)
+        texts, numbers = scene(force="20 kN").solve(), scene(force=20e3, size=0.005).solve()
+        assert texts.displacement == numbers.displacement
+
+    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
+    def test_kinematics(self, kinematics):
+        forces = (10e3, 20e3)
+        moved = [scene(force=force, kinematics=kinematics).solve().displacement for force in forces]
+        assert (moved[1] == pytest.approx(2 * moved[0], rel=1e-12)) == (kinematics == "linear")
+
+    def test_quadrilaterals(self):
+        result = scene("braced", definition="lattice").solve()
+        assert result.status is st.Status.SOLVED and len(result.scene.mesh.quads) and abs(result.error) < 0.02
+
+    def test_a_mesh_file(self, tmp_path):
+        mesh = st.make_mesh(BEAM, "free", "5 mm")
+        from springtune.mesh import Mesh, write_mesh
+
+        write_mesh(tmp_path / "own.vtu", Mesh(1e3 * mesh.points + [7.0, -3.0], mesh.triangles))
+        read = st.read_mesh(tmp_path / "own.vtu", BEAM, unit="1 mm")
+        ours, theirs = (st.Scene(BEAM, one, STEEL, "bending", "200 N").solve() for one in (mesh, read))
+        assert theirs.displacement == pytest.approx(ours.displacement, rel=1e-9)
+
+    def test_a_function_of_ones_own(self):
+        def halved(mesh, material, thickness):
+            springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
+            return st.Springs(0.5 * springs.reference, springs.relative)
+
+        own = scene(definition=halved, kinematics="linear")
+        plain = scene(definition="lattice", kinematics="linear")
+        assert own.definition.name == "halved"
+        assert own.solve().displacement == pytest.approx(2 * plain.solve().displacement, rel=1e-12)
+
+    def test_a_uniform_stiffness(self):
+        result = scene(definition="paper", stiffness="170e6 N/m").solve()
+        assert (result.stiffness == 170e6).all()
+
+    def test_cases_of_a_reference(self):
+        mesh = st.make_mesh(BEAM, "structured", "10 mm")
+        fitted = st.Scene(BEAM, mesh, STEEL, "bending", "200 N", definition="evolved", kinematics="linear").solve()
+        plain = st.Scene(BEAM, mesh, STEEL, "bending", "200 N", definition="lattice", kinematics="linear").solve()
+        assert abs(fitted.error) < abs(plain.error)
+
+
+class TestSameAsThePipeline:
+    @pytest.mark.parametrize(("load", "force"), [("traction", 20e3), ("bending", 200.0), ("pressure", 10.0)])
+    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
+    def test_error_and_displacement(self, load, force, kinematics):
+        found = scene(load=load, force=force, definition="area", kinematics=kinematics)
+        kind, signed = found.kind, LOADS[load].sign * force
+        task = {"material": asdict(STEEL), "kind": kind.name, "follower": False, "force": signed, "definition": "area",
+                "kinematics": kinematics, "reference": None}  # fmt: skip
+        stored = solve(Sheet(found.mesh, BEAM.thickness), task)
+        result = found.solve()
+        assert (result.displacement, result.status) == (stored["displacement"], stored["status"])
+        from springtune.reference.small_strain import solve_unit
+
+        unit = solve_unit(*unit_problem(BEAM, STEEL, kind)).displacement * unit_scales(BEAM, STEEL, kind)[1]
+        assert result.error == pytest.approx((stored["displacement"] - signed * unit) / abs(signed * unit), rel=1e-9)
+
+
+class TestEquilibrium:
+    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
+    @pytest.mark.parametrize("mesh_type", ["structured", "free", "braced"])
+    def test_spring_forces_balance_the_load(self, mesh_type, kinematics):
+        found = scene(mesh_type, "bending", "2 kN", definition="lattice", kinematics=kinematics)
+        result, mesh = found.solve(), found.mesh
+        where = mesh.points + (0 if kinematics == "linear" else result.displacements)
+        along = where[mesh.edges[:, 1]] - where[mesh.edges[:, 0]]
+        pulls = result.spring_forces[:, None] * along / np.linalg.norm(along, axis=1)[:, None]
+        total = found.force * found.sheet.weights(found.kind)
+        np.add.at(total, mesh.edges[:, 0], pulls)
+        np.subtract.at(total, mesh.edges[:, 1], pulls)
+        largest = np.abs(result.spring_forces).max()
+        assert np.abs(total[~found.network.held]).max() <= 1e-9 * largest
+        # What holds the beam takes the load.
+        assert total.sum(axis=0) == pytest.approx([0.0, found.force], abs=1e-9 * largest)
+
+    def test_a_column_beyond_its_buckling_load(self):
+        column = st.Beam("100 mm", "4 mm")
+        mesh = st.make_mesh(column, "structured", "1 mm")
+        about = column, mesh, STEEL, "compression"
+        critical = st.Scene(*about, "200 N", definition="lattice").buckling_load()
+        below, above = (st.Scene(*about, share * critical, definition="lattice").solve() for share in (0.95, 1.05))
+        assert below.status is st.Status.SOLVED and below.negative_pivots == 0
+        assert above.status is st.Status.UNSTABLE and above.negative_pivots == 1 and "pivot" in above.message
+
+    def test_a_scene_in_time_comes_to_its_equilibrium(self):
+        found = scene(kinematics="linear")
+        motion = found.motion(mass_damping=2e4)
+        run = motion.run("backward-euler", 1e-3, 500, rest=1e-8)
+        result = found.solve()
+        assert run.status == "rest"
+        assert np.abs(run.displacements - result.displacements).max() <= 1e-6 * abs(result.displacement)
+
+
+def test_networks_are_shared_between_scenes_of_a_sheet():
+    first = scene(definition="paper", stiffness=1e8)
+    others = {"definition": "paper", "stiffness": 2e8, "sheet": first.sheet}
+    second = st.Scene(BEAM, first.mesh, STEEL, "traction", "20 kN", **others)
+    bent = st.Scene(BEAM, first.mesh, STEEL, "bending", "200 N", **others)
+    assert second.network is first.network is bent.network and second.problem is first.problem
+    assert bent.problem is not first.problem
+    alone = scene(definition="paper", stiffness=2e8)
+    assert alone.network is not first.network and alone.solve().displacement == second.solve().displacement
+
+
+def test_sensitivity():
+    curve = st.sensitivity(scene(kinematics="linear"), [0.5, 0.8, 1.1])
+    assert curve.stiffness == pytest.approx(np.array([0.5, 0.8, 1.1]) * 210e9 * 1e-3) and curve.stable.all()
+    assert curve.displacement * curve.stiffness == pytest.approx(curve.displacement[0] * curve.stiffness[0])
+    assert curve.best_status is st.Status.SOLVED
+    best = scene(definition="paper", kinematics="linear", stiffness=curve.best_stiffness).solve()
+    assert abs(best.error) <= 1e-8
+    assert curve.best_stiffness == pytest.approx(curve.predicted_stiffness, rel=0.05)
+    with pytest.raises(ValueError, match="stiffness_ratios: not all above zero; give"):
+        st.sensitivity(scene(), [0.5, 0.0])
+    with pytest.raises(ValueError, match="turns with its side"):
+        st.sensitivity(scene(load="follower-pressure", force=10.0))
+
+
+def test_moduli_scale_out():
+    mesh = st.make_mesh(BEAM, "right", "5 mm")
+    soft, hard = (st.moduli(mesh, st.Material(young, 0.3), "area") for young in (1.0, 210e9))
+    for name in ("young_modulus_error", "poisson_ratio", "shear_modulus_error"):
+        assert getattr(hard, name) == pytest.approx(getattr(soft, name), abs=1e-12)
+
+
+class TestErrors:
+    @pytest.mark.parametrize(
+        ("make", "message"),
+        [
+            (lambda: st.Beam("200 GPa", 0.04), "length: '200 GPa' is a stress; give a length such as"),
+            (lambda: st.Beam(0.2, -0.04), "height: -0.04 is not above zero; give a length such as"),
+            (lambda: st.Beam(0.2, 0.04, float("nan")), "thickness: nan is not a finite number; give"),
+            (lambda: st.Material("210 mm", 0.3), "Young's modulus: '210 mm' is a length; give a stress"),
+            (lambda: st.Material(1e9, 0.6), "Poisson's ratio of 'material' is 0.6: .* give a number in that range"),
+            (lambda: st.Material(1e9, 0.3, 0), "density: 0 is not above zero; give a density such as '7850 kg/m"),
+            (lambda: st.make_mesh(BEAM, "structred", "5 mm"), "mesh type: 'structred' is unknown; did you mean"),
+            (lambda: st.make_mesh(BEAM, "right", "30 mm"), "mesh size: '30 mm' is larger than beam .100x20."),
+            (lambda: scene(load="tracton"), "load: 'tracton' is unknown; did you mean 'traction'"),
+            (lambda: scene(force=-1.0), "force: -1.0 is not above zero; give a force such as '400 kN'"),
+            (lambda: scene(definition="patches"), "definition: 'patches' is unknown; did you mean 'patch'"),
+            (lambda: scene(definition="paper"), "definition 'paper' needs a uniform one; give a stiffness such as"),
+            (lambda: scene(stiffness=1e8), "stiffness: .* definition 'patch' derives its own; leave it out"),
+            (lambda: scene(kinematics="finite"), "kinematics: 'finite' is unknown; known: nonlinear, linear"),
+            (lambda: scene("braced", "shear", definition="baudet-corrected"), "'baudet-corrected' is not for 'shear'"),
+            (lambda: scene(sheet=Sheet(st.make_mesh(BEAM, "right", 0.01), 1e-3)), "sheet: is of another mesh"),
+            (lambda: st.Scene(BEAM, None, STEEL, "traction", 1.0), "mesh: None is not a Mesh; give one such as"),
+            (lambda: scene(definition=lambda mesh, material, thickness: 1.0).solve(), "returns float; return spr"),
+            (lambda: scene("right", definition="baudet").solve(), "use mesh type 'braced'"),
+        ],
+    )  # fmt: skip
+    def test_key_value_and_remedy(self, make, message):
+        with pytest.raises(ValueError, match=message):
+            make()
+
+    def test_a_mesh_of_another_beam(self):
+        with pytest.raises(ValueError, match="mesh: extends over 0 to 100 x 0 to 20 mm, its beam over 200 x 40 mm"):
+            st.Scene(st.Beam(0.2, 0.04), st.make_mesh(BEAM, "right", 0.01), STEEL, "traction", 1.0)
+
+    def test_a_material_without_density(self):
+        still = st.Scene(BEAM, st.make_mesh(BEAM, "right", 0.01), st.Material(1e9, 0.3), "traction", 1.0)
+        with pytest.raises(ValueError, match="density: material 'material' has none; give a density"):
+            still.motion()
+
+    def test_no_dataset(self, tmp_path):
+        with pytest.raises(FileNotFoundError, match="there is no such dataset; run the study"):
+            st.open(tmp_path)
+        (tmp_path / "dataset.nc").write_text("no dataset")
+        with pytest.raises(ValueError, match="cannot be read"):
+            st.open(tmp_path)
+        import xarray as xr
+
+        xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+        with pytest.raises(ValueError, match="is not a dataset of springtune"):
+            st.open(tmp_path / "other.nc")
+
+
+def test_plots_are_drawn_where_they_are_wanted():
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    figure, ax = pyplot.subplots()
+    assert scene().solve().plot(ax) is ax and ax.collections
+    assert st.sensitivity(scene(), [0.5, 0.8, 1.1]).plot().lines
+    pyplot.close("all")
+
+
+class TestNames:
+    def test_import_costs_nothing(self):
+        program = "import sys, springtune; dir(springtune); print(*sys.modules)"
+        loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+        assert not {"numpy", "scipy", "xarray", "pint", "matplotlib"} & set(loaded.split())
+
+    def test_a_beam_and_a_scene_import_no_more_than_they_need(self):
+        program = "import sys, springtune as st; st.Beam('1 m', '1 m'); st.Material(1, 0.3); print(*sys.modules)"
+        loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+        assert "numpy" not in loaded.split()
+        program = "import sys, springtune as st; st.Scene, st.sensitivity, st.moduli; print(*sys.modules)"
+        loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+        assert not {"skfem", "xarray", "pint", "matplotlib", "numba", "pydantic", "h5py"} & set(loaded.split())
+
+    def test_every_name_is_there(self):
+        assert set(dir(st)) == set(st.__all__)
+        for name in st.__all__:
+            assert getattr(st, name) is not None
+        with pytest.raises(AttributeError, match="no attribute 'scenes'"):
+            st.scenes  # noqa: B018
+
+    def test_a_status_reads_as_in_a_dataset(self):
+        from springtune.output.dataset import STATUS
+
+        assert [str(flag) for flag in st.Status] == list(STATUS) and f"{st.Status.SOLVED}" == "solved"
+        assert [int(flag) for flag in st.Status] == list(range(len(STATUS)))
