@@ -1,8 +1,9 @@
-"""The quick study, end to end: the dataset's contract, and what the README says of it."""
+"""The quick study, end to end: the dataset's contract, and what the pages and an example say of it."""
 
 import csv
 import json
 import re
+import runpy
 import shutil
 
 import meshio
@@ -184,10 +185,18 @@ def test_tables_and_figures_are_there(run, tree):
             assert (results / f"figures/{stem}.{ending}").stat().st_size > 5000
 
 
-def test_readme_snippet_runs(run, tree, repository, monkeypatch):
-    snippet = re.search(r"```python\n(.*?)```", (repository / "README.md").read_text(), re.DOTALL).group(1)
+def test_snippet_of_the_docs_runs(run, tree, repository, monkeypatch):
+    snippet = re.search(r"```python\n(.*?)```", (repository / "docs/dataset.md").read_text(), re.DOTALL).group(1)
     monkeypatch.chdir(run.folder)
     exec(snippet.replace("results/paper", "results/quick").replace('"200x30"', '"100x20"'), {})
+
+
+def test_example_reads_the_dataset(run, tree, repository, monkeypatch, tmp_path):
+    """The reference is the paper's (table 1), which is printed to three digits."""
+    monkeypatch.chdir(run.folder)
+    main = runpy.run_path(str(repository / "examples/read_dataset.py"))["main"]
+    assert main(figure=tmp_path / "curves.png") == pytest.approx(0.475e-3, rel=1e-3)
+    assert (tmp_path / "curves.png").stat().st_size > 5000
 
 
 def test_second_run_has_nothing_to_do(run, tree):
