@@ -53,7 +53,7 @@ install() {
 install --require-hashes -r "requirements/$what.txt"
 if [ "$what" = run ]; then
     install --only-binary :all: --require-hashes -r requirements/cholesky.txt ||
-        say "no CHOLMOD for this machine: SuperLU factorises in its place, in three to five times the time"
+        say "no CHOLMOD for this machine: SuperLU factorizes in its place, in three to five times the time"
 fi
 "$python" -m pip install --quiet --no-deps --no-build-isolation --no-index --editable .
 "$python" -m compileall -q src || true # read-only sources only start a little later

@@ -389,7 +389,7 @@ def summary(study):
             f"from {_count(len(units), 'solution')}: small strain scales with force, E t and size",
         ],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
-        ["networks", networks, "to factorise at rest, at most: loads and uniform stiffnesses share one a mesh"],
+        ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]
     for kind in kinds():
         rows += kind.summary(study.parts[kind.name]) if study.parts[kind.name] else []

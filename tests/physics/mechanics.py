@@ -4,7 +4,7 @@ Energies are those of the definitions' papers, in plain differences of positions
 displacements, in forms that keep digits. Digits come from the 80-bit numbers in which forces are evaluated here.
 Tangents are complex-step derivatives of the forces (no differences, so exact to rounding), factors LAPACK's of band
 matrices, and eigenvalues those of dense matrices or Rayleigh quotients in 80 bits: nothing of the library's assembly,
-ordering, factorisations or pivots is used. From the library come points, cells and the springs' stiffnesses alone.
+ordering, factorizations or pivots is used. From the library come points, cells and the springs' stiffnesses alone.
 """
 
 import math
@@ -135,23 +135,23 @@ class Part:
 
     def __init__(self, corners, forces, *parameters):
         self.corners, self.forces = corners, forces
-        self._parameters = {LONG: [np.asarray(p, LONG) for p in parameters]}
-        self._parameters[np.float64] = [p.astype(float) for p in self._parameters[LONG]]
+        self.parameters = {LONG: [np.asarray(p, LONG) for p in parameters]}
+        self.parameters[np.float64] = [p.astype(float) for p in self.parameters[LONG]]
         # All directions of a tangent are taken at once, corner by corner but the first.
-        self._steps = 2 * (corners.shape[1] - 1)
-        self._repeated = [np.concatenate([p] * self._steps) for p in self._parameters[np.float64]]
+        self.steps = 2 * (corners.shape[1] - 1)
+        self.repeated = [np.concatenate([p] * self.steps) for p in self.parameters[np.float64]]
 
     def __call__(self, positions):
         x = positions[self.corners]
-        return self.forces(x, *self._parameters[x.real.dtype.type])
+        return self.forces(x, *self.parameters[x.real.dtype.type])
 
     def tangent(self, positions):
         """Derivative of the forces, shape (m, 2 c, 2 c); what one corner lacks, a common motion has."""
         count, corners = self.corners.shape
-        x = np.repeat(positions[self.corners][None].astype(complex), self._steps, axis=0)
-        for step in range(self._steps):
+        x = np.repeat(positions[self.corners][None].astype(complex), self.steps, axis=0)
+        for step in range(self.steps):
             x[step, :, 1 + step // 2, step % 2] += 1j * STEP
-        columns = self.forces(x.reshape(-1, corners, 2), *self._repeated).imag / STEP
+        columns = self.forces(x.reshape(-1, corners, 2), *self.repeated).imag / STEP
         columns = columns.reshape(corners - 1, 2, count, corners, 2).transpose(2, 3, 4, 0, 1)
         tangent = np.concatenate([-columns.sum(axis=3, keepdims=True), columns], axis=3)
         return tangent.reshape(count, 2 * corners, 2 * corners)
@@ -179,37 +179,37 @@ class Body:
         self.size = len(self.free)
         number = np.full(held.size, -1)
         number[self.free] = np.arange(self.size)
-        self._places, self.band = [], 0
+        self.places, self.band = [], 0
         for part in [*parts, *([follower] if follower else [])]:
             of = number[(2 * part.corners[:, :, None] + np.arange(2)).reshape(len(part.corners), -1)]
             rows, columns = np.broadcast_arrays(of[:, :, None], of[:, None, :])
             kept = (rows >= 0) & (columns >= 0)
             rows, columns = rows[kept], columns[kept]
             self.band = max(self.band, int(np.abs(rows - columns).max(initial=0)))
-            self._places.append((kept, rows, columns))
-        self._places = [(kept, (self.band + i - j) * self.size + j) for kept, i, j in self._places]
+            self.places.append((kept, rows, columns))
+        self.places = [(kept, (self.band + i - j) * self.size + j) for kept, i, j in self.places]
 
     # -- forces -----------------------------------------------------------------------------------------------------
 
-    def _sum(self, positions, parts):
+    def sum(self, positions, parts):
         total = np.zeros(positions.size, positions.dtype)
         for part in parts:
             places = 2 * part.corners[:, :, None] + np.arange(2)
             np.add.at(total, places.ravel(), part(positions).ravel())
         return total
 
-    def _field(self, unknowns):
+    def field(self, unknowns):
         field = np.zeros(self.rest.size, unknowns.dtype)
         field[self.free] = unknowns
         return field.reshape(-1, 2)
 
     def missing(self, unknowns, force):
         """Load less resistance, shape (unknowns,), in the precision of the unknowns."""
-        positions = self.rest + self._field(unknowns)
-        inner = self._sum(positions, self.parts)[self.free]
+        positions = self.rest + self.field(unknowns)
+        inner = self.sum(positions, self.parts)[self.free]
         if self.follower is None:
             return force * self.pattern.ravel()[self.free] - inner
-        return -force * self._sum(positions, [self.follower])[self.free] - inner
+        return -force * self.sum(positions, [self.follower])[self.free] - inner
 
     def along(self, unknowns, force, direction):
         """Tangent times a direction, in 80 bits."""
@@ -219,10 +219,10 @@ class Body:
 
     def tangent(self, unknowns, force):
         """Tangent in LAPACK's form of band matrices, shape (2 band + 1, unknowns)."""
-        positions = (self.rest + self._field(unknowns)).astype(float)
+        positions = (self.rest + self.field(unknowns)).astype(float)
         total = np.zeros((2 * self.band + 1) * self.size)
         parts = [(part, 1.0) for part in self.parts] + ([(self.follower, force)] if self.follower else [])
-        for (part, factor), (kept, places) in zip(parts, self._places):
+        for (part, factor), (kept, places) in zip(parts, self.places):
             total += np.bincount(places, factor * part.tangent(positions)[kept], len(total))
         return total.reshape(-1, self.size)
 
@@ -255,11 +255,11 @@ class Body:
             return 0.0, vector
         vector = vector.astype(LONG)
         value = float(vector @ self.along(unknowns, force, vector) / (vector @ vector)) / size
-        if value > 0 and not self._above(matrix, -1):
+        if value > 0 and not self.above(matrix, -1):
             value = float(np.linalg.eigvalsh(self.dense(matrix), UPLO="L")[0]) / size
         return value, vector
 
-    def _above(self, matrix, sign):
+    def above(self, matrix, sign):
         """Whether all eigenvalues are above what rounding may do to them, times a sign, by Cholesky's method."""
         lower = matrix[self.band :].copy()
         lower[0] -= sign * 1e-14 * math.sqrt(self.size) * np.abs(matrix).max()
@@ -272,9 +272,9 @@ class Body:
     def stable(self, unknowns, force):
         """Whether no eigenvalue is negative."""
         matrix = self.tangent(unknowns, force)
-        if self._above(matrix, 1):
+        if self.above(matrix, 1):
             return True
-        return self._above(matrix, -1) and self.lowest(unknowns, force, matrix)[0] > 0
+        return self.above(matrix, -1) and self.lowest(unknowns, force, matrix)[0] > 0
 
     def modes(self, unknowns, force, masses):
         """Eigenvalues of the tangent over the masses, which is not symmetric under a follower, over the largest."""
@@ -323,7 +323,7 @@ class Body:
 
     def change(self, unknowns):
         """Largest change of an edge's vector over its length [1], of all parts with two or more corners."""
-        field = self._field(np.asarray(unknowns, float))
+        field = self.field(np.asarray(unknowns, float))
         rest = self.rest.astype(float)
         largest = 0.0
         for part in self.parts:
@@ -334,7 +334,7 @@ class Body:
         return largest
 
     def inside_out(self, unknowns, cells):
-        positions = (self.rest + self._field(unknowns)).astype(float)
+        positions = (self.rest + self.field(unknowns)).astype(float)
         return any((area_of(positions[corners]) <= 0).any() for corners in cells)
 
     def follow(self, force, judge=None):

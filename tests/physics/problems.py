@@ -32,7 +32,7 @@ def roller_patch(cells, rows, stiffness):
     network = Sheet(mesh, 1.0).network(held, Springs(1.0, stiffness(mesh)))
     given = np.zeros(mesh.points.shape)
     given[ends, 0] = strain * mesh.points[ends, 0]
-    displacements = given + network.expand(network.factorize().solve(-network.linear_resistance(given)))
+    displacements = given + network.expand(network.factorize_tangent().solve(-network.linear_resistance(given)))
     # The pull on the right ends: every spring that crosses a cut, summed through the work of the whole strain.
     normals = network.rest_vectors / network.rest_lengths[:, None]
     elongations = np.einsum("ij,ij->i", normals, network.stretch(displacements))

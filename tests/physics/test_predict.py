@@ -7,7 +7,6 @@ import pytest
 
 from springtune.kinds.scenes.solve import solve
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.moduli import axial_moduli
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
 from springtune.prediction import CASES, extrapolate, particles, predict, references
@@ -179,21 +178,9 @@ class TestWhatClosedFormsGotWrong:
         *_, found = self.choices("braced", 1 / 3)
         assert "area" not in found and "patch" in found
 
-    def test_an_unstable_network_has_no_number(self, replaced):
-        """Area energies of the wrong sign and of any size: their networks are no beams."""
-        whole = DEFINITIONS["area"].function
-
-        def unstable(mesh, material, thickness):
-            found = whole(mesh, material, thickness)
-            energies = tuple(type(one)(one.points, one.corners, 40 * one.modulus) for one in found.energies)
-            return Springs(found.reference, found.relative, energies)
-
-        def tested(mesh, material, thickness):
-            return axial_moduli(mesh, unstable(mesh, material, thickness))
-
-        replaced("area", unstable)
-        replaced("patch-area", tested)
-        *_, found = self.choices("structured", 0.0)
+    def test_an_unstable_network_has_no_number(self):
+        """A sheet that grows wider as it is pulled: its area energies are large and negative."""
+        *_, found = self.choices("structured", -0.6)
         assert set(found["area"].failures) == {*CASES, "patch test"}
         assert all("unstable" in reason for reason in found["area"].failures.values())
         assert all(np.isnan(getattr(found["area"], load)) for load in (*CASES, "young_modulus_error", "poisson_ratio"))

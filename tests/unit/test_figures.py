@@ -174,7 +174,7 @@ def benchmark():
         "mesh_size": SIZES, "curve_count": [1, 11],
     }  # fmt: skip
     cell, fit = ("scene", "approach", "mesh_size"), ("scene", "approach")
-    parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorising", "solving")], cell)
+    parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorizing", "solving")], cell)
     return variables(
         labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts, cost_exponent=fit, error_rate=fit,
         reference_error_estimate=("scene",), reference_seconds=("scene",), separate_seconds=("curve_count",),

@@ -1,4 +1,4 @@
-"""Linear algebra: sparse factorisations, their orderings and multigrid."""
+"""Linear algebra: sparse factorizations, their orders of elimination, and multigrid."""
 
 SOLVERS = ("Cholesky", "SuperLU", "multigrid")
 """Solvers of linear systems."""

@@ -1,31 +1,73 @@
-"""Factorised symmetric matrices: by Cholesky's method where CHOLMOD is at hand, else by SuperLU.
+"""Factorized symmetric matrices: by Cholesky's method where CHOLMOD is at hand, else by SuperLU.
 
 CHOLMOD comes with the package cvxopt, an extra. Where it is not installed, or where the environment variable
-``SPRINGTUNE_SOLVER`` is ``superlu``, SuperLU factorises, which takes three to five times as long. What is not positive
+``SPRINGTUNE_SOLVER`` is ``superlu``, SuperLU factorizes, which takes three to five times as long. What is not positive
 definite has no Cholesky factor, and SuperLU then counts its negative pivots.
 """
 
 import os
 from functools import cached_property
 from importlib.util import find_spec
+from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, sparray
 from scipy.sparse.linalg import splu
 
 CHOLESKY = find_spec("cvxopt") is not None and os.environ.get("SPRINGTUNE_SOLVER") != "superlu"
-"""Whether CHOLMOD is there and wanted."""
+"""Whether CHOLMOD is there, and taken where no solver is named."""
 
-SUPERLU = {"relax": 4, "panel_size": 4, "options": {"SymmetricMode": True}}
+SUPERLU: dict[str, Any] = {"relax": 4, "panel_size": 4, "options": {"SymmetricMode": True}}
 """Sizes of SuperLU's panels: for these matrices its own are a quarter slower."""
 
 
 class SingularError(ArithmeticError):
-    """A matrix could not be factorised."""
+    """A matrix could not be factorized."""
 
 
-class Factor:
-    """A symmetric matrix factorised by SuperLU: solves, and counts negative eigenvalues (Sylvester's law of inertia).
+class Factor(Protocol):
+    """What solves systems of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`.
+
+    Attributes
+    ----------
+    name : str
+        One of `springtune.linalg.SOLVERS`.
+    """
+
+    name: str
+
+    @property
+    def negative_pivots(self) -> int:
+        """Number of negative eigenvalues of the matrix; 0 where it is positive definite.
+
+        Raises
+        ------
+        SingularError
+            If they cannot be told.
+        """
+        ...
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solution of the system.
+
+        Parameters
+        ----------
+        right : ndarray of float, shape (unknowns,) or (unknowns, n)
+            Right-hand sides.
+
+        Returns
+        -------
+        ndarray of float, of the same shape
+        """
+        ...
+
+    def estimate(self, right: np.ndarray) -> np.ndarray:
+        """As `solve`, where an estimate would do."""
+        ...
+
+
+class SuperLUFactor:
+    """A symmetric matrix factorized by SuperLU, see `Factor`.
 
     Parameters
     ----------
@@ -38,11 +80,19 @@ class Factor:
     ------
     SingularError
         If it is singular.
+
+    Examples
+    --------
+    >>> factor = SuperLUFactor(csc_array([[1.0, 2.0], [2.0, 1.0]]))
+    >>> factor.solve(np.array([3.0, 3.0]))
+    array([1., 1.])
+    >>> factor.negative_pivots  # the eigenvalues are 3 and -1
+    1
     """
 
     name = "SuperLU"
 
-    def __init__(self, matrix, order=None):
+    def __init__(self, matrix: csc_array, order: np.ndarray | None = None) -> None:
         self._order = slice(None) if order is None else order
         chosen = "MMD_AT_PLUS_A" if order is None else "NATURAL"
         try:
@@ -50,24 +100,29 @@ class Factor:
         except RuntimeError as error:
             raise SingularError(str(error)) from error
 
-    def solve(self, right):
-        """Solution of the factorised system, shape (unknowns,) or (unknowns, n)."""
+    @property
+    def fill(self) -> int:
+        """Number of entries of the lower triangular factor."""
+        return self._lu.L.nnz
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solution of the factorized system, shape (unknowns,) or (unknowns, n)."""
         solution = np.empty_like(right)
         solution[self._order] = self._lu.solve(right[self._order])
         return solution
 
-    def estimate(self, right):
+    def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, where an estimate would do."""
         return self.solve(right)
 
     @cached_property
-    def negative_pivots(self):
-        """Number of negative eigenvalues of the matrix; 0 where the equilibrium is stable.
+    def negative_pivots(self) -> int:
+        """Number of negative eigenvalues of the matrix (Sylvester's law of inertia).
 
         Raises
         ------
         SingularError
-            If a pivot on the diagonal is zero and the factorisation went beside it: its signs then say nothing.
+            If a pivot on the diagonal is zero and the factorization went beside it: its signs then say nothing.
         """
         if (self._lu.perm_r != self._lu.perm_c).any():
             raise SingularError("a zero pivot")
@@ -75,9 +130,9 @@ class Factor:
 
 
 class Analysis:
-    """Symbolic factorisation of all symmetric matrices of one sparsity, done once and used again.
+    """Symbolic factorization of all symmetric matrices of one sparsity, done once and used again.
 
-    Method: supernodal Cholesky factorisation (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22,
+    Method: supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22,
     2008).
 
     Parameters
@@ -86,9 +141,14 @@ class Analysis:
         Rows of the entries of each column, ascending, and column pointers, as in `scipy.sparse.csc_array`.
     order : ndarray of int, optional
         Order of elimination; CHOLMOD's own (minimum degree) without.
+
+    Attributes
+    ----------
+    symbolic_factors : int
+        How many have been made: as many as there were numeric ones in use at a time.
     """
 
-    def __init__(self, indices, pointers, order=None):
+    def __init__(self, indices: np.ndarray, pointers: np.ndarray, order: np.ndarray | None = None) -> None:
         from cvxopt import cholmod, matrix, spmatrix
 
         size = len(pointers) - 1
@@ -97,16 +157,30 @@ class Analysis:
         rows, columns = (matrix(part[self._lower].astype(np.int64)) for part in (indices, columns))
         self._matrix = spmatrix(np.zeros(len(self._lower)), rows, columns, (size, size))
         self._order = {} if order is None else {"p": matrix(order.astype(np.int64))}
-        self._spare = []
+        self._spare: list[Any] = []
+        self.symbolic_factors = 0
         cholmod.options["supernodal"] = 2
 
-    def factorise(self, data):
-        """Factor of the matrix of these entries; None where it is not positive definite."""
+    def factorize(self, data: np.ndarray) -> "CholeskyFactor | None":
+        """Factor of the matrix of these entries; None where it is not positive definite.
+
+        Parameters
+        ----------
+        data : ndarray of float, shape (n_entries,)
+
+        Returns
+        -------
+        CholeskyFactor or None
+        """
         from cvxopt import cholmod, matrix
 
         self._matrix.V = matrix(data[self._lower])
         # A factor is made in the place of its symbolic one, and gives that back when nobody needs it any more.
-        factor = self._spare.pop() if self._spare else cholmod.symbolic(self._matrix, uplo="L", **self._order)
+        if self._spare:
+            factor = self._spare.pop()
+        else:
+            factor = cholmod.symbolic(self._matrix, uplo="L", **self._order)
+            self.symbolic_factors += 1
         try:
             cholmod.numeric(self._matrix, factor)
         except ArithmeticError:
@@ -116,47 +190,64 @@ class Analysis:
 
 
 class CholeskyFactor:
-    """A factorised positive definite matrix; as `Factor`."""
+    """A factorized positive definite matrix, see `Factor`; made by `Analysis.factorize`.
+
+    Parameters
+    ----------
+    factor : object
+        CHOLMOD's.
+    spare : list
+        Where it goes when nobody needs it any more.
+    """
 
     name = "Cholesky"
     negative_pivots = 0
 
-    def __init__(self, factor, spare):
+    def __init__(self, factor: object, spare: list[Any]) -> None:
         self._factor, self._spare = factor, spare
 
-    def __del__(self):
+    def __del__(self) -> None:
         self._spare.append(self._factor)
 
-    def solve(self, right):
-        """Solution of the factorised system, shape (unknowns,) or (unknowns, n)."""
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solution of the factorized system, shape (unknowns,) or (unknowns, n)."""
         from cvxopt import cholmod, matrix
 
         solution = matrix(right)
         cholmod.solve(self._factor, solution)
         return np.array(solution).reshape(right.shape)
 
-    def estimate(self, right):
+    def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, where an estimate would do."""
         return self.solve(right)
 
 
-def factorised(matrix):
+def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | CholeskyFactor:
     """Factor of a symmetric matrix of any sparsity.
 
     Parameters
     ----------
     matrix : sparse array, shape (n, n)
+    solver : str, optional
+        ``"Cholesky"`` or ``"SuperLU"``; by what is installed otherwise. What is not positive definite is factorized by
+        SuperLU all the same.
 
     Returns
     -------
-    Factor or CholeskyFactor
+    SuperLUFactor or CholeskyFactor
 
     Raises
     ------
     SingularError
         If it is singular.
+
+    Examples
+    --------
+    >>> factorize(csc_array([[2.0, 1.0], [1.0, 2.0]])).solve(np.array([3.0, 3.0]))
+    array([1., 1.])
     """
     matrix = csc_array(matrix)
     matrix.sort_indices()
-    factor = Analysis(matrix.indices, matrix.indptr).factorise(matrix.data) if CHOLESKY else None
-    return factor or Factor(matrix)
+    cholesky = solver == "Cholesky" or CHOLESKY and solver != "SuperLU"
+    factor = Analysis(matrix.indices, matrix.indptr).factorize(matrix.data) if cholesky else None
+    return factor or SuperLUFactor(matrix)

@@ -3,15 +3,14 @@
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array, csr_matrix
+from scipy.sparse import csr_array, csr_matrix, sparray
 
 from .factors import SingularError
 
-TOLERANCE = 1e-11
+RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
 
-MAX_ITERATIONS = 300
-
+MAX_CG_ITERATIONS = 300
 
 CERTAIN = 1e-7
 """Residual over a random right-hand side below which every direction has been met: of a million unknowns each has a
@@ -27,9 +26,10 @@ class IndefiniteError(NotPositiveError):
 
 
 class Multigrid:
-    """In the place of a factor: smoothed aggregation, whose coarse spaces hold the rigid motions of the sheet.
+    """Smoothed aggregation, whose coarse spaces hold the rigid motions of the sheet.
 
-    Time and memory grow in proportion to the number of unknowns, where those of a factorisation grow with its power 3/2
+    It stands in the place of a factor, see `springtune.linalg.factors.Factor`.
+    Time and memory grow in proportion to the number of unknowns, where those of a factorization grow with its power 3/2
     and n log n. Method: Vanek, Mandel and Brezina, Computing 56:179, 1996; by the library pyamg.
 
     Parameters
@@ -42,7 +42,7 @@ class Multigrid:
 
     name = "multigrid"
 
-    def __init__(self, matrix, motions):
+    def __init__(self, matrix: sparray, motions: np.ndarray) -> None:
         from pyamg import smoothed_aggregation_solver
 
         self._matrix = csr_array(matrix)
@@ -53,12 +53,25 @@ class Multigrid:
         )
         self._precondition = hierarchy.aspreconditioner(cycle="V").matvec
 
-    def solve(self, right, tolerance=TOLERANCE):
-        """Solution, shape (unknowns,).
+    def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:
+        """Solution of the system.
+
+        Parameters
+        ----------
+        right : ndarray of float, shape (unknowns,)
+        tolerance : float, optional
+            Residual over the right-hand side at which it ends [1].
+
+        Returns
+        -------
+        ndarray of float, shape (unknowns,)
 
         Raises
         ------
+        IndefiniteError
+            If a direction without stiffness is met.
         NotPositiveError
+            If it does not end.
         """
         solution, missing = np.zeros(len(right)), np.array(right, dtype=float)
         target = tolerance * np.linalg.norm(right)
@@ -66,7 +79,7 @@ class Multigrid:
             return solution
         better = self._precondition(missing)
         direction, weight = better.copy(), missing @ better
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(MAX_CG_ITERATIONS):
             forces = self._matrix @ direction
             stiffness = direction @ forces
             if not stiffness > 0:
@@ -79,14 +92,14 @@ class Multigrid:
             better = self._precondition(missing)
             weight, before = missing @ better, weight
             direction = better + weight / before * direction
-        raise NotPositiveError(f"conjugate gradients did not end within {MAX_ITERATIONS} iterations")
+        raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
 
-    def estimate(self, right):
+    def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, to a percent."""
         return self.solve(right, 1e-2)
 
     @cached_property
-    def negative_pivots(self):
+    def negative_pivots(self) -> int:
         """0 where the matrix is positive definite, else 1: they are not counted.
 
         Conjugate gradients cannot end in a direction of which the right-hand side has a part without having met its

@@ -1,12 +1,15 @@
 """Equilibrium paths through limit points, and buckling loads."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..linalg.factors import SingularError
-from .series import smallest_share
-from .statics import TOLERANCE
+from ..linalg.factors import Factor, SingularError
+from .network import Network
+from .newton import TOLERANCE
+from .statics import StaticProblem
 
 FEW, MANY = 3, 8
 """Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
@@ -34,7 +37,9 @@ class Path:
     message: str
 
 
-def follow(problem, s, *, increment, most_points=200, limit=None):
+def follow(
+    problem: StaticProblem, s: float, *, increment: float, most_points: int = 200, limit: float | None = None
+) -> Path:
     """Follow the path of a network from rest by arc length, through limit points, until it carries a load.
 
     Riks' method: each point is sought in the plane across the last tangent, with the exact tangent anew in every Newton
@@ -49,77 +54,110 @@ def follow(problem, s, *, increment, most_points=200, limit=None):
         First and largest length of an increment, norm of the displacements of all unknowns [m].
     most_points : int, optional
     limit : float, optional
-        Largest norm of the displacements; the path ends there.
+        Largest norm of the displacements; the path ends there [m].
 
     Returns
     -------
     Path
+
+    Examples
+    --------
+    A shallow arch of two springs from (-1, 0) over (0, .1) to (1, 0) snaps through under a load on its top; a third
+    spring, without stiffness, closes the triangle:
+
+    >>> from springtune.mesh.cells import Mesh
+    >>> mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.1]]), np.array([[0, 1, 2]]))
+    >>> held = np.array([[True, True], [True, True], [True, False]])
+    >>> network = Network(mesh, held, (mesh.edges != [0, 1]).any(axis=1).astype(float))
+    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
+    >>> path = follow(problem, -1e-2, increment=0.002, limit=0.1)
+    >>> float(abs(path.loads).max().round(6)), int(path.negative_pivots.max())
+    (0.000383, 1)
+
+    The largest load is known: the springs, once of length L, are then of length l, the cube root of L.
+
+    >>> L = 1.01**0.5
+    >>> l = L ** (1 / 3)
+    >>> round(2 * (l**2 - 1) ** 0.5 * (L / l - 1), 6)
+    0.000383
     """
-    network, load = problem.network, problem.load
-    u, at, scale = np.zeros(network.unknowns), 0.0, abs(s) * problem.load_norm
-    direction = None
-    points = [(0.0, network.expand(u), 0)]
-    length, message = increment, "too many points"
-
-    def factorize(u, at):
-        follower = problem.follower and (at, problem.follower)
-        return network.factorize(network.expand(u), follower)
-
-    def forces(u):
-        return load if problem.follower is None else network.reduce(problem.follower.forces(network.expand(u)))
-
+    network, direction = problem.network, None
+    point = _Point(np.zeros(network.unknowns), 0.0, 0, 0)
+    points, length, message = [point], increment, "too many points"
     while len(points) < most_points:
-        try:
-            factor = factorize(u, at)
-            tangent = factor.solve(forces(u))
-            sign = np.sign(s) if direction is None else np.sign(direction @ tangent) or 1.0
-            found = None
-            while found is None and length > 1e-6 * increment:
-                rise = sign * length / np.linalg.norm(tangent)
-                found = _correct(problem, factorize, forces, u, at, rise * tangent, rise, scale)
-                if found is None:
-                    length *= 0.5
-        except SingularError:
-            length *= 0.7  # a point exactly on a limit point: the next one is not
-            found = None
+        found, length = _next(problem, s, point, direction, length, 1e-6 * increment)
         if found is None:
             message = "no equilibrium near the last point"
             break
-        new, load_now, pivots, steps = found
-        direction, u, at = new - u, new, load_now
-        points.append((at, network.expand(u), pivots))
-        if network.inverted(points[-1][1]):
+        direction, point = found.u - point.u, found
+        points.append(point)
+        if network.inverted(network.expand(point.u)):
             message = "triangles are inverted"
             break
-        if limit is not None and np.linalg.norm(u) >= limit or at / s >= 1.0:
+        if limit is not None and np.linalg.norm(point.u) >= limit or point.load / s >= 1.0:
             message = ""
             break
-        length = min(length * (1.5 if steps <= FEW else 0.5 if steps > MANY else 1.0), increment)
-    loads, displacements, pivots = zip(*points)
-    return Path(np.array(loads), np.array(displacements), np.array(pivots), message)
+        length = min(length * (1.5 if point.steps <= FEW else 0.5 if point.steps > MANY else 1.0), increment)
+    return Path(
+        np.array([point.load for point in points]),
+        np.array([network.expand(point.u) for point in points]),
+        np.array([point.negative_pivots for point in points]),
+        message,
+    )
 
 
-def _correct(problem, factorize, forces, u, at, du, ds, scale, most=12):
+class _Point(NamedTuple):
+    """A point of a path: unknowns [m], load [m], negative pivots there and the Newton steps that it took."""
+
+    u: np.ndarray
+    load: float
+    negative_pivots: int
+    steps: int
+
+
+def _next(
+    problem: StaticProblem, s: float, last: _Point, direction: np.ndarray | None, length: float, shortest: float
+) -> tuple[_Point | None, float]:
+    """Point after the last one, and the length of the increment, halved where Newton's method fails; None beyond."""
+    displacements = problem.network.expand(last.u)
+    try:
+        tangent = problem.factorize_tangent(last.load, displacements).solve(problem.load_at(displacements))
+        sign = np.sign(s) if direction is None else np.sign(direction @ tangent) or 1.0
+        while length > shortest:
+            rise = sign * length / np.linalg.norm(tangent)
+            found = _correct(problem, last, rise * tangent, rise, abs(s) * problem.load_norm)
+            if found is not None:
+                return found, length
+            length *= 0.5
+    except SingularError:  # a point exactly on a limit point
+        pass
+    return None, length
+
+
+def _correct(
+    problem: StaticProblem, last: _Point, du: np.ndarray, ds: float, scale: float, most: int = 12
+) -> _Point | None:
     """Newton's method in the plane across an increment; None where it does not converge."""
     network, across = problem.network, du
-    u, at = u + du, at + ds
+    u, at = last.u + du, last.load + ds
     for step in range(1, most + 1):
-        load = forces(u)
+        displacements = network.expand(u)
+        load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
-            missing = at * load - network.resistance(network.expand(u))
+            missing = at * load - network.resistance(displacements)
             size = np.linalg.norm(missing)
         if not np.isfinite(size):
             return None
-        factor = factorize(u, at)
+        factor = problem.factorize_tangent(at, displacements)
         if size <= TOLERANCE * scale:
-            return u, at, problem.stability(at, network.expand(u), factor)[0], step
+            return _Point(u, at, problem.stability(at, displacements, factor)[0], step)
         back, forth = factor.solve(missing), factor.solve(load)
         change = -(across @ back) / (across @ forth)
         u, at = u + back + change * forth, at + change
     return None
 
 
-def buckling_load(problem, guess):
+def buckling_load(problem: StaticProblem, guess: float) -> float:
     """Load at which the path from rest loses its stability [m]: force over the reference stiffness.
 
     A linear buckling analysis about two equilibria shortly below the critical load of the one about rest; the number of
@@ -129,12 +167,27 @@ def buckling_load(problem, guess):
     ----------
     problem : StaticProblem
     guess : float
-        A load of its magnitude and sign.
+        A load of its magnitude and sign [m].
 
     Returns
     -------
     float
         NaN where there is none up to a hundred times the guess, or none that could be proved.
+
+    Examples
+    --------
+    A slender beam of the triangular lattice, whose ``E t`` is ``2 / sqrt(3)``, clamped on the left and pressed on the
+    right, over Euler's load:
+
+    >>> from springtune.mesh import MESH_TYPES
+    >>> mesh = MESH_TYPES["structured"](0.2, 0.02, 2.5e-3)
+    >>> x = mesh.points[:, 0]
+    >>> held = np.repeat((x <= x.min())[:, None], 2, axis=1)
+    >>> pushed = np.stack([(x >= x.max()) / (x >= x.max()).sum(), 0 * x], axis=1)
+    >>> problem = StaticProblem(Network(mesh, held, 0.5 * mesh.cells_per_edge), pushed)
+    >>> euler = np.pi**2 * 2 / np.sqrt(3) * 0.02**3 / 12 / (4 * 0.2**2)
+    >>> float((buckling_load(problem, -1e-5) / -euler).round(2))
+    0.99
     """
     network, small = problem.network, 1e-3 * guess
     critical = smallest_share(network, None, small * problem.slope, problem.rest_factor) * small
@@ -147,11 +200,41 @@ def buckling_load(problem, guess):
     share = smallest_share(network, first.displacements, second.displacements)
     critical = 0.85 * critical + share * step
 
-    def pivots(factor):
+    def pivots(factor: float) -> int:
         # The path is all but straight between the two equilibria and here.
         along = (factor * critical - (critical - share * step)) / step
-        return network.factorize(
+        return network.factorize_tangent(
             first.displacements + along * (second.displacements - first.displacements)
         ).negative_pivots
 
     return critical if pivots(0.99) < pivots(1.01) else np.nan
+
+
+def smallest_share(
+    network: Network, first: np.ndarray | None, second: np.ndarray | None, factor: Factor | None = None
+) -> float:
+    """Where on the line from one tangent to another the first eigenvalue vanishes: 0 at the first, 1 at the second.
+
+    The tangent there is ``K1 + x (K2 - K1)``, singular first at one over the largest eigenvalue of
+    ``(K1 - K2) v = mu K1 v``.
+
+    Parameters
+    ----------
+    network : Network
+    first, second : ndarray of float, shape (n_points, 2)
+        Displacements [m]; None at rest.
+    factor : Factor, optional
+        First tangent factorized.
+
+    Returns
+    -------
+    float
+        Infinite where there is no such place.
+    """
+    here, there = network.tangent(first), network.tangent(second)
+    factor = factor or network.factorize_tangent(first)
+    inverse = LinearOperator(here.shape, factor.solve, dtype=float)
+    # A fixed start, across the beam, since buckling bends it: the same numbers in every run.
+    start = network.reduce(network.mesh.points[:, ::-1] ** 2 * [0.0, 1.0] + 1e-3 * network.mesh.points)
+    largest = eigsh(here - there, 1, here, which="LA", Minv=inverse, v0=start, tol=1e-4, return_eigenvectors=False)[0]
+    return 1.0 / largest if largest > 0 else np.inf

@@ -11,21 +11,27 @@ Each Newton step minimises the quadratic energy of all bodies under these condit
 .. math:: \min_d \tfrac{1}{2} d^T K d - r^T d \quad \text{with} \quad g + G d \ge 0,
 
 by its dual: the contact forces are the minimum over the positive quadrant of a dense problem with as many unknowns as
-corners close or nearly do, each body entering with its own factorised tangent. A body that does not move far is
-factorised once; a rigid one has no unknowns at all, a floor neither.
+corners close or nearly do, each body entering with its own factorized tangent. A body that does not move far is
+factorized once; a rigid one has no unknowns at all, a floor neither.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
-from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array, vstack
+from scipy.sparse import block_array, block_diag, csc_array, diags_array, eye_array, sparray, vstack
 from scipy.sparse.linalg import splu
 
-from ..linalg.factors import SingularError, factorised
+from ..linalg.factors import SingularError, factorize
+from ..mesh.cells import Mesh
+from .network import Network
+from .statics import FollowerPressure
 
 REACH = 2.0
 """Distance up to which corners and edges are watched, over the mesh size."""
@@ -36,15 +42,15 @@ STRAIGHT = 1e-6
 JOINT = 1e-6
 """Distance from the joint of two edges within which a corner is at it, over the mesh size."""
 
-LONGEST_STEP = 0.5
+LONGEST_WAY = 0.5
 """Longest way of a particle in one Newton step, over the mesh size."""
 
-TOLERANCE = 1e-9
+CONTACT_TOLERANCE = 1e-9
 """Longest last Newton step, over the mesh size: its error is of the order of its square."""
 
-MAX_ITERATIONS = 40
+MAX_CONTACT_STEPS = 40
 
-SMALLEST_STEP = 1e-4
+SMALLEST_LOAD_STEP = 1e-4
 """Smallest step of the load [1]."""
 
 SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
@@ -63,7 +69,7 @@ CHANGES = 4
 """How often a Newton step may change which contacts it takes for closed."""
 
 FRICTION_TOLERANCE = 1e-6
-"""As `TOLERANCE`, where friction lags a step behind."""
+"""As `CONTACT_TOLERANCE`, where friction lags a step behind."""
 
 SLIP = 1e-3
 """Way over which friction grows to its limit, over the mesh size, from where the load step began: what sticks creeps by
@@ -74,7 +80,7 @@ class ContactError(RuntimeError):
     """A scene of contact that has no solution near the last good load step; the message says which."""
 
 
-def oriented_outline(mesh):
+def oriented_outline(mesh: Mesh) -> np.ndarray:
     """Sides of the outline, the body on their left, shape (n, 2)."""
     sides = np.concatenate(
         [corners[:, [i, (i + 1) % count]] for count, corners in mesh.cells.items() for i in range(count)]
@@ -84,7 +90,7 @@ def oriented_outline(mesh):
     return sides[first[counts == 1]]
 
 
-def neighbours(outline):
+def neighbours(outline: np.ndarray) -> np.ndarray:
     """Edge after and edge before each edge of an outline, shape (2, n)."""
     starts = np.empty(outline.max() + 1, dtype=int)
     starts[outline[:, 0]] = np.arange(len(outline))
@@ -109,27 +115,36 @@ class Body:
     force : float, optional
         Its total force at full load [N], positive outwards.
     moves_little : bool, optional
-        Whether its tangent at rest serves throughout: it is factorised once.
+        Whether its tangent at rest serves throughout: it is factorized once.
     prescribed : ndarray of float, shape (n_points, 2), optional
         Displacements of held directions at full load [m]; zero without.
     """
 
-    def __init__(self, network, reference, forces=None, pressure=None, force=0.0, moves_little=False, prescribed=None):
+    def __init__(
+        self,
+        network: Network,
+        reference: float,
+        forces: np.ndarray | None = None,
+        pressure: FollowerPressure | None = None,
+        force: float = 0.0,
+        moves_little: bool = False,
+        prescribed: np.ndarray | None = None,
+    ) -> None:
         self.network, self.reference, self.prescribed = network, reference, prescribed
         self.forces = np.zeros(network.held.shape) if forces is None else forces
         self.pressure, self.force, self.moves_little = pressure, force, moves_little
         self.outline = oriented_outline(network.mesh)
         self.neighbours = neighbours(self.outline)
         self.displacements = np.zeros(network.held.shape)
-        self._factorised = self._solve = None
+        self._solved = self._solve = None
 
     @property
-    def points(self):
+    def points(self) -> np.ndarray:
         """Where the particles are [m], shape (n_points, 2)."""
         return self.network.mesh.points + self.displacements
 
-    def missing(self, share):
-        """Loads less resistance [N], shape (unknowns,)."""
+    def missing(self, share: float) -> np.ndarray:
+        """Loads less resistance at a share of the load [N], shape (unknowns,)."""
         network, moved = self.network, self.displacements
         load = network.reduce(share * self.forces)
         if self.pressure is not None:
@@ -137,7 +152,7 @@ class Body:
         resistance = network.linear_resistance(moved) if self.moves_little else network.resistance(moved)
         return load - self.reference * resistance
 
-    def tangent(self, share, more=None):
+    def tangent(self, share: float, more: sparray | None = None) -> csc_array:
         """Tangent of resistance less load [N/m], symmetric.
 
         Parameters
@@ -159,22 +174,33 @@ class Body:
         return tangent if more is None else (tangent + more).tocsc()
 
     @cached_property
-    def _rest_tangent(self):
+    def _rest_tangent(self) -> csc_array:
         return (self.reference * self.network.tangent()).tocsc()
 
-    def factorise(self, tangent):
-        """Function that solves with a tangent [m/N], made definite where it is not; the last one is kept."""
-        if self._factorised is tangent:
+    def solver(self, tangent: csc_array) -> Callable[[np.ndarray], np.ndarray]:
+        """Function that solves with a tangent, made definite where it is not; that of the last one is kept.
+
+        Parameters
+        ----------
+        tangent : csc_array, shape (unknowns, unknowns)
+            [N/m]
+
+        Returns
+        -------
+        callable
+            Displacements [m] of forces [N], shape (unknowns,) or (unknowns, n).
+        """
+        if self._solved is tangent:
             return self._solve
         scale = float(np.abs(tangent.diagonal()).mean())
         # A little resistance to any motion: free bodies are held by contact alone, which the tangent does not know.
         for added in SHIFTS:
             matrix = (tangent + added * scale * eye_array(tangent.shape[0], format="csc")).tocsc()
-            factor = factorised(matrix)
+            factor = factorize(matrix, self.network.solver)
             with suppress(SingularError):  # a zero pivot
                 if not factor.negative_pivots:
                     break
-        self._factorised, self._solve = tangent, factor.solve
+        self._solved, self._solve = tangent, factor.solve
         return self._solve
 
 
@@ -191,7 +217,7 @@ class Obstacle:
     points: np.ndarray
     outline: np.ndarray = field(init=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         numbers = np.arange(len(self.points))
         self.outline = np.stack([numbers, np.roll(numbers, -1)], axis=1)
         self.neighbours = neighbours(self.outline)
@@ -216,7 +242,7 @@ class _Sides:
         Whether the body is bent around each corner.
     """
 
-    def __init__(self, body):
+    def __init__(self, body: Body | Obstacle) -> None:
         first, last = body.outline.T
         self.start = body.points[first]
         side = body.points[last] - self.start
@@ -275,7 +301,14 @@ class Contact:
         Coulomb's coefficient of friction [1].
     """
 
-    def __init__(self, bodies, obstacles=(), floor=False, size=1e-3, friction=0.0):
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        obstacles: Sequence[Obstacle] = (),
+        floor: bool = False,
+        size: float = 1e-3,
+        friction: float = 0.0,
+    ) -> None:
         self.bodies, self.obstacles = list(bodies), list(obstacles)
         self.floor, self.size, self.friction = floor, size, friction
         self.all = self.bodies + self.obstacles
@@ -285,7 +318,7 @@ class Contact:
 
     # -- geometry ------------------------------------------------------------------------------------------------------
 
-    def find(self):
+    def find(self) -> Contacts:
         """Corners that are near an edge of another body that faces them: the nearest one of each other body.
 
         Where the edges of the other body turn towards the corner, it has to stay before the next ones as well; where
@@ -296,64 +329,83 @@ class Contact:
         Contacts
         """
         none = np.zeros(0, dtype=int)
-        parts = [(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
-        reach = REACH * self.size
+        parts = [Contacts(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
         sides = [_Sides(body) for body in self.all]
-        for owner, first in enumerate(self.all):
-            corners, outward, wraps = sides[owner].corners, sides[owner].outward, sides[owner].wraps
-            places = first.points[corners]
+        for owner in range(len(self.all)):
             if self.floor and owner < len(self.bodies):
-                near = places[:, 1] <= reach
-                count = int(near.sum())
-                up = np.tile([0.0, 1.0], (count, 1))
-                parts.append(
-                    (np.full(count, owner), corners[near], np.full(count, -1), np.zeros((count, 2), int),
-                     np.zeros(count), up, places[near, 1])
-                )  # fmt: skip
-            for target, second in enumerate(self.all):
-                if target == owner or min(owner, target) >= len(self.bodies):
-                    continue
-                met = sides[target]
-                near = _near(met.start, places, reach)
-                shown = np.flatnonzero(_near(places, met.start, reach + met.length))
-                if not near.any() or not len(shown):
-                    continue
-                after, before = second.neighbours
-                turn = met.turn
-                start, along, length, normals = (
-                    part[shown] for part in (met.start, met.along, met.length, met.normals)
-                )
-                offset = places[near][:, None, :] - start[None, :, :]
-                gaps = np.einsum("nea,ea->ne", offset, normals)
-                shares = np.einsum("nea,ea->ne", offset, along) / length
-                beyond = length * np.maximum(np.maximum(-shares, shares - 1), 0)
-                # Of two edges equally near it is the one that faces the corner.
-                facing = JOINT * self.size * (1 + outward[near] @ normals.T)
-                nearest = (np.hypot(gaps, beyond) + facing).argmin(axis=1)
-                rows, edge = np.flatnonzero(near), shown[nearest]
-                gaps, shares, beyond = (part[np.arange(len(rows)), nearest] for part in (gaps, shares, beyond))
-                at_end, at_start = turn[edge], turn[before[edge]]
-                slack = np.where(wraps[rows], JOINT * self.size / met.length[edge], -1e-9)
-                # Beyond the end of an edge is the next one's place, or nobody's, unless the two make a notch.
-                beside = (shares < np.where(at_start > STRAIGHT, slack, -1e-9)) & (at_start >= -STRAIGHT)
-                beside |= (1 - shares < np.where(at_end > STRAIGHT, slack, -1e-9)) & (at_end >= -STRAIGHT)
-                beside |= np.hypot(gaps, beyond) > reach
-                # The far face of a thin body is turned away from the corner.
-                opposed = np.einsum("na,nba->nb", met.normals[edge], sides[owner].meeting[rows]).min(axis=1) < 0
-                rows, edge = rows[opposed & ~beside], edge[opposed & ~beside]
-                ahead, behind = turn[edge] < -STRAIGHT, turn[before[edge]] < -STRAIGHT
-                rows = np.concatenate([rows, rows[ahead], rows[behind]])
-                edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
-                offset = places[rows] - met.start[edge]
-                shares = np.einsum("na,na->n", offset, met.along[edge]) / met.length[edge]
-                gaps = np.einsum("na,na->n", offset, met.normals[edge])
-                parts.append(
-                    (np.full(len(rows), owner), corners[rows], np.full(len(rows), target), second.outline[edge],
-                     shares, met.normals[edge], gaps)
-                )  # fmt: skip
-        return Contacts(*(np.concatenate(column) for column in zip(*parts)))
+                parts.append(self._on_floor(owner, sides[owner]))
+            for target in range(len(self.all)):
+                if target != owner and min(owner, target) < len(self.bodies):
+                    parts += self._between(owner, sides[owner], target, sides[target])
+        return Contacts(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Contacts)))
 
-    def _rows(self, contacts, directions):
+    def _on_floor(self, owner: int, sides: _Sides) -> Contacts:
+        """Corners of a body near the floor."""
+        places = self.all[owner].points[sides.corners]
+        near = places[:, 1] <= REACH * self.size
+        count = int(near.sum())
+        return Contacts(
+            owners=np.full(count, owner),
+            corners=sides.corners[near],
+            targets=np.full(count, -1),
+            edges=np.zeros((count, 2), int),
+            shares=np.zeros(count),
+            normals=np.tile([0.0, 1.0], (count, 1)),
+            gaps=places[near, 1],
+        )
+
+    def _between(self, owner: int, own: _Sides, target: int, met: _Sides) -> list[Contacts]:
+        """Corners of one body near edges of another one; an empty list where they are far from each other."""
+        places, (after, before) = self.all[owner].points[own.corners], self.all[target].neighbours
+        found = self._facing(places, own, met, before)
+        if found is None:
+            return []
+        rows, edge = found
+        ahead, behind = met.turn[edge] < -STRAIGHT, met.turn[before[edge]] < -STRAIGHT
+        rows = np.concatenate([rows, rows[ahead], rows[behind]])
+        edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
+        offset = places[rows] - met.start[edge]
+        contacts = Contacts(
+            owners=np.full(len(rows), owner),
+            corners=own.corners[rows],
+            targets=np.full(len(rows), target),
+            edges=self.all[target].outline[edge],
+            shares=np.einsum("na,na->n", offset, met.along[edge]) / met.length[edge],
+            normals=met.normals[edge],
+            gaps=np.einsum("na,na->n", offset, met.normals[edge]),
+        )
+        return [contacts]
+
+    def _facing(
+        self, places: np.ndarray, own: _Sides, met: _Sides, before: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Corners near an edge that faces them, by their number in the outline, and the nearest such edge of each."""
+        reach = REACH * self.size
+        near = _near(met.start, places, reach)
+        shown = np.flatnonzero(_near(places, met.start, reach + met.length))
+        if not near.any() or not len(shown):
+            return None
+        start, along, length, normals = (part[shown] for part in (met.start, met.along, met.length, met.normals))
+        offset = places[near][:, None, :] - start[None, :, :]
+        gaps = np.einsum("nea,ea->ne", offset, normals)
+        shares = np.einsum("nea,ea->ne", offset, along) / length
+        beyond = length * np.maximum(np.maximum(-shares, shares - 1), 0)
+        # Of two edges equally near it is the one that faces the corner.
+        facing = JOINT * self.size * (1 + own.outward[near] @ normals.T)
+        nearest = (np.hypot(gaps, beyond) + facing).argmin(axis=1)
+        rows, edge = np.flatnonzero(near), shown[nearest]
+        gaps, shares, beyond = (part[np.arange(len(rows)), nearest] for part in (gaps, shares, beyond))
+        at_end, at_start = met.turn[edge], met.turn[before[edge]]
+        slack = np.where(own.wraps[rows], JOINT * self.size / met.length[edge], -1e-9)
+        # Beyond the end of an edge is the next one's place, or nobody's, unless the two make a notch.
+        beside = (shares < np.where(at_start > STRAIGHT, slack, -1e-9)) & (at_start >= -STRAIGHT)
+        beside |= (1 - shares < np.where(at_end > STRAIGHT, slack, -1e-9)) & (at_end >= -STRAIGHT)
+        beside |= np.hypot(gaps, beyond) > reach
+        # The far face of a thin body is turned away from the corner.
+        opposed = np.einsum("na,nba->nb", met.normals[edge], own.meeting[rows]).min(axis=1) < 0
+        return rows[opposed & ~beside], edge[opposed & ~beside]
+
+    def _rows(self, contacts: Contacts, directions: np.ndarray) -> list[csc_array]:
         """Derivative of the corners' way against the edges along directions, for each body: (unknowns, n_contacts)."""
         count = len(contacts.corners)
         columns = []
@@ -370,7 +422,7 @@ class Contact:
         return columns
 
     @property
-    def penetration(self):
+    def penetration(self) -> float:
         """Largest depth of a corner inside another body or below the floor [m]."""
         deepest = 0.0
         for owner, first in enumerate(self.all):
@@ -384,7 +436,7 @@ class Contact:
 
     # -- mechanics -----------------------------------------------------------------------------------------------------
 
-    def solve(self, first=0.02, smallest=SMALLEST_STEP):
+    def solve(self, first: float = 0.02, smallest: float = SMALLEST_LOAD_STEP) -> None:
         """Equilibrium under the whole load, in load steps that are as long as Newton's method allows.
 
         Parameters
@@ -414,56 +466,83 @@ class Contact:
             if count <= 12:
                 step *= 2.0
 
-    def newton(self, share):
-        """Newton's method at a share of the load; number of steps, or None where it does not converge."""
-        limit = LONGEST_STEP * self.size
+    def newton(self, share: float) -> int | None:
+        """Newton's method at a share of the load.
+
+        Parameters
+        ----------
+        share : float
+            [1]
+
+        Returns
+        -------
+        int or None
+            Number of steps; None where it does not converge.
+        """
         near = False
         for body in self.bodies:
             if body.prescribed is not None:
                 held = body.network.held
                 body.displacements = np.where(held, share * body.prescribed, body.displacements)
-        for count in range(1, MAX_ITERATIONS + 1):
+        for count in range(1, MAX_CONTACT_STEPS + 1):
             self.iterations += 1
-            contacts = self.find()
-            with np.errstate(all="ignore"):
-                missing = [body.missing(share) for body in self.bodies]
-            if not all(np.isfinite(part).all() for part in missing):
+            longest = self._step(share, near)
+            if longest is None:
                 return None
-            known = self._known(contacts)
-            more = self._turning(contacts, known)
-            drag = 0.0
-            if self.friction:
-                rubbing, stiffening, drag = self._friction(contacts, known)
-                missing = [part + force for part, force in zip(missing, rubbing)]
-                more = [_sum(*pair) for pair in zip(more, stiffening)]
-            rows = self._rows(contacts, contacts.normals)
-            try:
-                tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
-                found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
-                if found is None:
-                    found = self._opening(tangents, missing, rows, contacts.gaps, known > 0)
-            except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
-                return None
-            steps, forces = found
-            longest = max(np.abs(part).max() if len(part) else 0.0 for part in steps)
-            if not np.isfinite(longest):
-                return None
-            shorter = min(1.0, limit / longest) if longest > 0 else 1.0
-            for body, part in zip(self.bodies, steps):
-                body.displacements = body.displacements + body.network.expand(shorter * part)
-            self.contacts, self.forces, self.drag = contacts, forces, drag
-            near = longest <= limit
-            if longest <= (FRICTION_TOLERANCE if self.friction else TOLERANCE) * self.size:
+            near = longest <= LONGEST_WAY * self.size
+            if longest <= (FRICTION_TOLERANCE if self.friction else CONTACT_TOLERANCE) * self.size:
                 return None if any(body.network.inverted(body.displacements) for body in self.bodies) else count
         return None
 
-    def _opening(self, tangents, missing, rows, gaps, likely):
+    def _step(self, share: float, near: bool) -> float | None:
+        """One Newton step at a share of the load, no longer than may be: its longest way [m]; None where there is none.
+
+        `near` says whether the step before was short, so that its closed contacts may be taken for those of this one.
+        """
+        contacts = self.find()
+        with np.errstate(all="ignore"):
+            missing = [body.missing(share) for body in self.bodies]
+        if not all(np.isfinite(part).all() for part in missing):
+            return None
+        known = self._known(contacts)
+        more = self._turning(contacts, known)
+        drag = 0.0
+        if self.friction:
+            rubbing, stiffening, drag = self._friction(contacts, known)
+            missing = [part + force for part, force in zip(missing, rubbing)]
+            more = [_sum(*pair) for pair in zip(more, stiffening)]
+        rows = self._rows(contacts, contacts.normals)
+        try:
+            tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
+            found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
+            if found is None:
+                found = self._opening(tangents, missing, rows, contacts.gaps, known > 0)
+        except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
+            return None
+        steps, forces = found
+        longest = max(np.abs(part).max() if len(part) else 0.0 for part in steps)
+        if not np.isfinite(longest):
+            return None
+        shorter = min(1.0, LONGEST_WAY * self.size / longest) if longest > 0 else 1.0
+        for body, part in zip(self.bodies, steps):
+            body.displacements = body.displacements + body.network.expand(shorter * part)
+        self.contacts, self.forces, self.drag = contacts, forces, drag
+        return longest
+
+    def _opening(
+        self,
+        tangents: list[csc_array],
+        missing: list[np.ndarray],
+        rows: list[csc_array],
+        gaps: np.ndarray,
+        likely: np.ndarray,
+    ) -> tuple[list[np.ndarray], np.ndarray]:
         """Steps and contact forces from the quadratic minimum under the conditions of all contacts.
 
         Of many contacts few close: the minimum is found under the conditions of those that are likely to, and of
         those that it breaks besides.
         """
-        solves = [body.factorise(tangent) for body, tangent in zip(self.bodies, tangents)]
+        solves = [body.solver(tangent) for body, tangent in zip(self.bodies, tangents)]
         steps = free = [solve(part) for solve, part in zip(solves, missing)]
         opening = gaps + sum(row.T @ part for row, part in zip(rows, free))
         forces, watched = np.zeros(len(gaps)), np.zeros(0, dtype=int)
@@ -482,7 +561,14 @@ class Contact:
             more = np.flatnonzero(left < min(-GAP * self.size, 0.5 * left.min()))
         return steps, forces
 
-    def _closed(self, tangents, missing, rows, gaps, closed):
+    def _closed(
+        self,
+        tangents: list[csc_array],
+        missing: list[np.ndarray],
+        rows: list[csc_array],
+        gaps: np.ndarray,
+        closed: np.ndarray,
+    ) -> tuple[list[np.ndarray], np.ndarray] | None:
         """Newton step with the contacts that were closed; None where it is not clear which ones are.
 
         Its tangent needs to be definite on what the closed contacts leave free, no more: the step of a true Newton
@@ -510,7 +596,7 @@ class Contact:
             closed = (closed & ~pulls) | closes
         return None
 
-    def _known(self, contacts):
+    def _known(self, contacts: Contacts) -> np.ndarray:
         """Contact forces of the step before on the corners that are still near [N], shape (n_contacts,)."""
         old = self.contacts
         if old is None:
@@ -519,7 +605,7 @@ class Contact:
         keys = zip(contacts.owners, contacts.corners, contacts.targets, contacts.edges[:, 0])
         return np.array([forces.get(key, 0.0) for key in keys])
 
-    def _turning(self, contacts, forces):
+    def _turning(self, contacts: Contacts, forces: np.ndarray) -> list[csc_array | None]:
         """Stiffness of the contact forces as the edges turn that they act on: the curvature of the gaps, by body."""
         parts = [None] * len(self.bodies)
         for number, body in enumerate(self.bodies):
@@ -547,7 +633,7 @@ class Contact:
             parts[number] = body.network.stiffness_of(edges, matrices)
         return parts
 
-    def _friction(self, contacts, forces):
+    def _friction(self, contacts: Contacts, forces: np.ndarray) -> tuple[list[np.ndarray], list[csc_array], np.ndarray]:
         """Forces and stiffness of friction, its normal forces those of the step before; its force at each contact."""
         tangents = np.stack([contacts.normals[:, 1], -contacts.normals[:, 0]], axis=1)
         rows = self._rows(contacts, tangents)
@@ -558,12 +644,10 @@ class Contact:
         size = np.sqrt(slip**2 + width**2)
         pull = self.friction * forces * slip / size
         stiffness = self.friction * forces * width**2 / size**3 + 1e-3 * self.friction * forces / size
-        parts = []
-        for row in rows:
-            parts.append((row @ diags_array(stiffness) @ row.T).tocsc())
+        parts = [(row @ diags_array(stiffness) @ row.T).tocsc() for row in rows]
         return [-(row @ pull) for row in rows], parts, -pull[:, None] * tangents
 
-    def contact_force(self):
+    def contact_force(self) -> np.ndarray:
         """Sum of the contact forces and friction on the bodies from obstacles and floor [N], shape (2,)."""
         bodies = len(self.bodies)
         forces = self.forces[:, None] * self.contacts.normals + self.drag
@@ -572,18 +656,18 @@ class Contact:
         return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
 
 
-def _sum(first, second):
+def _sum(first: csc_array | None, second: csc_array | None) -> csc_array | None:
     """Sum of two matrices, either of which may be missing."""
     return second if first is None else first + second
 
 
-def _near(others, places, reach):
+def _near(others: np.ndarray, places: np.ndarray, reach: np.ndarray | float) -> np.ndarray:
     """Which places are within reach of the box around others, shape (n,)."""
     reach = np.broadcast_to(reach, len(places))[:, None]
     return ((places >= others.min(axis=0) - reach) & (places <= others.max(axis=0) + reach)).all(axis=1)
 
 
-def _depth(places, start, end):
+def _depth(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
     """Largest depth of places inside a polygon of sides from start to end [m]."""
     places = places[_near(start, places, 0.0)]
     offset, side = places[:, None, :] - start, end - start
@@ -597,7 +681,7 @@ def _depth(places, start, end):
     return np.linalg.norm(offset - shares[:, :, None] * side, axis=2).min(axis=1).max(initial=0.0)
 
 
-def _complementary(schur, opening, likely):
+def _complementary(schur: np.ndarray, opening: np.ndarray, likely: np.ndarray) -> np.ndarray:
     """Forces, none negative, that open gaps ``opening + schur @ forces`` to zero or more, and act on closed ones alone.
 
     The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and Kunisch,

@@ -4,12 +4,12 @@ A network whose loads, stiffnesses and energies are over a reference stiffness k
 ``(m/k) u'' + (c/k) u' + r(u) = s p``: masses enter as inertia m/k [s2], dampers as c/k [s], and frequencies and steps
 are in seconds all the same.
 
-Explicit steps factorise nothing, and assemble nothing but the rows of a linear network. They are bounded before the
+Explicit steps factorize nothing, and assemble nothing but the rows of a linear network. They are bounded before the
 run by `Motion.step_limit`; where the bound is not kept, and in every other case of a run that came to nothing, the
 status and the message of a `Run` say so.
 
 A run ends at rest on any equilibrium, be it one that the least push would end: a straight column above its buckling
-load. The tangent where a run came to rest is therefore factorised, once and for all kinds of runs, and its negative
+load. The tangent where a run came to rest is therefore factorized, once and for all kinds of runs, and its negative
 pivots are counted.
 """
 
@@ -17,13 +17,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import cg, eigsh
+from scipy.sparse import csc_array, diags_array, sparray
+from scipy.sparse.linalg import eigsh
 
-from ..linalg.factors import SingularError, factorised
-from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED
+from ..linalg.factors import SingularError
+from ..mesh.cells import Mesh
+from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, BackwardEuler
 from .network import Network
-from .statics import TOLERANCE
+from .newton import TOLERANCE
+from .stepping import make_stepper
 
 CHECK = 64
 """Steps between looks at an explicit run: a look costs about two steps."""
@@ -32,7 +34,7 @@ BLOWN_UP = 1e3
 """Displacement over the largest of the network's extents beyond which a run has left its model."""
 
 
-def masses(mesh, density, thickness):
+def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
     """Lumped mass of each particle [kg], shape (n_points,): a cell of area A gives ``rho A t / n`` to its n corners.
 
     The total is exact; the centre is that of the body for triangles and parallelograms (the paper's equation 1).
@@ -44,16 +46,21 @@ def masses(mesh, density, thickness):
         [kg/m3]
     thickness : float
         [m]
+
+    Returns
+    -------
+    ndarray of float, shape (n_points,)
+        [kg]
     """
     return density * thickness * mesh.particle_areas
 
 
-def centre(mesh, masses):
-    """Centre of mass [m], shape (2,)."""
+def centre(mesh: Mesh, masses: np.ndarray) -> np.ndarray:
+    """Centre of mass [m], shape (2,), of masses [kg] of shape (n_points,)."""
     return masses @ mesh.points / masses.sum()
 
 
-def rayleigh(ratios, frequencies):
+def rayleigh(ratios: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
     r"""Damping in proportion to mass and stiffness that has given ratios at two frequencies.
 
     .. math:: \xi(\omega) = \frac{\alpha}{2 \omega} + \frac{\beta \omega}{2}
@@ -74,6 +81,12 @@ def rayleigh(ratios, frequencies):
     ------
     ValueError
         If the frequencies are equal, or the damping that comes out is negative: the run would gain energy.
+
+    Examples
+    --------
+    >>> alpha, beta = rayleigh((0.02, 0.02), (10.0, 30.0))
+    >>> round(alpha, 6), round(beta, 6)
+    (0.3, 0.001)
     """
     (first, second), (low, high) = ratios, frequencies
     if low == high:
@@ -144,9 +157,33 @@ class Motion:
     ------
     ValueError
         If a particle that can move has no mass, or a damping is negative.
+
+    Examples
+    --------
+    A mass of 1 on a spring of stiffness 1, its frequency 1: explicit steps up to 2 are stable, and it is back after
+    two pi.
+
+    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    >>> held = np.array([[True, True], [False, True], [True, True]])
+    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
+    >>> motion = Motion(network, np.ones(3), linear=True)
+    >>> round(motion.step_limit("central-difference"), 9)
+    2.0
+    >>> start = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]])
+    >>> found = motion.run("central-difference", 2 * np.pi / 1000, 1000, start)
+    >>> found.displacements[1].round(6), found.status
+    (array([0.1, 0. ]), 'moving')
     """
 
-    def __init__(self, network, inertia, load=None, mass_damping=0.0, dampers=None, linear=False):
+    def __init__(
+        self,
+        network: Network,
+        inertia: np.ndarray,
+        load: np.ndarray | None = None,
+        mass_damping: float = 0.0,
+        dampers: np.ndarray | None = None,
+        linear: bool = False,
+    ) -> None:
         self.network, self.linear = network, linear
         self.load = np.zeros(network.held.shape) if load is None else load
         self.mass_damping, self.dampers = mass_damping, dampers
@@ -160,23 +197,23 @@ class Motion:
     # -- before a run -----------------------------------------------------------------------------------------------
 
     @cached_property
-    def mass(self):
+    def mass(self) -> np.ndarray:
         """Inertia of each unknown [s2], shape (unknowns,)."""
         return self.network.reduce(self.inertia)
 
     @cached_property
-    def stiffness_matrix(self):
+    def stiffness_matrix(self) -> csc_array:
         """Tangent at rest [1]."""
         return self.network.tangent()
 
     @cached_property
-    def damper_matrix(self):
+    def damper_matrix(self) -> csc_array | None:
         """Matrix of the dampers along springs at rest [s]; None without any."""
         if self.dampers is None:
             return None
         return Network(self.network.mesh, self.network.held, self.dampers, like=self.network).tangent()
 
-    def damper_tangent(self, displacements):
+    def damper_tangent(self, displacements: np.ndarray) -> csc_array | None:
         """Derivative of the dampers' forces by the velocities [s], the springs turned by displacements [m]; or None."""
         if self.dampers is None or self.linear:
             return self.damper_matrix
@@ -187,24 +224,24 @@ class Motion:
         return self.network.stiffness_of(self.network.mesh.edges, matrices)
 
     @cached_property
-    def particle_bound(self):
+    def particle_bound(self) -> float:
         """Bound of the highest frequency from each particle's springs alone [rad/s]: above `omega_max`, never below.
 
         ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `Network.local_stiffness`.
         """
         return float(np.sqrt((self.network.reduce(self.network.local_stiffness) / self.mass).max()))
 
-    def step_bound(self, integrator):
+    def step_bound(self, integrator: str) -> float:
         """Step that is safe by each particle's stiffness alone, springs undamped [s]; infinite for implicit schemes."""
         return np.inf if integrator in IMPLICIT else 2 / self.particle_bound
 
     @cached_property
-    def omega_max(self):
-        """Highest frequency at rest [rad/s], by Lanczos' method: nothing is factorised."""
+    def omega_max(self) -> float:
+        """Highest frequency at rest [rad/s], by Lanczos' method: nothing is factorized."""
         root = diags_array(1.0 / np.sqrt(self.mass))
         return float(np.sqrt(_largest(root @ self.stiffness_matrix @ root)[0]))
 
-    def step_limit(self, integrator):
+    def step_limit(self, integrator: str) -> float:
         r"""Largest stable step about rest [s]; infinite for implicit schemes.
 
         Without damping that lags it is :math:`2/\omega_{max}`. With such damping, steps h are stable as long as
@@ -215,6 +252,11 @@ class Motion:
         ----------
         integrator : str
             One of `INTEGRATORS`.
+
+        Returns
+        -------
+        float
+            [s]
         """
         if integrator in IMPLICIT:
             return np.inf
@@ -222,7 +264,7 @@ class Motion:
         if self.dampers is None:
             # All modes share alpha, so the highest one goes first.
             xi = 0.5 * alpha / self.omega_max
-            return 2 / self.omega_max * (np.sqrt(1 + xi**2) - xi)
+            return float(2 / self.omega_max * (np.sqrt(1 + xi**2) - xi))
         root = diags_array(1.0 / np.sqrt(self.mass))
         stiffness, damping = (root @ matrix @ root for matrix in (self.stiffness_matrix, self.damper_matrix))
         step, start = 2 / self.omega_max, None
@@ -236,11 +278,16 @@ class Motion:
         return float(step)
 
     @cached_property
-    def loaded_frequency(self):
+    def loaded_frequency(self) -> float:
         """Lowest frequency that the load excites [rad/s]: of the mode with the largest share in the static answer.
 
         By Lanczos' method from that answer, which a symmetric load keeps among the modes that it excites; one
-        factorisation.
+        factorization.
+
+        Raises
+        ------
+        ValueError
+            If there is no load.
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
@@ -261,19 +308,19 @@ class Motion:
         shares = (shapes.T @ (basis @ load)) ** 2 / squares
         return float(np.sqrt(squares[int(np.argmax(shares))]))
 
-    def critical(self):
+    def critical(self) -> "Motion":
         """As it is, with damping in proportion to mass that is critical for the lowest loaded mode."""
         return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
 
     # -- mechanics --------------------------------------------------------------------------------------------------
 
-    def missing(self, displacements):
+    def missing(self, displacements: np.ndarray) -> np.ndarray:
         """Load less resistance [m], shape (unknowns,)."""
         resist = self.network.linear_resistance if self.linear else self.network.resistance
         with np.errstate(over="ignore", invalid="ignore"):
             return self.network.reduce(self.load) - resist(displacements)
 
-    def energy(self, displacements, velocities):
+    def energy(self, displacements: np.ndarray, velocities: np.ndarray) -> float:
         """Kinetic energy, plus that of the network, less the work of the load, over the reference stiffness [m2]."""
         kinetic = 0.5 * float((self.inertia * velocities**2).sum())
         if self.linear:
@@ -282,7 +329,7 @@ class Motion:
             stored = self.network.energy(displacements)
         return kinetic + stored - float((self.load * displacements).sum())
 
-    def residual(self, displacements):
+    def residual(self, displacements: np.ndarray) -> float:
         """Out-of-balance force over the load [1], or without a load, over the reference stiffness [m]."""
         size = np.linalg.norm(self.network.reduce(self.load))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -290,14 +337,24 @@ class Motion:
 
     # -- a run ------------------------------------------------------------------------------------------------------
 
-    def run(self, integrator, step, steps, start=None, velocities=None, *, rest=None, sample=0, precision="float64",
-            stiffness_damping=0.0, iterations=None, tolerance=1e-5):  # fmt: skip
+    def run(
+        self,
+        integrator: str | BackwardEuler,
+        step: float,
+        steps: int,
+        start: np.ndarray | None = None,
+        velocities: np.ndarray | None = None,
+        *,
+        rest: float | None = None,
+        sample: int = 0,
+        precision: str = "float64",
+    ) -> Run:
         """Move for a number of steps, or until rest.
 
         Parameters
         ----------
-        integrator : str
-            One of `INTEGRATORS`.
+        integrator : str or BackwardEuler
+            One of `INTEGRATORS`, ``backward-euler`` also with options.
         step : float
             [s]
         steps : int
@@ -312,79 +369,107 @@ class Motion:
             Steps between samples of energy and momentum; none without.
         precision : str, optional
             ``"float64"`` or ``"float32"``, of explicit schemes.
-        stiffness_damping : float, optional
-            Rayleigh's beta of ``backward-euler`` [s].
-        iterations : int, optional
-            Conjugate-gradient iterations of each step of ``backward-euler``, in place of a factorisation.
-        tolerance : float, optional
-            Relative residual at which they end earlier; SOFA's default.
 
         Returns
         -------
         Run
+
+        Raises
+        ------
+        ValueError
+            If there is no such integrator, or the step is not above zero.
         """
-        if integrator not in INTEGRATORS:
-            raise ValueError(f"unknown integrator '{integrator}'; known: {', '.join(INTEGRATORS)}")
+        name = "backward-euler" if isinstance(integrator, BackwardEuler) else integrator
+        if name not in INTEGRATORS:
+            raise ValueError(f"unknown integrator '{name}'; known: {', '.join(INTEGRATORS)}")
         if not (step > 0 and np.isfinite(step)):
             raise ValueError(f"a step of {step} s; give one above zero")
-        shape = self.network.held.shape
-        u = np.zeros(shape) if start is None else np.array(start, dtype=float)
-        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
-        v[self.network.held] = 0.0
-        if integrator in EXPLICIT:
-            stepper = _Explicit(self, integrator, step, precision)
-        elif integrator == "backward-euler":
-            stepper = _BackwardEuler(self, step, stiffness_damping, iterations, tolerance)
-        else:
-            stepper = _Midpoint(self, step)
-        stepper.begin(u, v)
-        pace = sample or (CHECK if integrator in EXPLICIT else 1)
-        extent = BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
-        done, samples, status, message = 0, [], "moving", ""
+        stepper = make_stepper(self, integrator, step, precision)
+        stepper.begin(*self._beginning(start, velocities))
+        pace = sample or (CHECK if name in EXPLICIT else 1)
+        done, samples = 0, []
         while True:
             u, v = stepper.state()
-            size = np.abs(u).max()
-            if not np.isfinite(size) or size > extent or not np.isfinite(v).all():
-                status, message = "diverged", self._why(integrator, step, done)
-                break
-            if stepper.failed:
-                status, message = "diverged", f"{stepper.failed} in step {done}; take a smaller step"
+            end = self._end(stepper.failed, u, v, name, step, done)
+            if end is not None:
                 break
             if sample:
-                momentum = (self.inertia * v).sum(axis=0)
-                samples.append([done * step, self.energy(u, v), *momentum])
+                samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
             if rest is not None and done and self._at_rest(u, v, rest):
-                status = "rest"
+                end = self._rest_end(u, name, done)
                 break
             if done >= steps:
+                end = self._moving_end(u, rest, steps)
                 break
             count = min(pace, steps - done)
             stepper.advance(count)
             done += count
-        residual = self.residual(u)
-        if status != "diverged" and self.network.inverted(u):
-            status, message = (
-                "inverted",
-                f"triangles are inverted after {done} steps; use less load or smaller steps",
-            )
-        if status == "rest":
-            status, message = self._judge(u)
-            if status == "unstable" and integrator == "backward-euler":
-                message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
-        if status == "moving" and rest is not None:
-            message = f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
         samples = np.array(samples).reshape(-1, 4)
-        return Run(u, v, status, message, done, done * step, residual, self.step_bound(integrator), samples)
+        return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), samples)
 
-    def _at_rest(self, u, v, rest):
+    def _beginning(self, start: np.ndarray | None, velocities: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        shape = self.network.held.shape
+        u = np.zeros(shape) if start is None else np.array(start, dtype=float)
+        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
+        v[self.network.held] = 0.0
+        return u, v
+
+    def _end(
+        self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int
+    ) -> tuple[str, str] | None:
+        """Status and message of a run that came to nothing; None where it may go on."""
+        size = np.abs(u).max()
+        extent = BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
+        if not np.isfinite(size) or size > extent or not np.isfinite(v).all():
+            return "diverged", self._why(integrator, step, done)
+        if failed:
+            return "diverged", f"{failed} in step {done}; take a smaller step"
+        return None
+
+    def _rest_end(self, u: np.ndarray, integrator: str, done: int) -> tuple[str, str]:
+        """Status and message of a run that came to rest."""
+        if self.network.inverted(u):
+            return self._inverted_end(done)
+        status, message = self.judge_rest(u)
+        if status == "unstable" and integrator == "backward-euler":
+            message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
+        return status, message
+
+    def _moving_end(self, u: np.ndarray, rest: float | None, steps: int) -> tuple[str, str]:
+        """Status and message of a run whose steps are all done."""
+        if self.network.inverted(u):
+            return self._inverted_end(steps)
+        if rest is None:
+            return "moving", ""
+        residual = self.residual(u)
+        return "moving", f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
+
+    @staticmethod
+    def _inverted_end(done: int) -> tuple[str, str]:
+        return "inverted", f"triangles are inverted after {done} steps; use less load or smaller steps"
+
+    def _at_rest(self, u: np.ndarray, v: np.ndarray, rest: float) -> bool:
         if self.residual(u) > rest:
             return False
         # Speed that the load would give its particles in free fall through the static displacement.
         work = abs(float((self.load * u).sum())) or 1.0
         return 0.5 * float((self.inertia * v**2).sum()) <= rest**2 * work
 
-    def _judge(self, u):
-        """Status and message of a run that came to rest: whether its equilibrium is stable."""
+    def judge_rest(self, displacements: np.ndarray) -> tuple[str, str]:
+        """Whether an equilibrium is stable: status and message of a run that came to rest there.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+
+        Returns
+        -------
+        status : str
+            ``"rest"`` or ``"unstable"``.
+        message : str
+            Why it is unstable, or was not checked; else empty.
+        """
         network = self.network
         x, y = (network.mesh.points - network.mesh.points.mean(axis=0)).T / np.ptp(network.mesh.points)
         one, none = np.ones(len(x)), np.zeros(len(x))
@@ -392,7 +477,7 @@ class Motion:
         if np.linalg.matrix_rank(motions) < 3:
             return "rest", "the body is free to move as a whole, so whether it is stable was not checked"
         try:
-            pivots = (network.rest_factor if self.linear else network.factorize(u)).negative_pivots
+            pivots = (network.rest_factor if self.linear else network.factorize_tangent(displacements)).negative_pivots
         except SingularError as error:
             return "unstable", f"at rest on a limit point, where the tangent is singular ({error}); use another load"
         if not pivots:
@@ -403,7 +488,7 @@ class Motion:
             f"would end it; push the body sideways, by a force of a thousandth of the load, say, and run again"
         )
 
-    def _why(self, integrator, step, done):
+    def _why(self, integrator: str, step: float, done: int) -> str:
         limit = self.step_limit(integrator)
         if step > limit:
             return (
@@ -413,186 +498,7 @@ class Motion:
         return f"diverged within {done} steps though the step is stable about rest; use a smaller step or load"
 
 
-class _Stepper:
-    """State of a run and how it advances."""
-
-    failed = ""
-
-    def begin(self, u, v):
-        self.u, self.v = u, v
-
-    def state(self):
-        return self.u, self.v
-
-
-class _Explicit(_Stepper):
-    def __init__(self, motion, integrator, step, precision):
-        self.motion, self.step = motion, step
-        self.half = integrator != "symplectic-euler"
-        self.kind = np.dtype(precision).type
-        network = motion.network
-        with np.errstate(divide="ignore"):
-            inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
-        half = 0.5 * motion.mass_damping * step
-        if integrator in LAGGED:
-            keep, gain = np.full(inverse.shape, 1 - 2 * half), step * inverse
-        else:
-            keep, gain = np.full(inverse.shape, (1 - half) / (1 + half)), step * inverse / (1 + half)
-        self.inverse = inverse
-        dampers = np.zeros(0) if motion.dampers is None else motion.dampers
-        if motion.linear:
-            from .kernels import advance_matrix as advance
-
-            matrix = motion.stiffness_matrix  # symmetric: its columns are its rows
-            damping = np.zeros(0) if motion.dampers is None else motion.damper_matrix.data
-            self._as = network.reduce
-            self._back = network.expand
-            index = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
-            arrays = (matrix.data, damping, *map(network.reduce, (keep, gain, motion.load)))
-        elif network.energies:
-            advance, index, arrays = self._advance_energies, (), (keep, gain, motion.load)
-            self._as = self._back = np.array
-        else:
-            from .kernels import advance_springs as advance
-
-            self._as = self._back = np.array
-            index = (network.first.astype(np.int32), network.second.astype(np.int32))
-            arrays = (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, keep, gain, motion.load)
-        self._function, self._index = advance, index
-        self._arrays = [np.ascontiguousarray(part, dtype=self.kind) for part in arrays]
-
-    def begin(self, u, v):
-        if self.half:  # the velocity half a step before the start
-            v = v - 0.5 * self.step * self._acceleration(u, v)
-        self.u = np.ascontiguousarray(self._as(u), dtype=self.kind)
-        self.v = np.ascontiguousarray(self._as(v), dtype=self.kind)
-        self.force = np.zeros_like(self.u)
-
-    def _acceleration(self, u, v):
-        motion = self.motion
-        force = motion.network.expand(motion.missing(u) - _damper_forces(motion, u, v))
-        return force * self.inverse - motion.mass_damping * v
-
-    def advance(self, steps):
-        self._function(*self._index, *self._arrays, self.u, self.v, self.force, self.kind(self.step), steps)
-
-    def _advance_energies(self, keep, gain, load, u, v, force, step, steps):
-        """As the kernels, of a network whose energies are not compiled."""
-        motion = self.motion
-        with np.errstate(over="ignore", invalid="ignore"):
-            for _ in range(steps):
-                at, speed = u.astype(float), v.astype(float)
-                missing = motion.missing(at) - _damper_forces(motion, at, speed)
-                v *= keep
-                v += gain * motion.network.expand(missing)
-                u += step * v
-
-    def state(self):
-        u, v = self._back(self.u).astype(float), self._back(self.v).astype(float)
-        if self.half and np.isfinite(v).all() and np.isfinite(u).all():
-            with np.errstate(over="ignore", invalid="ignore"):
-                v = v + 0.5 * self.step * self._acceleration(u, v)
-        return u, v
-
-
-def _damper_forces(motion, u, v):
-    """Forces of the dampers along springs, shape (unknowns,)."""
-    if motion.dampers is None:
-        return 0.0
-    network = motion.network
-    if motion.linear:
-        return motion.damper_matrix @ network.reduce(v)
-    along = network.rest_vectors + network.stretch(u)
-    rate = np.einsum("ij,ij->i", along, network.stretch(v)) / np.einsum("ij,ij->i", along, along)
-    return -network.gather((motion.dampers * rate)[:, None] * along)
-
-
-class _BackwardEuler(_Stepper):
-    r"""One linear solve a step, as SOFA's EulerImplicitSolver does.
-
-    .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
-    """
-
-    def __init__(self, motion, step, stiffness_damping, iterations, tolerance):
-        self.motion, self.step, self.beta = motion, step, stiffness_damping
-        self.iterations, self.tolerance = iterations, tolerance
-        self.solve = None
-
-    def advance(self, steps):
-        motion, network, h = self.motion, self.motion.network, self.step
-        for _ in range(steps):
-            if self.solve is None or not motion.linear:
-                self.stiffness = motion.stiffness_matrix if motion.linear else network.tangent(self.u)
-                self.damping = motion.damper_tangent(self.u)
-                mass = diags_array(motion.mass * (1 + h * motion.mass_damping))
-                matrix = mass + h * (h + self.beta) * self.stiffness
-                if self.damping is not None:
-                    matrix = matrix + h * self.damping
-                self.solve = self._solver(csc_array(matrix))
-            v = network.reduce(self.v)
-            right = motion.missing(self.u) - (h + self.beta) * (self.stiffness @ v)
-            right -= motion.mass_damping * motion.mass * v
-            if self.damping is not None:
-                right -= self.damping @ v
-            v = v + self.solve(h * right)
-            self.v = network.expand(v)
-            self.u = self.u + h * self.v
-
-    def _solver(self, matrix):
-        if self.iterations is None:
-            return factorised(matrix).solve
-        # SOFA's test is of the residual over the right-hand side, as here.
-        return lambda right: cg(matrix, right, rtol=self.tolerance, maxiter=self.iterations)[0]
-
-
-class _Midpoint(_Stepper):
-    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``."""
-
-    def __init__(self, motion, step):
-        self.motion, self.step = motion, step
-        self.factor = None
-
-    def advance(self, steps):
-        motion, network, h = self.motion, self.motion.network, self.step
-        inertia = 2 / h * motion.mass
-        damping = motion.mass_damping * motion.mass
-        load = float(np.linalg.norm(network.reduce(motion.load)))
-        for _ in range(steps):
-            v = network.reduce(self.v)
-            middle, last, fresh = v.copy(), np.inf, self.factor is None
-            for _ in range(40):
-                at = self.u + 0.5 * h * network.expand(middle)
-                missing = motion.missing(at) - inertia * (middle - v) - damping * middle
-                missing -= _damper_forces(motion, at, network.expand(middle))
-                with np.errstate(over="ignore", invalid="ignore"):
-                    size = float(np.linalg.norm(missing))
-                    scale = float(np.linalg.norm(inertia * v)) + float(np.linalg.norm(motion.missing(self.u))) + load
-                if size <= 1e-12 * scale or scale == 0:
-                    break
-                if not np.isfinite(size):
-                    self.failed = "Newton's method diverged"
-                    return
-                if self.factor is None or (size > 0.1 * last and not fresh):
-                    stiffness = motion.stiffness_matrix if motion.linear else network.tangent(at)
-                    matrix = diags_array(inertia + damping) + 0.5 * h * stiffness
-                    if motion.dampers is not None:
-                        matrix = matrix + motion.damper_tangent(at)
-                    self.factor = factorised(csc_array(matrix))
-                    fresh = True
-                elif size >= last:
-                    if size <= 1e-9 * scale:  # rounding
-                        break
-                    fresh = False
-                middle = middle + self.factor.solve(missing)
-                last = size
-            else:
-                self.failed = "Newton's method did not converge"
-                return
-            self.u = self.u + h * network.expand(middle)
-            self.v = network.expand(2 * middle - v)
-
-
-def _largest(matrix, start=None):
+def _largest(matrix: sparray, start: np.ndarray | None = None) -> tuple[float, np.ndarray]:
     """Largest eigenvalue of a symmetric matrix and its vector."""
     size = matrix.shape[0]
     if size < 40:
@@ -610,13 +516,20 @@ RELAX_CHECK = 40
 """Steps between new estimates of the lowest frequency."""
 
 
-def relax(network, load, *, linear=False, tolerance=TOLERANCE, max_steps=200_000):
+def relax(
+    network: Network,
+    load: np.ndarray,
+    *,
+    linear: bool = False,
+    tolerance: float = TOLERANCE,
+    max_steps: int = 200_000,
+) -> Run:
     r"""Equilibrium by dynamic relaxation: explicit steps with masses and damping made for it.
 
     Masses of twice the row sums of stiffness make a step of 1 stable and all local frequencies alike; the damping is
     critical for the frequency :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` of the motion at
     hand (Underwood, Dynamic relaxation, in: Computational methods for transient analysis, 1983, ch. 5).
-    No step factorises; what came to rest is judged by one factorisation, as a `Motion.run` is.
+    No step factorizes; what came to rest is judged by one factorization, as a `Motion.run` is.
 
     Parameters
     ----------
@@ -649,7 +562,7 @@ def relax(network, load, *, linear=False, tolerance=TOLERANCE, max_steps=200_000
             if network.inverted(u):
                 status, message = "inverted", "triangles are inverted; use a smaller load"
             else:
-                status, message = motion._judge(u)
+                status, message = motion.judge_rest(u)
             return replace(found, status=status, message=message, steps=done)
         resistance = -motion.missing(u)
         if before is not None:

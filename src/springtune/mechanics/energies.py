@@ -17,22 +17,22 @@ import numpy as np
 from ..mesh.cells import DIAGONALS, SIDES
 
 
-def cross(a, b):
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross product of plane vectors in the first axis."""
     return a[0] * b[1] - a[1] * b[0]
 
 
-def dot(a, b):
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar product of plane vectors in the first axis."""
     return a[0] * b[0] + a[1] * b[1]
 
 
-def following(field):
+def following(field: np.ndarray) -> np.ndarray:
     """Values at the next corner of each."""
     return np.roll(field, -1, axis=-2)
 
 
-def preceding(field):
+def preceding(field: np.ndarray) -> np.ndarray:
     """Values at the corner before each."""
     return np.roll(field, 1, axis=-2)
 
@@ -48,15 +48,18 @@ class Energy:
         Particles of each cell, counter-clockwise: all cells of a mesh with so many corners, as in its ``cells``.
     """
 
-    def value(self, displacements):
+    points: np.ndarray
+    corners: np.ndarray
+
+    def value(self, displacements: np.ndarray) -> float:
         """Energy over the reference stiffness [m2] at displacements of shape (n_points, 2)."""
         return float(self._values(self._at_corners(displacements)).sum())
 
-    def forces(self, displacements):
+    def forces(self, displacements: np.ndarray) -> np.ndarray:
         """Derivative of the energy by the corners' positions [m], shape (n_cells, m, 2)."""
         return self._forces(self._at_corners(displacements)).transpose(2, 1, 0)
 
-    def couplings(self, displacements=None):
+    def couplings(self, displacements: np.ndarray | None = None) -> np.ndarray:
         """Blocks of the tangent that couple two corners of a cell [1], shape (n_pairs, 2, 2, n_cells).
 
         Pairs are in the order of `Mesh.cell_edges`; first axes: pair, direction at its first corner, at its second. An
@@ -66,7 +69,7 @@ class Energy:
         moved = np.zeros(self._rest.shape) if displacements is None else self._at_corners(displacements)
         return self._couplings(moved)
 
-    def tangent(self, displacements=None):
+    def tangent(self, displacements: np.ndarray | None = None) -> np.ndarray:
         """Second derivative by the corners' positions [1], shape (n_cells, 2 m, 2 m); at rest without displacements."""
         count, corners = self.corners.shape
         tangent = np.zeros((count, corners, 2, corners, 2))
@@ -78,19 +81,19 @@ class Energy:
         return tangent.reshape(count, 2 * corners, 2 * corners)
 
     @property
-    def key(self):
+    def key(self) -> bytes:
         """Bytes that tell energies of one mesh apart."""
         return type(self).__name__.encode() + b"".join(np.ascontiguousarray(part).tobytes() for part in self._moduli())
 
     @property
-    def _pairs(self):
+    def _pairs(self) -> tuple[tuple[int, int], ...]:
         return SIDES[self.corners.shape[1]] + DIAGONALS[self.corners.shape[1]]
 
     @cached_property
-    def _rest(self):
+    def _rest(self) -> np.ndarray:
         return self._at_corners(self.points)
 
-    def _at_corners(self, field):
+    def _at_corners(self, field: np.ndarray) -> np.ndarray:
         return np.take(np.ascontiguousarray(field.T), self.corners.T, axis=1)
 
 
@@ -112,35 +115,35 @@ class AreaEnergy(Energy):
     corners: np.ndarray
     modulus: np.ndarray
 
-    def _moduli(self):
+    def _moduli(self) -> tuple[np.ndarray, ...]:
         return (self.modulus,)
 
     @staticmethod
-    def _slopes(positions):
+    def _slopes(positions: np.ndarray) -> np.ndarray:
         """Derivative of the area by each corner: half the vector between its neighbours, turned outwards."""
         x, y = 0.5 * (following(positions) - preceding(positions))
         return np.stack([y, -x])
 
     @cached_property
-    def _rest_slopes(self):
+    def _rest_slopes(self) -> np.ndarray:
         return self._slopes(self._rest)
 
     @cached_property
-    def _stiffness(self):
+    def _stiffness(self) -> np.ndarray:
         return self.modulus / (0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0))
 
-    def _growth(self, moved):
+    def _growth(self, moved: np.ndarray) -> np.ndarray:
         moved = moved - moved[:, :1]
         # The area is quadratic in the positions.
         return (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0)
 
-    def _values(self, moved):
+    def _values(self, moved: np.ndarray) -> np.ndarray:
         return 0.5 * self._stiffness * self._growth(moved) ** 2
 
-    def _forces(self, moved):
+    def _forces(self, moved: np.ndarray) -> np.ndarray:
         return self._stiffness * self._growth(moved) * self._slopes(self._rest + moved)
 
-    def _couplings(self, moved):
+    def _couplings(self, moved: np.ndarray) -> np.ndarray:
         slopes, pull = self._slopes(self._rest + moved), 0.5 * self._stiffness * self._growth(moved)
         scaled = self._stiffness * slopes
         blocks = np.stack([scaled[:, None, a] * slopes[None, :, b] for a, b in self._pairs])
@@ -168,10 +171,10 @@ class AngleEnergy(Energy):
     corners: np.ndarray
     modulus: np.ndarray
 
-    def _moduli(self):
+    def _moduli(self) -> tuple[np.ndarray, ...]:
         return (self.modulus,)
 
-    def _change(self, moved):
+    def _change(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Change of each angle [rad], and the vectors from each corner to the next and to the one before."""
         (a, b), (da, db) = ((following(field) - field, preceding(field) - field) for field in (self._rest, moved))
         sine, cosine = cross(a, b), dot(a, b)
@@ -182,23 +185,23 @@ class AngleEnergy(Energy):
         )
         return change, a + da, b + db
 
-    def _values(self, moved):
+    def _values(self, moved: np.ndarray) -> np.ndarray:
         change, _, _ = self._change(moved)
         return 0.5 * self.modulus * (change**2).sum(axis=0)
 
     @staticmethod
-    def _slopes(a, b):
+    def _slopes(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivative of each angle by the position of its next corner and of the one before, shape (2, 3, n_cells)."""
         # The direction of a vector r changes by its turn over r^2.
         (ax, ay), (bx, by) = a / dot(a, a), b / dot(b, b)
         return np.stack([ay, -ax]), np.stack([-by, bx])
 
-    def _forces(self, moved):
+    def _forces(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
         to_next, to_last = (self.modulus * change * slope for slope in self._slopes(a, b))
         return preceding(to_next) + following(to_last) - to_next - to_last
 
-    def _couplings(self, moved):
+    def _couplings(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
         to_next, to_last = self._slopes(a, b)
         own = -to_next - to_last
@@ -244,20 +247,20 @@ class BiquadraticEnergy(Energy):
     tensile: np.ndarray
     coupling: np.ndarray | None = None
 
-    def _moduli(self):
+    def _moduli(self) -> tuple[np.ndarray, ...]:
         return (self.tensile,) if self.coupling is None else (self.tensile, self.coupling)
 
     @staticmethod
-    def _sides(field):
+    def _sides(field: np.ndarray) -> np.ndarray:
         """Side opposite each corner: from the next corner to the one before."""
         return preceding(field) - following(field)
 
     @cached_property
-    def _halves(self):
+    def _halves(self) -> list[np.ndarray | None]:
         """Half the stiffnesses, row by row."""
         return [None if part is None else 0.5 * np.ascontiguousarray(part.T) for part in (self.tensile, self.coupling)]
 
-    def _stresses(self, moved):
+    def _stresses(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Sides, change of their squared lengths, and derivative of the energy by the latter."""
         rest, relative = self._sides(self._rest), self._sides(moved)
         change = dot(2 * rest + relative, relative)
@@ -268,16 +271,16 @@ class BiquadraticEnergy(Energy):
             pull += preceding(coupling * following(following(change))) + following(coupling * following(change))
         return rest + relative, change, pull
 
-    def _values(self, moved):
+    def _values(self, moved: np.ndarray) -> np.ndarray:
         _, change, pull = self._stresses(moved)
         return 0.5 * (change * pull).sum(axis=0)
 
-    def _forces(self, moved):
+    def _forces(self, moved: np.ndarray) -> np.ndarray:
         sides, _, pull = self._stresses(moved)
         along = 2 * pull * sides
         return following(along) - preceding(along)
 
-    def _couplings(self, moved):
+    def _couplings(self, moved: np.ndarray) -> np.ndarray:
         sides, _, pull = self._stresses(moved)
         tensile, coupling = self._halves
         blocks = np.empty((3, 2, 2, sides.shape[2]))

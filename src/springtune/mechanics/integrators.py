@@ -1,4 +1,6 @@
-"""Names of time integrators, and what a run makes of noise."""
+"""Names of time integrators, options of one of them, and what a run makes of noise."""
+
+from dataclasses import dataclass
 
 EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
 """Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
@@ -15,3 +17,22 @@ LAGGED = ("symplectic-euler", "central-difference-lagged")
 
 BEHAVIOURS = ("stable", "decaying", "growing", "nan")
 """Meanings of the flags of ``behaviour``: what a run makes of noise."""
+
+
+@dataclass(frozen=True)
+class BackwardEuler:
+    """The scheme ``backward-euler`` with options, in the place of its name.
+
+    Attributes
+    ----------
+    stiffness_damping : float
+        Rayleigh's beta [s].
+    iterations : int or None
+        Conjugate-gradient iterations of each step; each is solved by a factorization without.
+    tolerance : float
+        Relative residual at which they end earlier [1]; SOFA's default.
+    """
+
+    stiffness_damping: float = 0.0
+    iterations: int | None = None
+    tolerance: float = 1e-5

@@ -8,10 +8,13 @@ with d and g given for each direction: g holds the step over the mass, 0 where a
 allocated or branched on. In single precision all arrays and the step are single.
 """
 
+from collections.abc import Callable
+
+import numpy as np
 from numba import njit
 
 
-def _compiled(function):
+def _compiled(function: Callable) -> Callable:
     """Compiled when first called, and kept on disk where there is a place to write."""
     try:
         return njit(cache=True, error_model="numpy")(function)
@@ -20,7 +23,22 @@ def _compiled(function):
 
 
 @_compiled
-def advance_springs(first, second, rest, lengths, stiffness, dampers, keep, gain, load, u, v, force, step, steps):
+def advance_springs(
+    first: np.ndarray,
+    second: np.ndarray,
+    rest: np.ndarray,
+    lengths: np.ndarray,
+    stiffness: np.ndarray,
+    dampers: np.ndarray,
+    keep: np.ndarray,
+    gain: np.ndarray,
+    load: np.ndarray,
+    u: np.ndarray,
+    v: np.ndarray,
+    force: np.ndarray,
+    step: float,
+    steps: int,
+) -> None:
     """Steps of springs that keep their length law, each with a damper along it.
 
     Parameters
@@ -66,7 +84,20 @@ def advance_springs(first, second, rest, lengths, stiffness, dampers, keep, gain
 
 
 @_compiled
-def advance_matrix(pointers, indices, stiffness, dampers, keep, gain, load, u, v, force, step, steps):
+def advance_matrix(
+    pointers: np.ndarray,
+    indices: np.ndarray,
+    stiffness: np.ndarray,
+    dampers: np.ndarray,
+    keep: np.ndarray,
+    gain: np.ndarray,
+    load: np.ndarray,
+    u: np.ndarray,
+    v: np.ndarray,
+    force: np.ndarray,
+    step: float,
+    steps: int,
+) -> None:
     """Steps of a linear network, from the rows of its stiffness and damping matrices.
 
     Parameters

@@ -12,15 +12,51 @@ mesh that is given: rows of triangles fitted to a box are stretched, and their m
 """
 
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from ..linalg.factors import SingularError
+from ..mesh.cells import Mesh
+from .energies import Energy
 from .network import Network
 
 
-def ends(mesh):
-    """Particles of the left and of the right end, straight or staggered: of outline edges that lie on neither face."""
+class Elastic(Protocol):
+    """What a patch test needs to know of springs: `springtune.springs.Springs` has it.
+
+    Attributes
+    ----------
+    relative : ndarray of float, shape (n_springs,)
+        Stiffness over the reference stiffness [1].
+    energies : tuple of Energy
+        Energies besides the springs'.
+    lateral : float
+        Pull on the faces over the axial stress [1]; 0 for springs that need none.
+    """
+
+    @property
+    def relative(self) -> np.ndarray: ...
+
+    @property
+    def energies(self) -> tuple[Energy, ...]: ...
+
+    @property
+    def lateral(self) -> float: ...
+
+
+def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Particles of the left and of the right end, straight or staggered: of outline edges that lie on neither face.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    left, right : ndarray of int
+        Ascending.
+    """
     y = mesh.points[:, 1]
     tolerance = 1e-9 * np.ptp(y)
     edges = mesh.edges[mesh.on_outline]
@@ -31,11 +67,23 @@ def ends(mesh):
     return np.unique(edges[left]), np.unique(edges[~left])
 
 
-def mean_gradient(mesh, displacements):
-    """Mean displacement gradient over the area [1], shape (2, 2): derivative of row by column."""
+def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
+    """Mean displacement gradient over the area, by the divergence theorem.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    displacements : ndarray of float, shape (n_points, 2)
+        [m]
+
+    Returns
+    -------
+    ndarray of float, shape (2, 2)
+        Derivative of row by column [1].
+    """
     total = np.zeros((2, 2))
     for corners in mesh.cells.values():
-        # By the divergence theorem, side by side around each cell.
+        # Side by side around each cell.
         here, moved = mesh.points[corners], displacements[corners]
         side = np.roll(here, -1, axis=1) - here
         normal = np.stack([side[..., 1], -side[..., 0]], axis=2)
@@ -50,13 +98,28 @@ class PatchTest:
     Parameters
     ----------
     mesh : Mesh
+
+    Examples
+    --------
+    The triangular lattice, each spring the mean of two triangles: Poisson's ratio is a third and ``G / E`` is 3/8.
+
+    >>> from types import SimpleNamespace
+    >>> from springtune.mesh import lattice
+    >>> mesh = lattice(12, 8)
+    >>> test = PatchTest(mesh)
+    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
+    >>> young_modulus, poisson_ratio = test.axial(springs)
+    >>> float((young_modulus * 3**0.5 / 2).round(6)), float(poisson_ratio.round(6))
+    (1.0, 0.333333)
+    >>> round(test.shear(springs) / float(young_modulus), 6)
+    0.375
     """
 
-    def __init__(self, mesh):
+    def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        self._first = {}
+        self._first: dict[str, Network] = {}
 
-    def _network(self, name, held, springs):
+    def _network(self, name: str, held: np.ndarray, springs: Elastic) -> Network:
         network = Network(self.mesh, held, springs.relative, springs.energies, self._first.get(name))
         self._first.setdefault(name, network)
         if network.unknowns and network.rest_factor.negative_pivots:
@@ -64,7 +127,7 @@ class PatchTest:
         return network
 
     @cached_property
-    def _rollers(self):
+    def _rollers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Particles at both ends, directions held and displacements given between rollers."""
         left, right = ends(self.mesh)
         held = np.zeros(self.mesh.points.shape, dtype=bool)
@@ -73,14 +136,14 @@ class PatchTest:
         return left, right, held, np.where(held, self.mesh.points * [1.0, 0.0], 0.0)
 
     @cached_property
-    def _frame(self):
+    def _frame(self) -> tuple[np.ndarray, np.ndarray]:
         """Directions held and displacements given under even shear of the whole outline."""
         held = np.zeros(self.mesh.points.shape, dtype=bool)
         held[self.mesh.edges[self.mesh.on_outline]] = True
         return held, self.mesh.points[:, ::-1] * [1.0, 0.0]
 
-    def axial(self, springs):
-        """See `axial_moduli`."""
+    def axial(self, springs: Elastic) -> tuple[float, float]:
+        """Young's modulus and Poisson's ratio, see `axial_moduli`."""
         mesh, (left, right, held, given) = self.mesh, self._rollers
         network = self._network("rollers", held, springs)
         moved = given + network.expand(network.rest_factor.solve(-network.linear_resistance(given)))
@@ -95,8 +158,8 @@ class PatchTest:
         strain = mean_gradient(mesh, moved)
         return stress / strain[0, 0], -strain[1, 1] / strain[0, 0]
 
-    def shear(self, springs):
-        """See `shear_modulus`."""
+    def shear(self, springs: Elastic) -> float:
+        """Shear modulus, see `shear_modulus`."""
         held, given = self._frame
         network = self._network("frame", held, springs)
         moved = given
@@ -105,7 +168,7 @@ class PatchTest:
         return float((network.linear_forces(moved) * given).sum()) / self.mesh.area
 
 
-def axial_moduli(mesh, springs):
+def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
     """Young's modulus along x and Poisson's ratio, between rollers.
 
     Parameters
@@ -124,12 +187,26 @@ def axial_moduli(mesh, springs):
     ------
     SingularError
         If the network is singular or unstable at rest.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from springtune.mesh import lattice
+    >>> mesh = lattice(12, 8)
+    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
+    >>> [float(modulus.round(6)) for modulus in axial_moduli(mesh, springs)]  # 2 / sqrt(3) and 1 / 3
+    [1.154701, 0.333333]
     """
     return PatchTest(mesh).axial(springs)
 
 
-def shear_modulus(mesh, springs):
+def shear_modulus(mesh: Mesh, springs: Elastic) -> float:
     """Shear modulus under even shear of the whole outline.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    springs : Springs
 
     Returns
     -------
@@ -144,7 +221,7 @@ def shear_modulus(mesh, springs):
     return PatchTest(mesh).shear(springs)
 
 
-def lateral_forces(mesh):
+def lateral_forces(mesh: Mesh) -> np.ndarray:
     """Forces of a unit stress [N/m] that pulls outwards on the lower and the upper face, shape (n_points, 2)."""
     forces = np.zeros(mesh.points.shape)
     y = mesh.points[:, 1]

@@ -1,22 +1,16 @@
-"""The equilibrium path of a network from rest, as power series of its load or of a way along it, and curves from it.
+"""Curves from the equilibrium path of a network from rest: the displacement under many loads at once.
 
-With ``s = F / k`` a uniform network's path u(s) is analytic, so every stiffness k of a sensitivity curve lies on one
-path. A series costs one factorisation and one back-substitution an order (asymptotic numerical method: Cochelin,
-Damil and Potier-Ferry, Revue europeenne des elements finis 3(2):281, 1994); Pade approximants continue it past its
-poles. The nearest of these is the buckling load, even for a beam in tension.
+With ``s = F / k`` every stiffness k of a sensitivity curve lies on one path. It is followed by power series of the
+load, or of a way along it, see `springtune.mechanics.expansion`.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..linalg.factors import SingularError
-
-ORDER = 14
-"""Order of a series that gives a whole curve, as a rule."""
+from ..linalg.factors import Factor, SingularError
+from .expansion import Expansion
+from .statics import StaticProblem
 
 HIGH_ORDER = 16
 """Order of one that the rule does not serve."""
@@ -27,9 +21,6 @@ CURVE_TOLERANCE = 1e-7
 STRETCH = 0.1
 """Change of a spring's length over that at rest from one tangent that is looked at to the next: networks pulled to
 three times their length lose their stability and gain it again within .25."""
-
-STEP = 1e-3
-"""Difference of two approximants over the way from the point that ends a step along the path."""
 
 WAY_ORDER = 10
 """Order of a series along the path."""
@@ -53,248 +44,17 @@ LIMIT = 1e-3
 GROWTH = 8
 """Power of the way along a series with which its error is taken to grow; that of order 10 grows faster."""
 
-MAX_HALVINGS = 6
+MAX_STEP_HALVINGS = 6
 """Of a step at whose end there is no stable equilibrium."""
 
-MAX_FACTORISATIONS = 5
+FEW_FACTORIZATIONS = 5
 """Of a solve from a prediction: from near the path one or two do."""
 
 NEAR = 0.02
 """Distance of a spring's vector from its prediction, over its length, beyond which a solve found another path."""
 
 
-class Expansion:
-    """Power series of the equilibrium path about one of its points.
-
-    With a parameter ``sigma`` displacements, loads, a spring's vector d, its length l and ``w = 1/l`` are power series.
-    From ``l^2 = d.d``, ``w l = 1`` and the force ``k (d - L w d)``, order n follows from lower orders by one solve with
-    the tangent at the point. The parameter is the growth of the load; or, where the load may turn, the way along the
-    path: the displacements' share of their first derivative v, ``sigma = (u - u_0).v / v.v``, as the first order of
-    the load is 1 either way.
-
-    Parameters
-    ----------
-    network : Network
-    load : ndarray of float, shape (unknowns,)
-        Load pattern [1].
-    s : float
-        Force over the reference stiffness at the point [m].
-    displacements : ndarray of float, shape (n_points, 2), or None
-        Equilibrium at the point [m]; None at rest.
-    factor : Factor
-        Tangent factorised there.
-    order : int, optional
-    turning : bool, optional
-        Whether the parameter is the way along the path.
-
-    Attributes
-    ----------
-    coefficients : ndarray of float, shape (order + 1, n_points, 2)
-        The displacements are ``sum_n coefficients[n] sigma^n``.
-    loads : ndarray of float, shape (order + 1,)
-        The loads are ``sum_n loads[n] sigma^n`` [m].
-    """
-
-    def __init__(self, network, load, s, displacements, factor, order=ORDER, turning=False):
-        self.s, self.order, self.turning = s, 0, turning
-        self._network, self._load, self._factor = network, load, factor
-        self.coefficients = np.zeros((1, *network.held.shape))
-        if displacements is not None:
-            self.coefficients[0] = displacements
-        self.loads = np.array([s, 1.0])
-        # Component by component, shape (order + 1, 2, n_springs): sums over orders are then of whole rows.
-        self._d = (network.rest_vectors + network.stretch(self.coefficients[0])).T[None].copy()
-        self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
-        self._inverse = 1.0 / self._length
-        self._first = None
-        self.extend(order)
-
-    def extend(self, order):
-        """Add the orders up to one."""
-        network = self._network
-        d, length, inverse, coefficients = (
-            _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients)
-        )
-        loads = np.zeros(order + 1)
-        loads[: len(self.loads)] = self.loads[: order + 1]
-        weight = network.stiffness * network.rest_lengths
-        for n in range(self.order + 1, order + 1):
-            right, length[n], inverse[n] = self._load, 0.0, 0.0
-            if n > 1:
-                # What lower orders give of order n, as if d[n] were 0.
-                square = np.einsum("nji,nji->i", d[1:n], d[n - 1 : 0 : -1])
-                square -= np.einsum("ni,ni->i", length[1:n], length[n - 1 : 0 : -1])
-                length[n] = 0.5 * square * inverse[0]
-                inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
-                known = np.einsum("ni,nji->ji", inverse[1 : n + 1], d[n - 1 :: -1])
-                right = -network.gather((weight * known).T)
-            change = self._factor.solve(right)
-            if n == 1:
-                self._first = change
-            elif self.turning:
-                loads[n] = -(change @ self._first) / (self._first @ self._first)
-                change += loads[n] * self._first
-            coefficients[n] = network.expand(change)
-            d[n] = network.stretch(coefficients[n]).T
-            along = np.einsum("ji,ji->i", d[0], d[n]) * inverse[0]
-            length[n] += along
-            inverse[n] -= inverse[0] ** 2 * along
-        self._d, self._length, self._inverse, self.coefficients, self.order = d, length, inverse, coefficients, order
-        self.loads = loads
-        for name in ("_products", "_radius"):
-            self.__dict__.pop(name, None)
-        self._denominators = {}
-
-    def predict(self, s):
-        """Displacements at ``s`` [m], shape (n_points, 2), from the series cut off before its smallest term."""
-        powers = (s - self.s) ** np.arange(self.order + 1.0)
-        sizes = np.abs(powers[1:]) * np.linalg.norm(self.coefficients[1:].reshape(self.order, -1), axis=1)
-        kept = 2 + int(np.argmin(sizes))
-        return np.tensordot(powers[:kept], self.coefficients[:kept], axes=1)
-
-    @cached_property
-    def _products(self):
-        """Scalar products of the coefficients, shape (order + 1, order + 1)."""
-        flat = self.coefficients.reshape(self.order + 1, -1)
-        with np.errstate(over="ignore", invalid="ignore"):
-            return flat @ flat.T
-
-    @cached_property
-    def _radius(self):
-        """Value of the parameter that makes the last term as large as the first [m]."""
-        sizes = np.sqrt(np.diag(self._products))
-        return float((sizes[1] / sizes[-1]) ** (1.0 / (self.order - 1))) if sizes[-1] else 1.0
-
-    def _denominator(self, lower):
-        """Coefficients of a denominator whose product with the series has least orders beyond the numerator's.
-
-        In powers of the parameter over the radius.
-        """
-        if lower not in self._denominators:
-            powers = self._radius ** np.arange(self.order + 1.0)
-            scaled = self._products * np.outer(powers, powers)
-            matrix, right = np.zeros((lower, lower)), np.zeros(lower)
-            for n in range(self.order - lower + 1, self.order + 1):
-                rows = np.arange(n - 1, max(n - 1 - lower, 0), -1)
-                matrix[: len(rows), : len(rows)] += scaled[np.ix_(rows, rows)]
-                right[: len(rows)] -= scaled[rows, n]
-            solution = np.linalg.lstsq(matrix, right, rcond=1e-14)[0]
-            self._denominators[lower] = np.concatenate([[1.0], solution])
-        return self._denominators[lower]
-
-    def _shares(self, sigma, less=0):
-        """Factors of the coefficients in their approximant of one denominator, shape (order + 1,).
-
-        The denominator is of half the order, or of a degree `less`. The numerator has the rest where the series is
-        asked for far beyond its radius, and all orders where the path may turn within it.
-        """
-        lower = self.order // 2 - less
-        upper = self.order if self.turning else self.order - lower
-        sums = np.zeros(self.order + 1)
-        sums[: lower + 1] = self._denominator(lower) * (sigma / self._radius) ** np.arange(lower + 1.0)
-        sums = np.cumsum(sums)
-        shares = np.zeros(self.order + 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares[: upper + 1] = sums[upper::-1] / sums[-1] * sigma ** np.arange(upper + 1.0)
-        shares[0] = 1.0
-        return shares
-
-    def at(self, sigma):
-        """Load [m] and displacements [m], shape (n_points, 2), at a value of the parameter: a vector Pade approximant.
-
-        All components share one denominator (Cochelin, Damil and Potier-Ferry, Int. J. Num. Meth. Eng. 37:1187, 1994).
-        """
-        shares = self._shares(sigma)
-        return float(shares @ self.loads), np.tensordot(shares, self.coefficients, axes=1)
-
-    def reach(self, sign):
-        """How far the series is good to start a solve, 0 where it is not; and whether the load turns there.
-
-        Returns
-        -------
-        sigma : float
-            Parameter [m].
-        turns : bool
-            Whether the load is largest there: a limit point of the path.
-        """
-        if not np.isfinite(self._products).all():  # next to a singular point
-            return 0.0, False
-        sigma = 2.0 * sign * self._radius
-        for _ in range(40):
-            shares = self._shares(sigma)
-            apart = shares - self._shares(sigma, 1)
-            way = np.concatenate([[0.0], shares[1:]])
-            close = apart @ self._products @ apart <= STEP**2 * (way @ self._products @ way)
-            if close and abs(apart @ self.loads) <= STEP * abs(way @ self.loads):
-                break
-            sigma *= 0.75
-        loads = [sign * (self._shares(part * sigma) @ self.loads) for part in np.linspace(0.0, 1.0, 33)]
-        falls = np.flatnonzero(np.diff(loads) <= 0)
-        return (sigma * (falls[0] / 32.0), True) if len(falls) else (sigma, False)
-
-    def parameter(self, s, farthest, less=0):
-        """Parameter of a load that lies between the point and that of the parameter `farthest`."""
-        if not self.turning:
-            return s - self.s
-        apart = [self._shares(sigma, less) @ self.loads - s for sigma in (0.0, farthest)]
-        if apart[0] * apart[1] >= 0:  # the last one but for rounding, or for what the approximants differ by
-            return farthest
-        return brentq(lambda sigma: self._shares(sigma, less) @ self.loads - s, 0.0, farthest, xtol=1e-300, rtol=1e-14)
-
-    def value(self, weights, s, farthest):
-        """Weighted sum of the displacements at a load up to that of a parameter, and the estimated relative error."""
-        series = np.tensordot(self.coefficients, weights, axes=2)
-        best, second, third = (self._shares(self.parameter(s, farthest, less), less) @ series for less in range(3))
-        error = max(abs(best - second), abs(second - third)) / abs(best) if best else np.inf
-        return best, error if np.isfinite(error) else np.inf
-
-    def measure(self, weights, s):
-        """Weighted sum of the displacements at each of many ``s``, by Pade approximants.
-
-        Parameters
-        ----------
-        weights : ndarray of float, shape (n_points, 2)
-        s : ndarray of float, shape (n,)
-            Force over the reference stiffness [m].
-
-        Returns
-        -------
-        values : ndarray of float, shape (n,)
-        errors : ndarray of float, shape (n,)
-            Largest difference to the approximants of the two lower orders, relative to the value.
-        """
-        series = np.tensordot(self.coefficients, weights, axes=2)
-        sigma = np.asarray(s) - self.s
-        # Scaled so that all coefficients are of one size: the equations of an approximant are then well-conditioned.
-        scaled = series[1:] * self._radius ** np.arange(1.0, self.order + 1)
-        x = sigma / self._radius
-        half = (self.order - 1) // 2
-        orders = ((half, half + 1), (half, half), (half - 1, half))
-        best, second, third = (series[0] + x * _pade(scaled, *order)(x) for order in orders)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            errors = np.maximum(np.abs(best - second), np.abs(second - third)) / np.abs(best)
-        return best, np.where(np.isfinite(errors), errors, np.inf)
-
-
-def _grown(array, length):
-    """The array with room for more along its first axis."""
-    grown = np.empty((length, *array.shape[1:]))
-    grown[: len(array)] = array
-    return grown
-
-
-def _pade(series, upper, lower):
-    """Pade approximant of a series: numerator of degree `upper` over denominator of degree `lower`, as a function."""
-    padded = np.concatenate([np.zeros(lower), series])
-    matrix = np.array([padded[upper + row : upper + row + lower][::-1] for row in range(1, lower + 1)])
-    # Least squares: where the series needs fewer poles the matrix is singular, and the smallest solution is right.
-    solution = np.linalg.lstsq(matrix, -series[upper + 1 : upper + lower + 1], rcond=1e-14)[0]
-    denominator = np.concatenate([[1.0], solution])
-    numerator = np.convolve(denominator, series)[: upper + 1]
-    return lambda x: np.polyval(numerator[::-1], x) / np.polyval(denominator[::-1], x)
-
-
-def trace(problem, weights, targets):
+def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weighted displacement at many loads on one equilibrium path.
 
     Parameters
@@ -313,6 +73,22 @@ def trace(problem, weights, targets):
     stable : ndarray of bool, shape (n,)
         Whether the path from rest gets there and is stable all the way; other values are of equilibria that the beam
         leaves or does not come to.
+
+    Examples
+    --------
+    A strip of triangles under a pull at its end, all springs of one stiffness: twice the load, twice the displacement
+    and a little less.
+
+    >>> from springtune.mechanics.network import Network
+    >>> from springtune.mesh import MESH_TYPES
+    >>> mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+    >>> x = mesh.points[:, 0]
+    >>> held = np.repeat((x <= x.min())[:, None], 2, axis=1)
+    >>> pulled = np.stack([(x >= x.max()) / (x >= x.max()).sum(), 0 * x], axis=1)
+    >>> problem = StaticProblem(Network(mesh, held, np.ones(len(mesh.edges))), pulled)
+    >>> values, stable = trace(problem, pulled, np.array([1e-4, 2e-4]))
+    >>> bool(stable.all()), float((values[1] / values[0]).round(4))
+    (True, 1.9998)
     """
     path = StablePath(problem, weights, targets)
     return path.values, path.stable
@@ -323,7 +99,7 @@ class _Point:
     """A predicted point, corrected; the tangent is that of the prediction."""
 
     displacements: np.ndarray
-    factor: object
+    factor: Factor
     stable: bool
     value: float
     error: float
@@ -362,7 +138,7 @@ class StablePath:
         Why the path ends before the last target; empty where it does not, or was not followed that far.
     """
 
-    def __init__(self, problem, weights, targets):
+    def __init__(self, problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> None:
         self.problem, self.weights = problem, weights
         targets = np.asarray(targets, dtype=float)
         self._sign = np.sign(targets[0])
@@ -384,8 +160,8 @@ class StablePath:
         values[~found] = np.nan
         self.values, self.stable = values[places], stable[places]
 
-    def value(self, s):
-        """Weighted displacement at a load on the stable path; NaN where it does not get there."""
+    def value(self, s: float) -> float:
+        """Weighted displacement [m] at a load [m] on the stable path; NaN where it does not get there."""
         load = abs(s)
         series = self._series_of(load)
         if series is None:
@@ -394,7 +170,7 @@ class StablePath:
 
     # -- series of the load -----------------------------------------------------------------------------------------
 
-    def _by_series(self, loads):
+    def _by_series(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
         """Displacements by the series about rest, and by some about points that it gives where all beyond need them.
 
         Returns
@@ -412,13 +188,8 @@ class StablePath:
             values, errors = rest.measure(self.weights, loads)
         good, count, served, before = errors <= CURVE_TOLERANCE, 0, errors <= CURVE_TOLERANCE, None
         for _ in range(MAX_SERIES):
-            number = len(served) if served.all() else int(np.argmin(served))
-            while number > 0:
-                point = self._point(series, loads[count + number - 1], values[count + number - 1])
-                if point is not None and point.error <= CURVE_TOLERANCE:
-                    break
-                number -= 1 + number // 8
-            if number <= 0:
+            number, point = self._proved(series, loads[count:], values[count:], served)
+            if point is None:
                 break
             count += number
             self._series.append((series, abs(loads[count - 1])))
@@ -430,7 +201,7 @@ class StablePath:
                 self._turns = True
                 break
             try:
-                factor = self.problem.network.factorize(point.displacements)
+                factor = self.problem.network.factorize_tangent(point.displacements)
             except SingularError:
                 break
             displacements = before = point.displacements
@@ -441,23 +212,35 @@ class StablePath:
             served = errors <= CURVE_TOLERANCE
         return values, good, count
 
-    def _series_of(self, load):
+    def _proved(
+        self, series: Expansion, loads: np.ndarray, values: np.ndarray, served: np.ndarray
+    ) -> tuple[int, _Point | None]:
+        """How many loads in a row a series serves, proved by the point at the last of them; and that point."""
+        number = len(served) if served.all() else int(np.argmin(served))
+        while number > 0:
+            point = self._point(series, loads[number - 1], values[number - 1])
+            if point is not None and point.error <= CURVE_TOLERANCE:
+                return number, point
+            number -= 1 + number // 8
+        return 0, None
+
+    def _series_of(self, load: float) -> Expansion | None:
         """The series that serves a load; None where none does."""
         return next((series for series, last in self._series if load <= last), None)
 
-    def _point(self, series, s, value):
+    def _point(self, series: Expansion, s: float, value: float) -> _Point | None:
         """The point at a load that a series predicts; None where there is none."""
         network = self.problem.network
         displacements = series.at(s - series.s)[1]
         if not np.isfinite(displacements).all() or network.inverted(displacements):
             return None
         try:
-            factor = network.factorize(displacements)
+            factor = network.factorize_tangent(displacements)
             return self._corrected(s, value, displacements, factor, factor.negative_pivots == 0)
         except SingularError:
             return None
 
-    def _corrected(self, s, value, displacements, factor, stable):
+    def _corrected(self, s: float, value: float, displacements: np.ndarray, factor: Factor, stable: bool) -> _Point:
         """A predicted point, corrected by steps with one tangent; its error is that of a value."""
         network = self.problem.network
         size = before = np.inf
@@ -475,7 +258,7 @@ class StablePath:
         error = abs(better - value) / abs(better) if size <= CURVE_TOLERANCE else np.inf
         return _Point(displacements, factor, stable, better, error, size <= 0.01 * CURVE_TOLERANCE)
 
-    def _bracket(self, last, point, before):
+    def _bracket(self, last: float, point: _Point, before: np.ndarray | None) -> None:
         """Look at the stability between the point up to which the path is stable and the last of a series."""
         first = self.stable_to
         steps = 1 + int(self._stretched(point.displacements, 0.0 if before is None else before) / STRETCH)
@@ -485,7 +268,7 @@ class StablePath:
                 break
             self.stable_to = load
 
-    def _stretched(self, displacements, before):
+    def _stretched(self, displacements: np.ndarray, before: np.ndarray | float) -> float:
         """Largest change of a spring's length from one place to another, over that at rest [1]."""
         network = self.problem.network
         lengths = [
@@ -494,12 +277,12 @@ class StablePath:
         ]
         return float((np.abs(lengths[1] - lengths[0]) / network.rest_lengths).max())
 
-    def _stable_at(self, load):
+    def _stable_at(self, load: float) -> bool:
         """Whether the point that a series of the load predicts is stable."""
         series = self._series_of(load)
         return self.problem.network.is_stable(series.at(self._sign * load - series.s)[1])
 
-    def _is_stable(self, load):
+    def _is_stable(self, load: float) -> bool:
         """Whether the path is stable up to a load that a series serves."""
         if self.stable_to < load < self._unstable_from:
             if self._stable_at(load):
@@ -508,7 +291,7 @@ class StablePath:
                 self._unstable_from = load
         return load <= self.stable_to
 
-    def _count_stable(self, loads):
+    def _count_stable(self, loads: np.ndarray) -> int:
         """How many loads are on the stable path, by bisection."""
         least, most = 0, len(loads)
         while least < most:
@@ -519,7 +302,7 @@ class StablePath:
                 most = middle - 1
         return least
 
-    def _check_between(self, loads, values, stable):
+    def _check_between(self, loads: np.ndarray, values: np.ndarray, stable: np.ndarray) -> None:
         """Correct values that differ from what those on both sides say: an approximant may have a pole beside a zero.
 
         A factor from near by is good enough to see it.
@@ -535,7 +318,7 @@ class StablePath:
                 values[place] = point.value if point.converged else self._solved(s, guess)
                 stable[place] = np.isfinite(values[place])
 
-    def _check_others(self, loads, values, good, found):
+    def _check_others(self, loads: np.ndarray, values: np.ndarray, good: np.ndarray, found: np.ndarray) -> None:
         """Keep values of the series about rest beyond the stable path: of equilibria, though not of that path."""
         rest, others = self.problem.rest, np.flatnonzero(good & ~found)
         for group in np.split(others, np.flatnonzero(np.diff(others) > 1) + 1):
@@ -552,7 +335,9 @@ class StablePath:
 
     # -- beyond it --------------------------------------------------------------------------------------------------
 
-    def _follow(self, loads, values, good, stable, found):
+    def _follow(
+        self, loads: np.ndarray, values: np.ndarray, good: np.ndarray, stable: np.ndarray, found: np.ndarray
+    ) -> None:
         """Values at the loads that the series about rest does not serve, as far as the path is stable."""
         if self._turns and self.problem.network.unknowns > MOST_UNKNOWNS:
             return
@@ -564,14 +349,14 @@ class StablePath:
             if self.end and abs(loads[place]) > self.stable_to:
                 return
 
-    def _elsewhere(self, s):
+    def _elsewhere(self, s: float) -> bool:
         """Whether the series about rest is by now of another path, which the beam would leave."""
         network, displacements = self.problem.network, self.problem.rest.at(s)[1]
         missing = s * self.problem.load - network.resistance(displacements)
         near = np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm
         return near and not network.is_stable(displacements)
 
-    def _reach(self, load):
+    def _reach(self, load: float) -> float:
         """Weighted displacement at a load beyond the series; NaN where the stable path does not get there."""
         while self.stable_to < load and not self.end:
             self._advance(load)
@@ -585,13 +370,13 @@ class StablePath:
             return value
         return self._solved(s, series.at(sigma)[1])
 
-    def _missed(self, displacements, guess):
+    def _missed(self, displacements: np.ndarray, guess: np.ndarray) -> float:
         """Relative error of the weighted displacement of a guess."""
         value = np.tensordot(displacements, self.weights, axes=2)
         return abs(np.tensordot(guess, self.weights, axes=2) / value - 1.0)
 
-    def _solve(self, s, guess):
-        """Displacements of the equilibrium next to a guess and its tangent factorised; None where there is none.
+    def _solve(self, s: float, guess: np.ndarray) -> tuple[np.ndarray | None, Factor | None]:
+        """Displacements of the equilibrium next to a guess and its tangent factorized; None where there is none.
 
         Returns
         -------
@@ -602,7 +387,7 @@ class StablePath:
         network = self.problem.network
         if network.inverted(guess):
             return None, None
-        found = self.problem.newton(s, guess, MAX_FACTORISATIONS)
+        found = self.problem.newton(s, guess, FEW_FACTORIZATIONS)
         if not found.converged or network.largest_change(found.displacements - guess) > NEAR:
             return None, None
         try:
@@ -610,25 +395,27 @@ class StablePath:
         except SingularError:
             return found.displacements, None
 
-    def _solved(self, s, guess):
+    def _solved(self, s: float, guess: np.ndarray) -> float:
         """Weighted displacement of the stable equilibrium next to a guess; NaN where there is none."""
         displacements, factor = self._solve(s, guess)
         return np.nan if factor is None else float(np.tensordot(displacements, self.weights, axes=2))
 
-    def _advance(self, load):
-        """One more step along the path, towards a load."""
-        network = self.problem.network
+    def _last_point(self) -> tuple[float, np.ndarray | None, Factor | None]:
+        """Load, displacements (None at rest) and tangent of the last point; no tangent where it is not stable."""
         if self._pieces:
-            s, displacements, factor = self._last
-        else:
-            s, displacements, factor = 0.0, None, self.problem.rest_factor
-            if self.stable_to:
-                s = self._sign * self.stable_to
-                displacements, factor = self._solve(s, self._far.displacements)
-                if factor is None:
-                    self.end = "no stable equilibrium found"
-                    return
-        series = Expansion(network, self.problem.load, s, displacements, factor, WAY_ORDER, turning=True)
+            return self._last
+        if not self.stable_to:
+            return 0.0, None, self.problem.rest_factor
+        s = self._sign * self.stable_to
+        return s, *self._solve(s, self._far.displacements)
+
+    def _advance(self, load: float) -> None:
+        """One more step along the path, towards a load."""
+        s, displacements, factor = self._last_point()
+        if factor is None:
+            self.end = "no stable equilibrium found"
+            return
+        series = Expansion(self.problem.network, self.problem.load, s, displacements, factor, WAY_ORDER, turning=True)
         farthest, turns = series.reach(self._sign)
         most = abs(series.at(farthest)[0])
         if turns and most - abs(s) <= LIMIT * most and load >= most:
@@ -641,8 +428,12 @@ class StablePath:
         start = 0.0 if displacements is None else displacements
         while self._stretched(series.at(farthest)[1], start) > STRETCH:
             farthest *= 0.75
+        self._end_step(series, farthest)
+
+    def _end_step(self, series: Expansion, farthest: float) -> None:
+        """Find the stable equilibrium at the end of a step, halved until there is one."""
         unstable = np.inf
-        for _ in range(MAX_HALVINGS):
+        for _ in range(MAX_STEP_HALVINGS):
             s, guess = series.at(farthest)
             displacements, factor = self._solve(s, guess) if farthest else (None, None)
             if factor is not None:
@@ -659,21 +450,27 @@ class StablePath:
 
 
 class LinearPath:
-    """As `StablePath`, of a network with linear kinematics, whose displacements are in proportion to the load."""
+    """As `StablePath`, of a network with linear kinematics, whose displacements are in proportion to the load.
+
+    Parameters
+    ----------
+    problem, weights, targets
+        As of `StablePath`.
+    """
 
     end = ""
 
-    def __init__(self, problem, weights, targets):
+    def __init__(self, problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> None:
         self._slope = float(np.tensordot(problem.slope, weights, axes=2))
         self.values, self.stable = self._slope * targets, np.ones(len(targets), dtype=bool)
         self.stable_to = np.inf
 
-    def value(self, s):
-        """Weighted displacement at a load."""
+    def value(self, s: float) -> float:
+        """Weighted displacement [m] at a load [m]."""
         return self._slope * s
 
 
-def left_out(x, y):
+def left_out(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """What values differ by from the polynomials through three neighbours on either side.
 
     Parameters
@@ -698,31 +495,3 @@ def left_out(x, y):
     ratios[:, diagonal, diagonal] = among[:, diagonal, diagonal] = 1.0
     result[places] = y[places] - ((ratios / among).prod(axis=2) * values).sum(axis=1)
     return result
-
-
-def smallest_share(network, first, second, factor=None):
-    """Where on the line from one tangent to another the first eigenvalue vanishes: 0 at the first, 1 at the second.
-
-    The tangent there is ``K1 + x (K2 - K1)``, singular first at one over the largest eigenvalue of
-    ``(K1 - K2) v = mu K1 v``.
-
-    Parameters
-    ----------
-    network : Network
-    first, second : ndarray of float, shape (n_points, 2)
-        Displacements [m]; None at rest.
-    factor : Factor, optional
-        First tangent factorised.
-
-    Returns
-    -------
-    float
-        Infinite where there is no such place.
-    """
-    here, there = network.tangent(first), network.tangent(second)
-    factor = factor or network.factorize(first)
-    inverse = LinearOperator(here.shape, factor.solve, dtype=float)
-    # A fixed start, across the beam, since buckling bends it: the same numbers in every run.
-    start = network.reduce(network.mesh.points[:, ::-1] ** 2 * [0.0, 1.0] + 1e-3 * network.mesh.points)
-    largest = eigsh(here - there, 1, here, which="LA", Minv=inverse, v0=start, tol=1e-4, return_eigenvectors=False)[0]
-    return 1.0 / largest if largest > 0 else np.inf

@@ -4,37 +4,18 @@ The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is t
 [m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..linalg.factors import SingularError
+from ..linalg.factors import Factor, SingularError
+from ..mesh.cells import Mesh
 from ..problem.status import Status
-from .series import Expansion
-
-TOLERANCE = 1e-10
-"""Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
-
-MAX_ITERATIONS = 16
-MAX_HALVINGS = 12
-CORRECTION = 1e-6
-"""Largest estimated error of a solution's displacements: a residual alone says nothing where the stiffness is
-ill-conditioned."""
-
-REFINED = 1e-9
-"""Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
-
-REPRESENTATION = 4.0
-"""Residual that counts as balance, over what rounding of the displacements alone makes of it."""
-
-WATCHED = 4
-"""Steps of Newton's method in a row that may leave the residual above the least one seen: a slender beam that turns is
-stretched by one step and released by the next."""
-
-LONGEST_STEP = 0.5
-"""Largest change of a spring's vector over its length in such a step."""
+from .expansion import Expansion
+from .network import Network
+from .newton import KEEP_TANGENT, MAX_FACTORIZATIONS, Equilibrium, Iterate, Newton, norm, refine, uncertainty
 
 FAR = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
@@ -57,50 +38,8 @@ MODES = 24
 MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
 
-KEEP_TANGENT = 0.03
-"""Share of the residual that a step may leave for its tangent to serve once more."""
-
 START_ORDER = 3
-"""Orders of the series that starts Newton's method: together they cost half of a factorisation."""
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """What a solve found.
-
-    Attributes
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        Displacement of each particle [m]; of the last iterate where it did not converge.
-    converged : bool
-    iterations : int
-        Newton steps.
-    residual : float
-        Norm of the out-of-balance force over that of the load [1].
-    factor : Factor or None
-        Factorised tangent: that at the solution, where it converged.
-    reason : str
-        Why it did not converge, empty where it did.
-    error_estimate : float
-        Estimated error of the displacements over their size [1]; NaN where there is no balance.
-    unstable_share : float
-        Share of the load at which the path to it is unstable [1]; NaN where no such place is known.
-    load_share : float
-        Largest share of the load at which there is a good equilibrium [1]; 1 where it converged.
-    last : ndarray of float, shape (n_points, 2), or None
-        Displacements at that share, where it is below 1.
-    """
-
-    displacements: np.ndarray
-    converged: bool
-    iterations: int
-    residual: float
-    factor: object
-    reason: str = ""
-    error_estimate: float = np.nan
-    unstable_share: float = np.nan
-    load_share: float = 1.0
-    last: np.ndarray | None = None
+"""Orders of the series that starts Newton's method: together they cost half of a factorization."""
 
 
 class FollowerPressure:
@@ -117,7 +56,7 @@ class FollowerPressure:
         Axis along the side; the force is along the other one.
     """
 
-    def __init__(self, mesh, edges, axis):
+    def __init__(self, mesh: Mesh, edges: np.ndarray, axis: int) -> None:
         along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
         self.edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)
         self.rest = mesh.points[self.edges[:, 1]] - mesh.points[self.edges[:, 0]]
@@ -126,8 +65,19 @@ class FollowerPressure:
         half = np.block([-self.turn, self.turn])
         self.derivative = np.broadcast_to(np.vstack([half, half]), (len(edges), 4, 4))
 
-    def forces(self, displacements):
-        """Forces on the particles [1], shape (n_points, 2)."""
+    def forces(self, displacements: np.ndarray) -> np.ndarray:
+        """Forces on the particles.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+
+        Returns
+        -------
+        ndarray of float, shape (n_points, 2)
+            [1]
+        """
         sides = self.rest + displacements[self.edges[:, 1]] - displacements[self.edges[:, 0]]
         field = np.zeros(displacements.shape)
         np.add.at(field, self.edges, (sides @ self.turn.T)[:, None, :])
@@ -144,48 +94,66 @@ class StaticProblem:
         Forces on the particles [1]; scaled by ``s``.
     follower : FollowerPressure, optional
         What the forces become as the particles move; they stay as they are without.
+
+    Attributes
+    ----------
+    load : ndarray of float, shape (unknowns,)
+        The pattern's part on free directions [1].
+    load_norm : float
+        [1]
+
+    Examples
+    --------
+    A spring of length 1 and stiffness 1 between a clamp and a roller, pulled by a force of a tenth of the stiffness:
+
+    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    >>> held = np.array([[True, True], [False, True], [True, True]])
+    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
+    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]))
+    >>> found = problem.nonlinear(0.1)
+    >>> found.displacements[1].round(12), found.converged, problem.stability(0.1, found.displacements, found.factor)
+    (array([0.1, 0. ]), True, (0, False))
     """
 
-    def __init__(self, network, pattern, follower=None):
+    def __init__(self, network: Network, pattern: np.ndarray, follower: FollowerPressure | None = None) -> None:
         self.network = network
         self.follower = follower
         self.load = network.reduce(pattern)
         self.load_norm = float(np.linalg.norm(self.load))
 
     @property
-    def rest_factor(self):
-        """Tangent factorised at rest, shared by all loads of the network."""
+    def rest_factor(self) -> Factor:
+        """Tangent factorized at rest, shared by all loads of the network."""
         return self.network.rest_factor
 
     @cached_property
-    def _slope(self):
+    def _slope(self) -> tuple[np.ndarray, float, float]:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
 
-        def balance(slope):
+        def balance(slope: np.ndarray) -> tuple[np.ndarray, float]:
             missing = self.load - self.network.linear_resistance(slope)
-            return missing, _norm(missing) / self.load_norm
+            return missing, norm(missing) / self.load_norm
 
         first = self.network.expand(self.rest_factor.solve(self.load))
-        here, correction = self._refine((first, *balance(first)), self.rest_factor, balance, linear=True)
-        slope, _, residual = here
-        return slope, residual, correction
+        here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
+        return here.displacements, here.residual, error
 
     @property
-    def slope(self):
+    def slope(self) -> np.ndarray:
         """Displacements of the linear network over ``s`` [1], shape (n_points, 2)."""
         return self._slope[0]
 
     @cached_property
-    def start(self):
+    def start(self) -> Expansion:
         """Short series about rest: where Newton's method starts."""
         return Expansion(self.network, self.load, 0.0, None, self.rest_factor, order=START_ORDER)
 
     @cached_property
-    def rest(self):
+    def rest(self) -> Expansion:
         """Long series about rest, for a whole curve."""
         return Expansion(self.network, self.load, 0.0, None, self.rest_factor)
 
-    def linear(self, s):
+    def linear(self, s: float) -> Equilibrium:
         """Equilibrium of the network with linear kinematics.
 
         Parameters
@@ -197,55 +165,11 @@ class StaticProblem:
         -------
         Equilibrium
         """
-        slope, residual, correction = self._slope
-        reason = "" if correction <= CORRECTION else _uncertain(correction)
-        return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, correction)
+        slope, residual, error = self._slope
+        reason = uncertainty(error)
+        return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, error)
 
-    def _correction(self, factor, missing, displacements, linear=False):
-        """Estimated error of displacements over their size [1].
-
-        The Newton step that is left, and what rounding of the forces does to the displacements.
-
-        Parameters
-        ----------
-        factor : Factor
-            Tangent factorised near them.
-        missing : ndarray of float, shape (unknowns,)
-            Load less resistance [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-        linear : bool, optional
-            Whether the network has linear kinematics.
-        """
-        rounding = self.network.rounding(displacements, linear)
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
-        return _norm(factor.estimate(missing + signs * rounding)) / (_norm(displacements.ravel()) or 1.0)
-
-    def _balanced(self, s, displacements, residual):
-        """Whether a residual is within the tolerance, or what rounding of the displacements alone makes of it."""
-        if residual <= TOLERANCE:
-            return True
-        rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
-        return residual * abs(s) * self.load_norm <= REPRESENTATION * _norm(rounding)
-
-    def negative_pivots(self, s, found):
-        """Number of negative eigenvalues of the tangent at an equilibrium; 0 where it is stable under dead loads.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        found : Equilibrium
-            Its factor is that of the tangent there.
-
-        Raises
-        ------
-        SingularError
-            If the tangent is singular, as it is at a limit point.
-        """
-        return self.stability(s, found.displacements, found.factor)[0]
-
-    def stability(self, s, displacements, factor):
+    def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
         """Whether an equilibrium is stable.
 
         Parameters
@@ -255,7 +179,7 @@ class StaticProblem:
         displacements : ndarray of float, shape (n_points, 2)
             [m]
         factor : Factor
-            Tangent factorised there; that at rest for linear kinematics.
+            Tangent factorized there; that at rest for linear kinematics.
 
         Returns
         -------
@@ -275,7 +199,7 @@ class StaticProblem:
         merged = np.abs(modes.imag) > MERGED * np.abs(modes)
         return int((modes.real < 0)[~merged].sum()), bool(merged.any())
 
-    def modes(self, s, displacements, factor):
+    def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
         """Eigenvalues nearest to zero of the tangent over the masses, at an equilibrium under a follower pressure.
 
         Such a tangent is not symmetric: besides one of them passing zero, where a beam buckles, two may merge and leave
@@ -289,7 +213,7 @@ class StaticProblem:
         displacements : ndarray of float, shape (n_points, 2)
             [m]
         factor : Factor
-            Tangent factorised there.
+            Tangent factorized there.
 
         Returns
         -------
@@ -307,7 +231,7 @@ class StaticProblem:
         start = np.random.default_rng(0).standard_normal(len(mass))
         return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
 
-    def judge(self, s, found):
+    def judge(self, s: float, found: Equilibrium):
         """What an equilibrium is worth.
 
         Parameters
@@ -345,7 +269,7 @@ class StaticProblem:
             return Status.UNSTABLE, f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
         return Status.SOLVED, "", pivots
 
-    def nonlinear(self, s):
+    def nonlinear(self, s: float) -> Equilibrium:
         """Equilibrium of the network with its springs' full length law.
 
         Newton's method from the series about rest; where that fails, from the linear solution, which next to buckling
@@ -376,122 +300,63 @@ class StaticProblem:
                 break
         return self._in_steps(s, iterations)
 
-    def _unstable(self, s, found):
+    def _unstable(self, s: float, found: Equilibrium) -> bool:
         """Whether a path leaves an equilibrium; flutter on the way is no matter of where it leads."""
         try:
             return self.stability(s, found.displacements, found.factor)[0] > 0
         except SingularError:
             return True
 
-    def _balance(self, s, displacements):
-        """Load less resistance [m], and its norm over that of the load [1]."""
-        load = self.load if self.follower is None else self.network.reduce(self.follower.forces(displacements))
-        missing = s * load - self.network.resistance(displacements)
-        return missing, _norm(missing) / (abs(s) * self.load_norm)
-
-    def _factorize(self, s, displacements):
-        return self.network.factorize(displacements, self.follower and (s, self.follower))
-
-    def newton(self, s, start, max_iterations=MAX_ITERATIONS):
-        """Newton's method with the exact tangent.
-
-        A few steps may leave the residual above the least one seen, before the iterate with that is taken up again and
-        steps are halved until the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell,
-        Math. Programming Study 16:1, 1982). No step may invert a cell. A factorised tangent serves as long as its steps
-        cut the residual by `KEEP_TANGENT`: near the solution a new one costs ten such steps.
+    def balance(self, s: float, displacements: np.ndarray) -> tuple[np.ndarray, float]:
+        """Load less resistance, and its norm over that of the load.
 
         Parameters
         ----------
         s : float
             Force over the reference stiffness [m].
-        start : ndarray of float, shape (n_points, 2)
-            First guess of the displacements [m].
-        max_iterations : int, optional
-            Largest number of factorisations on the way; one more is that of the tangent at the solution.
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
 
         Returns
         -------
-        Equilibrium
+        missing : ndarray of float, shape (unknowns,)
+            [m]
+        residual : float
+            [1]
         """
-        network = self.network
-        here = start, *self._balance(s, start)  # displacements, what is missing and the residual
-        if not np.isfinite(here[2]) or network.inverted(start):
-            here = np.zeros_like(start), s * self.load, 1.0
-        factor, factorised, steps, keep = None, 0, 0, False
-        best, since, watched = here, 0, True
+        missing = s * self.load_at(displacements) - self.network.resistance(displacements)
+        return missing, norm(missing) / (abs(s) * self.load_norm)
 
-        def end(reason):
-            return Equilibrium(here[0], False, steps, here[2], factor, reason)
+    def load_at(self, displacements: np.ndarray) -> np.ndarray:
+        """Load pattern at displacements [m] of shape (n_points, 2), a follower's turned with them: [1], (unknowns,)."""
+        return self.load if self.follower is None else self.network.reduce(self.follower.forces(displacements))
 
-        while not self._balanced(s, here[0], here[2]):
-            if not keep:
-                if factorised == max_iterations:
-                    return end("too many iterations")
-                factor = None  # which gives its room back
-                try:
-                    factor = self._factorize(s, here[0])
-                except SingularError:
-                    return end("singular tangent")
-                factorised += 1
-            step = network.expand(factor.solve(here[1]))
-            there = self._step(s, here, step, halvings=0 if watched else MAX_HALVINGS)
-            lower = there is not None and there[2] <= (1.0 - 1e-4) * best[2]
-            if keep and not lower:  # the tangent is of an earlier iterate
-                keep = False
-                continue
-            if watched and not lower and (there is None or since == WATCHED):
-                here, keep, watched = best, False, False
-                continue
-            if there is None:
-                return end("line search found no descent")
-            steps += 1
-            keep = there[2] <= KEEP_TANGENT * here[2]
-            here = there
-            best, since = (here, 0) if lower else (best, since + 1)
-        factor = None
-        try:
-            factor = self._factorize(s, here[0])
-            refined, correction = self._refine(here, factor, lambda displacements: self._balance(s, displacements))
-            if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
-                factor = None
-                factor = self._factorize(s, refined[0])
-        except SingularError:
-            return end("singular tangent")
-        displacements, _, residual = refined
-        reason = "" if correction <= CORRECTION else _uncertain(correction)
-        return Equilibrium(displacements, not reason, steps, residual, factor, reason, correction)
+    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
+        """Factor of the tangent of resistance less load, see `Network.factorize_tangent`.
 
-    def _refine(self, here, factor, balance, linear=False):
-        """Steps with one tangent for as long as each of them halves the estimated error; where they end, and that."""
-        correction = self._correction(factor, here[1], here[0], linear)
-        while correction > REFINED:
-            displacements = here[0] + self.network.expand(factor.solve(here[1]))
-            there = displacements, *balance(displacements)
-            better = self._correction(factor, there[1], displacements, linear)
-            if not better <= 0.5 * correction or not linear and self.network.inverted(displacements):
-                break
-            here, correction = there, better
-        return here, correction
-
-    def _step(self, s, here, step, halvings):
-        """Where a step leads, halved until the residual falls; as it is where it may not be halved.
-
-        None where no such step keeps all cells from turning inside out.
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
         """
-        displacements, _, residual = here
-        length = 1.0
-        if not halvings and 2 * np.abs(step).max() > LONGEST_STEP * self.network.rest_lengths.min():
-            length /= max(1.0, self.network.largest_change(step) / LONGEST_STEP)
-        for _ in range(max(halvings, 1)):
-            trial = displacements + length * step
-            missing, found = self._balance(s, trial)
-            lower = not halvings or found <= (1.0 - 1e-4 * length) * residual
-            if lower and np.isfinite(found) and not self.network.inverted(trial):
-                return trial, missing, found
-            length *= 0.5
-        return None
+        return self.network.factorize_tangent(displacements, self.follower and (s, self.follower))
 
-    def _in_steps(self, s, iterations):
+    def newton(
+        self,
+        s: float,
+        start: np.ndarray,
+        max_factorizations: int = MAX_FACTORIZATIONS,
+        keep_tangent: float = KEEP_TANGENT,
+    ) -> Equilibrium:
+        """Equilibrium by Newton's method from a first guess of the displacements [m], shape (n_points, 2).
+
+        Parameters are those of `springtune.mechanics.newton.Newton`.
+        """
+        return Newton(self, s, max_factorizations, keep_tangent).solve(start)
+
+    def _in_steps(self, s: float, iterations: int) -> Equilibrium:
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""
         done, step = 0.0, 0.25  # of the load
         last = before = np.zeros(self.network.held.shape)
@@ -518,12 +383,3 @@ class StaticProblem:
                 return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
             else:
                 step *= 0.5
-
-
-def _uncertain(correction):
-    return f"ill-conditioned: {correction:.1e} of the displacements is uncertain"
-
-
-def _norm(vector):
-    with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.linalg.norm(vector))

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
-from ..linalg.factors import Factor, SingularError
+from ..linalg.factors import SingularError, SuperLUFactor
 from ..problem.geometry import Beam
 from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
 from ..problem.materials import Material
@@ -214,7 +214,7 @@ class _Sheet:
                 return None
             step = np.zeros(moved.shape)
             try:
-                factor = Factor(csc_array((self._tangent(gradient, state) - turning)[free][:, free]))
+                factor = SuperLUFactor(csc_array((self._tangent(gradient, state) - turning)[free][:, free]))
             except SingularError:
                 return None
             step[~self.held] = factor.solve(residual)

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.sparse import block_array, coo_array, csr_array, diags_array, kron
 
-from ..linalg.factors import factorised
+from ..linalg.factors import factorize
 from ..problem.geometry import Beam
 from ..problem.loads import AXIAL, BOTTOM, LEFT, RIGHT, TOP, LoadKind
 from ..problem.materials import Material
@@ -426,7 +426,7 @@ class _Grid:
         direct, shear = one / (1 - one * nu * nu), one / (2 * (1 + one * nu))
         matrix = float(direct) * (self._direct + nu * self._lateral) + float(shear) * self._shear
         # Rounding must not make the factor of a slender beam an indefinite one.
-        factor, load = factorised(matrix + SHIFT * diags_array(matrix.diagonal())), self.load
+        factor, load = factorize(matrix + SHIFT * diags_array(matrix.diagonal())), self.load
         solution = factor.solve(load.astype(float)).astype(EXTENDED)
         # Roundings of a term: entries, products along x and y there and back, moduli, sums and the load.
         unit = (8 * self._x.degree + 30) * float(np.finfo(EXTENDED).eps)

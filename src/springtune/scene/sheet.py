@@ -22,7 +22,7 @@ from ..springs import DEFINITIONS, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
 NETWORKS = 6
-"""Factorised networks of a mesh that are kept: scenes come in an order in which few are enough."""
+"""Factorized networks of a mesh that are kept: scenes come in an order in which few are enough."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Solution:
 class Sheet:
     """A meshed sheet on which scenes are solved.
 
-    Networks that differ in their reference stiffness alone are assembled and factorised once; networks with the same
+    Networks that differ in their reference stiffness alone are assembled and factorized once; networks with the same
     directions held share their numbering of unknowns; the springs derived last are kept for further loads.
 
     Parameters

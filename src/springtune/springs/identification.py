@@ -121,7 +121,7 @@ class Misfit:
         for name, cases in self.groups.items():
             network = Network(self.mesh, cases[0].held, relative, like=self.patterns[name])
             try:
-                factor = network.factorize()
+                factor = network.factorize_tangent()
             except SingularError:
                 return np.inf, slope
             loads = np.stack([network.reduce(case.forces) for case in cases], axis=1) / self.reference

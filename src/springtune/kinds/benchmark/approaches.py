@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...linalg.factors import factorised
+from ...linalg.factors import factorize
 from ...mechanics.dynamics import relax
+from ...mechanics.integrators import BackwardEuler
 from ...mesh import structured
 from ...problem.boundary import held, measured, weights
 from ...reference import calculix
@@ -23,7 +24,7 @@ def network(scene, mesh, definition, clock):
         sheet, springs, problem = _problem(scene, mesh, definition)
         problem.network.tangent()
     with clock("factorizing"):
-        problem.rest_factor  # noqa: B018  factorised when first asked for
+        problem.rest_factor  # noqa: B018  factorized when first asked for
     with clock("solving"):
         found = problem.linear(scene.force / springs.reference)
     if not found.converged:
@@ -61,7 +62,7 @@ def backward_euler(scene, size, clock, iterations=None):
         sheet, springs, problem = _problem(scene, mesh, "delingette")
         motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force, linear=True)
     with clock("solving"):
-        found = motion.run("backward-euler", 0.01, 500, rest=1e-6, iterations=iterations)
+        found = motion.run(BackwardEuler(iterations=iterations), 0.01, 500, rest=1e-6)
     if found.status != "rest":
         raise ArithmeticError(found.message)
     return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
@@ -110,7 +111,7 @@ def _triangles(scene, size, clock, degree):
         free = np.setdiff1d(np.arange(len(load)), clamp)
         matrix = matrix[free][:, free].tocsc()
     with clock("factorizing"):
-        factor = factorised(matrix)
+        factor = factorize(matrix)
     with clock("solving"):
         solution = np.zeros(len(load))
         solution[free] = factor.solve(scene.force * mean[free])

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...linalg import SOLVERS, factors
+from ...mechanics.network import Network
 from ...mechanics.series import trace
 from ...mesh import MESH_TYPES
 from ...problem.boundary import weights
@@ -139,7 +140,7 @@ def run(scene, approaches, sizes, most_seconds, thorough=(), most_thorough=0.0, 
     result["error"] = (arrays["displacement"] - reference.displacement) / abs(reference.displacement)
     result["second_error"] = _second(scene, second_beam, approaches, sizes, status == Status.SOLVED)
     result["assured_error"] = assured(result["error"], result["second_error"])
-    return result | _rates(result, sizes)
+    return result | rates(result, sizes)
 
 
 def _second(scene, beam, approaches, sizes, solved):
@@ -218,7 +219,7 @@ def _repeat(send, scene, approach, size, mesh, meshing, once):
     send.send(found | {"peak_memory": 1024.0 * max(here - base, there)})
 
 
-def _rates(result, sizes):
+def rates(result, sizes):
     """Order of the error in the mesh size, exponent of the seconds in the unknowns, and which cases nothing beats.
 
     An error that changes its sign or does not fall with the mesh size has no order.
@@ -277,12 +278,11 @@ def solvers(scene, sizes, most_seconds):
             coarser = first[solver, number + 1 :]
             if name == "Cholesky" and not factors.CHOLESKY or np.nanmax(coarser, initial=0.0) * 8 > most_seconds:
                 continue
-            sheet = Sheet(mesh, scene.beam.thickness)
-            springs = sheet.network(sheet.held(scene.kind), Springs(1.0, half_weight(mesh)))
+            springs = Network(mesh, Sheet(mesh, 1.0).held(scene.kind), half_weight(mesh), solver=name)
             matrix, right = springs.tangent(), np.ones(springs.unknowns)
             for seconds in (first, again):
                 begin = time.perf_counter()
-                springs.factorized(matrix, solver=name).solve(right)
+                springs.factorize_matrix(matrix).solve(right)
                 seconds[solver, number] = time.perf_counter() - begin
     return {"solver_seconds": first, "solver_again_seconds": again}
 

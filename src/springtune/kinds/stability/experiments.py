@@ -12,7 +12,7 @@ import numpy as np
 from ...linalg.factors import SingularError
 from ...mechanics.arc_length import buckling_load, follow
 from ...mechanics.dynamics import Motion, relax
-from ...mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS
+from ...mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
 from ...mechanics.moduli import PatchTest
 from ...mechanics.statics import StaticProblem
 from ...mesh import MESH_TYPES, Mesh, corner_angles
@@ -248,7 +248,7 @@ def rest(setup):
             u = v = None
             done = 0
             for k, steps in enumerate(AXES["implicit_steps"]):
-                found = motion.run("backward-euler", 0.01, steps - done, u, v, iterations=iterations or None)
+                found = motion.run(BackwardEuler(iterations=iterations or None), 0.01, steps - done, u, v)
                 u, v, done = found.displacements, found.velocities, steps
                 errors[i, j, k] = np.abs(u - static.displacements).max() / largest
         found = relax(motion.network, motion.load, linear=True)

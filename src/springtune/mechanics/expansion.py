@@ -1,0 +1,279 @@
+"""Power series of an equilibrium path about one of its points.
+
+With ``s = F / k`` a uniform network's path u(s) is analytic. A series costs one factorization and one
+back-substitution an order (asymptotic numerical method: Cochelin, Damil and Potier-Ferry, Revue europeenne des elements
+finis 3(2):281, 1994); Pade approximants continue it past its poles. The nearest of these is the buckling load, even for
+a beam in tension.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..linalg.factors import Factor
+from .network import Network
+
+ORDER = 14
+"""Order of a series that gives a whole curve, as a rule."""
+
+STEP = 1e-3
+"""Difference of two approximants over the way from the point that ends a step along the path."""
+
+
+class Expansion:
+    """Power series of the equilibrium path about one of its points.
+
+    With a parameter ``sigma`` displacements, loads, a spring's vector d, its length l and ``w = 1/l`` are power series.
+    From ``l^2 = d.d``, ``w l = 1`` and the force ``k (d - L w d)``, order n follows from lower orders by one solve with
+    the tangent at the point. The parameter is the growth of the load; or, where the load may turn, the way along the
+    path: the displacements' share of their first derivative v, ``sigma = (u - u_0).v / v.v``, as the first order of
+    the load is 1 either way.
+
+    Parameters
+    ----------
+    network : Network
+    load : ndarray of float, shape (unknowns,)
+        Load pattern [1].
+    s : float
+        Force over the reference stiffness at the point [m].
+    displacements : ndarray of float, shape (n_points, 2), or None
+        Equilibrium at the point [m]; None at rest.
+    factor : Factor
+        Tangent factorized there.
+    order : int, optional
+    turning : bool, optional
+        Whether the parameter is the way along the path.
+
+    Attributes
+    ----------
+    coefficients : ndarray of float, shape (order + 1, n_points, 2)
+        The displacements are ``sum_n coefficients[n] sigma^n``.
+    loads : ndarray of float, shape (order + 1,)
+        The loads are ``sum_n loads[n] sigma^n`` [m].
+
+    Examples
+    --------
+    A spring of length 1 with a stiffness of 1 is straight: its displacement is the load itself.
+
+    >>> from springtune.mesh.cells import Mesh
+    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    >>> held = np.array([[True, True], [False, True], [True, True]])
+    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
+    >>> series = Expansion(network, np.ones(1), 0.0, None, network.rest_factor, order=3)
+    >>> series.predict(0.1)[1].round(12)
+    array([0.1, 0. ])
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        load: np.ndarray,
+        s: float,
+        displacements: np.ndarray | None,
+        factor: Factor,
+        order: int = ORDER,
+        turning: bool = False,
+    ) -> None:
+        self.s, self.order, self.turning = s, 0, turning
+        self._network, self._load, self._factor = network, load, factor
+        self.coefficients = np.zeros((1, *network.held.shape))
+        if displacements is not None:
+            self.coefficients[0] = displacements
+        self.loads = np.array([s, 1.0])
+        # Component by component, shape (order + 1, 2, n_springs): sums over orders are then of whole rows.
+        self._d = (network.rest_vectors + network.stretch(self.coefficients[0])).T[None].copy()
+        self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
+        self._inverse = 1.0 / self._length
+        self._first = None
+        self.extend(order)
+
+    def extend(self, order: int) -> None:
+        """Add the orders up to `order`."""
+        network = self._network
+        d, length, inverse, coefficients = (
+            _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients)
+        )
+        loads = np.zeros(order + 1)
+        loads[: len(self.loads)] = self.loads[: order + 1]
+        weight = network.stiffness * network.rest_lengths
+        for n in range(self.order + 1, order + 1):
+            right, length[n], inverse[n] = self._load, 0.0, 0.0
+            if n > 1:
+                # What lower orders give of order n, as if d[n] were 0.
+                square = np.einsum("nji,nji->i", d[1:n], d[n - 1 : 0 : -1])
+                square -= np.einsum("ni,ni->i", length[1:n], length[n - 1 : 0 : -1])
+                length[n] = 0.5 * square * inverse[0]
+                inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
+                known = np.einsum("ni,nji->ji", inverse[1 : n + 1], d[n - 1 :: -1])
+                right = -network.gather((weight * known).T)
+            change = self._factor.solve(right)
+            if n == 1:
+                self._first = change
+            elif self.turning:
+                loads[n] = -(change @ self._first) / (self._first @ self._first)
+                change += loads[n] * self._first
+            coefficients[n] = network.expand(change)
+            d[n] = network.stretch(coefficients[n]).T
+            along = np.einsum("ji,ji->i", d[0], d[n]) * inverse[0]
+            length[n] += along
+            inverse[n] -= inverse[0] ** 2 * along
+        self._d, self._length, self._inverse, self.coefficients, self.order = d, length, inverse, coefficients, order
+        self.loads = loads
+        for name in ("_products", "_radius"):
+            self.__dict__.pop(name, None)
+        self._denominators = {}
+
+    def predict(self, s: float) -> np.ndarray:
+        """Displacements at ``s`` [m], shape (n_points, 2), from the series cut off before its smallest term."""
+        powers = (s - self.s) ** np.arange(self.order + 1.0)
+        sizes = np.abs(powers[1:]) * np.linalg.norm(self.coefficients[1:].reshape(self.order, -1), axis=1)
+        kept = 2 + int(np.argmin(sizes))
+        return np.tensordot(powers[:kept], self.coefficients[:kept], axes=1)
+
+    @cached_property
+    def _products(self) -> np.ndarray:
+        """Scalar products of the coefficients, shape (order + 1, order + 1)."""
+        flat = self.coefficients.reshape(self.order + 1, -1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return flat @ flat.T
+
+    @cached_property
+    def _radius(self) -> float:
+        """Value of the parameter that makes the last term as large as the first [m]."""
+        sizes = np.sqrt(np.diag(self._products))
+        return float((sizes[1] / sizes[-1]) ** (1.0 / (self.order - 1))) if sizes[-1] else 1.0
+
+    def _denominator(self, lower: int) -> np.ndarray:
+        """Coefficients of a denominator whose product with the series has least orders beyond the numerator's.
+
+        In powers of the parameter over the radius.
+        """
+        if lower not in self._denominators:
+            powers = self._radius ** np.arange(self.order + 1.0)
+            scaled = self._products * np.outer(powers, powers)
+            matrix, right = np.zeros((lower, lower)), np.zeros(lower)
+            for n in range(self.order - lower + 1, self.order + 1):
+                rows = np.arange(n - 1, max(n - 1 - lower, 0), -1)
+                matrix[: len(rows), : len(rows)] += scaled[np.ix_(rows, rows)]
+                right[: len(rows)] -= scaled[rows, n]
+            solution = np.linalg.lstsq(matrix, right, rcond=1e-14)[0]
+            self._denominators[lower] = np.concatenate([[1.0], solution])
+        return self._denominators[lower]
+
+    def _shares(self, sigma: float, less: int = 0) -> np.ndarray:
+        """Factors of the coefficients in their approximant of one denominator, shape (order + 1,).
+
+        The denominator is of half the order, or of a degree `less`. The numerator has the rest where the series is
+        asked for far beyond its radius, and all orders where the path may turn within it.
+        """
+        lower = self.order // 2 - less
+        upper = self.order if self.turning else self.order - lower
+        sums = np.zeros(self.order + 1)
+        sums[: lower + 1] = self._denominator(lower) * (sigma / self._radius) ** np.arange(lower + 1.0)
+        sums = np.cumsum(sums)
+        shares = np.zeros(self.order + 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares[: upper + 1] = sums[upper::-1] / sums[-1] * sigma ** np.arange(upper + 1.0)
+        shares[0] = 1.0
+        return shares
+
+    def at(self, sigma: float) -> tuple[float, np.ndarray]:
+        """Load [m] and displacements [m], shape (n_points, 2), at a value of the parameter: a vector Pade approximant.
+
+        All components share one denominator (Cochelin, Damil and Potier-Ferry, Int. J. Num. Meth. Eng. 37:1187, 1994).
+        """
+        shares = self._shares(sigma)
+        return float(shares @ self.loads), np.tensordot(shares, self.coefficients, axes=1)
+
+    def reach(self, sign: float) -> tuple[float, bool]:
+        """How far the series is good to start a solve, 0 where it is not; and whether the load turns there.
+
+        Parameters
+        ----------
+        sign : float
+            1 towards larger parameters, -1 towards smaller ones.
+
+        Returns
+        -------
+        sigma : float
+            Parameter [m].
+        turns : bool
+            Whether the load is largest there: a limit point of the path.
+        """
+        if not np.isfinite(self._products).all():  # next to a singular point
+            return 0.0, False
+        sigma = 2.0 * sign * self._radius
+        for _ in range(40):
+            shares = self._shares(sigma)
+            apart = shares - self._shares(sigma, 1)
+            way = np.concatenate([[0.0], shares[1:]])
+            close = apart @ self._products @ apart <= STEP**2 * (way @ self._products @ way)
+            if close and abs(apart @ self.loads) <= STEP * abs(way @ self.loads):
+                break
+            sigma *= 0.75
+        loads = [sign * (self._shares(part * sigma) @ self.loads) for part in np.linspace(0.0, 1.0, 33)]
+        falls = np.flatnonzero(np.diff(loads) <= 0)
+        return (sigma * (falls[0] / 32.0), True) if len(falls) else (sigma, False)
+
+    def parameter(self, s: float, farthest: float, less: int = 0) -> float:
+        """Parameter of a load that lies between the point and that of the parameter `farthest`."""
+        if not self.turning:
+            return s - self.s
+        apart = [self._shares(sigma, less) @ self.loads - s for sigma in (0.0, farthest)]
+        if apart[0] * apart[1] >= 0:  # the last one but for rounding, or for what the approximants differ by
+            return farthest
+        return brentq(lambda sigma: self._shares(sigma, less) @ self.loads - s, 0.0, farthest, xtol=1e-300, rtol=1e-14)
+
+    def value(self, weights: np.ndarray, s: float, farthest: float) -> tuple[float, float]:
+        """Weighted sum of the displacements at a load up to that of a parameter, and the estimated relative error."""
+        series = np.tensordot(self.coefficients, weights, axes=2)
+        best, second, third = (self._shares(self.parameter(s, farthest, less), less) @ series for less in range(3))
+        error = max(abs(best - second), abs(second - third)) / abs(best) if best else np.inf
+        return best, error if np.isfinite(error) else np.inf
+
+    def measure(self, weights: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Weighted sum of the displacements at each of many ``s``, by Pade approximants.
+
+        Parameters
+        ----------
+        weights : ndarray of float, shape (n_points, 2)
+        s : ndarray of float, shape (n,)
+            Force over the reference stiffness [m].
+
+        Returns
+        -------
+        values : ndarray of float, shape (n,)
+        errors : ndarray of float, shape (n,)
+            Largest difference to the approximants of the two lower orders, relative to the value.
+        """
+        series = np.tensordot(self.coefficients, weights, axes=2)
+        sigma = np.asarray(s) - self.s
+        # Scaled so that all coefficients are of one size: the equations of an approximant are then well-conditioned.
+        scaled = series[1:] * self._radius ** np.arange(1.0, self.order + 1)
+        x = sigma / self._radius
+        half = (self.order - 1) // 2
+        orders = ((half, half + 1), (half, half), (half - 1, half))
+        best, second, third = (series[0] + x * _pade(scaled, *order)(x) for order in orders)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors = np.maximum(np.abs(best - second), np.abs(second - third)) / np.abs(best)
+        return best, np.where(np.isfinite(errors), errors, np.inf)
+
+
+def _grown(array: np.ndarray, length: int) -> np.ndarray:
+    """The array with room for more along its first axis."""
+    grown = np.empty((length, *array.shape[1:]))
+    grown[: len(array)] = array
+    return grown
+
+
+def _pade(series: np.ndarray, upper: int, lower: int) -> Callable[[np.ndarray], np.ndarray]:
+    """Pade approximant of a series: numerator of degree `upper` over denominator of degree `lower`, as a function."""
+    padded = np.concatenate([np.zeros(lower), series])
+    matrix = np.array([padded[upper + row : upper + row + lower][::-1] for row in range(1, lower + 1)])
+    # Least squares: where the series needs fewer poles the matrix is singular, and the smallest solution is right.
+    solution = np.linalg.lstsq(matrix, -series[upper + 1 : upper + lower + 1], rcond=1e-14)[0]
+    denominator = np.concatenate([[1.0], solution])
+    numerator = np.convolve(denominator, series)[: upper + 1]
+    return lambda x: np.polyval(numerator[::-1], x) / np.polyval(denominator[::-1], x)

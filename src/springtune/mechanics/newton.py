@@ -1,0 +1,305 @@
+"""Newton's method for one equilibrium of a network, and how far its answer can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..linalg.factors import Factor, SingularError
+from .network import Network
+
+if TYPE_CHECKING:
+    from .statics import StaticProblem
+
+TOLERANCE = 1e-10
+"""Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
+
+MAX_FACTORIZATIONS = 16
+MAX_HALVINGS = 12
+CORRECTION = 1e-6
+"""Largest estimated error of a solution's displacements: a residual alone says nothing where the stiffness is
+ill-conditioned."""
+
+REFINED = 1e-9
+"""Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
+
+REPRESENTATION = 4.0
+"""Residual that counts as balance, over what rounding of the displacements alone makes of it."""
+
+WATCHED = 4
+"""Steps in a row that may leave the residual above the least one seen: a slender beam that turns is stretched by one
+step and released by the next."""
+
+LONGEST_STEP = 0.5
+"""Largest change of a spring's vector over its length in such a step."""
+
+KEEP_TANGENT = 0.03
+"""Share of the residual that a step may leave for its tangent to serve once more."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """What a solve found.
+
+    Attributes
+    ----------
+    displacements : ndarray of float, shape (n_points, 2)
+        Displacement of each particle [m]; of the last iterate where it did not converge.
+    converged : bool
+    iterations : int
+        Newton steps.
+    residual : float
+        Norm of the out-of-balance force over that of the load [1].
+    factor : Factor or None
+        Factorized tangent: that at the solution, where it converged.
+    reason : str
+        Why it did not converge, empty where it did.
+    error_estimate : float
+        Estimated error of the displacements over their size [1]; NaN where there is no balance.
+    unstable_share : float
+        Share of the load at which the path to it is unstable [1]; NaN where no such place is known.
+    load_share : float
+        Largest share of the load at which there is a good equilibrium [1]; 1 where it converged.
+    last : ndarray of float, shape (n_points, 2), or None
+        Displacements at that share, where it is below 1.
+    """
+
+    displacements: np.ndarray
+    converged: bool
+    iterations: int
+    residual: float
+    factor: Factor | None
+    reason: str = ""
+    error_estimate: float = np.nan
+    unstable_share: float = np.nan
+    load_share: float = 1.0
+    last: np.ndarray | None = None
+
+
+class Iterate(NamedTuple):
+    """Where Newton's method is.
+
+    Attributes
+    ----------
+    displacements : ndarray of float, shape (n_points, 2)
+        [m]
+    missing : ndarray of float, shape (unknowns,)
+        Load less resistance there [m].
+    residual : float
+        Its norm over that of the load [1].
+    """
+
+    displacements: np.ndarray
+    missing: np.ndarray
+    residual: float
+
+
+class Newton:
+    """Newton's method with the exact tangent, under one load.
+
+    A few steps may leave the residual above the least one seen, before the iterate with that is taken up again and
+    steps are halved until the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell,
+    Math. Programming Study 16:1, 1982). No step may invert a cell. A factorized tangent serves as long as its steps
+    cut the residual by `keep_tangent`: near the solution a new one costs ten such steps.
+
+    Parameters
+    ----------
+    problem : StaticProblem
+    s : float
+        Force over the reference stiffness [m].
+    max_factorizations : int, optional
+        Largest number of factorizations on the way; one more is that of the tangent at the solution.
+    keep_tangent : float, optional
+        Share of the residual that a step may leave for its tangent to serve once more; with 0 each step has its own.
+    """
+
+    def __init__(
+        self,
+        problem: StaticProblem,
+        s: float,
+        max_factorizations: int = MAX_FACTORIZATIONS,
+        keep_tangent: float = KEEP_TANGENT,
+    ) -> None:
+        self.problem, self.network, self.s = problem, problem.network, s
+        self.max_factorizations, self.keep_tangent = max_factorizations, keep_tangent
+
+    def solve(self, start: np.ndarray) -> Equilibrium:
+        """Equilibrium from a first guess of the displacements.
+
+        Parameters
+        ----------
+        start : ndarray of float, shape (n_points, 2)
+            [m]; rest takes its place where forces are not finite or cells are inside out.
+
+        Returns
+        -------
+        Equilibrium
+        """
+        here = self._at(start)
+        if not np.isfinite(here.residual) or self.network.inverted(start):
+            here = Iterate(np.zeros_like(start), self.s * self.problem.load, 1.0)
+        self._here = self._best = here
+        self._factor: Factor | None = None
+        self._factorizations = self._steps = self._since_best = 0
+        self._keep, self._watched = False, True
+        while not self._balanced():
+            reason = self._iterate()
+            if reason:
+                return self._failed(reason)
+        return self._refined()
+
+    def _at(self, displacements: np.ndarray) -> Iterate:
+        return Iterate(displacements, *self.problem.balance(self.s, displacements))
+
+    def _balanced(self) -> bool:
+        """Whether the residual is within the tolerance, or what rounding of the displacements alone makes of it."""
+        displacements, _, residual = self._here
+        if residual <= TOLERANCE:
+            return True
+        rounding = np.finfo(float).eps * self.network.reduce(self.network.local_stiffness * displacements)
+        return residual * abs(self.s) * self.problem.load_norm <= REPRESENTATION * norm(rounding)
+
+    def _iterate(self) -> str:
+        """Take a step, or decide to take another one; why none can be taken, empty where one can."""
+        if not self._keep:
+            if self._factorizations == self.max_factorizations:
+                return "too many iterations"
+            self._factor = None  # which gives its room back
+            try:
+                self._factor = self.problem.factorize_tangent(self.s, self._here.displacements)
+            except SingularError:
+                return "singular tangent"
+            self._factorizations += 1
+        there = self._step(self.network.expand(self._factor.solve(self._here.missing)))
+        lower = there is not None and there.residual <= (1.0 - 1e-4) * self._best.residual
+        if self._keep and not lower:  # the tangent is of an earlier iterate
+            self._keep = False
+            return ""
+        if self._watched and not lower and (there is None or self._since_best == WATCHED):
+            self._here, self._keep, self._watched = self._best, False, False
+            return ""
+        if there is None:
+            return "line search found no descent"
+        self._steps += 1
+        self._keep = there.residual <= self.keep_tangent * self._here.residual
+        self._here = there
+        self._best, self._since_best = (there, 0) if lower else (self._best, self._since_best + 1)
+        return ""
+
+    def _step(self, step: np.ndarray) -> Iterate | None:
+        """Where a step leads: while steps are watched as it is, later halved until the residual falls.
+
+        None where no such step keeps all cells from turning inside out.
+        """
+        displacements, _, residual = self._here
+        length, halvings = 1.0, 0 if self._watched else MAX_HALVINGS
+        if not halvings and 2 * np.abs(step).max() > LONGEST_STEP * self.network.rest_lengths.min():
+            length /= max(1.0, self.network.largest_change(step) / LONGEST_STEP)
+        for _ in range(max(halvings, 1)):
+            there = self._at(displacements + length * step)
+            lower = not halvings or there.residual <= (1.0 - 1e-4 * length) * residual
+            if lower and np.isfinite(there.residual) and not self.network.inverted(there.displacements):
+                return there
+            length *= 0.5
+        return None
+
+    def _refined(self) -> Equilibrium:
+        """The equilibrium found, refined where its estimated error is large, with the tangent there."""
+        here, self._factor = self._here, None
+        try:
+            self._factor = self.problem.factorize_tangent(self.s, here.displacements)
+            refined, error = refine(
+                self.network, here, self._factor, lambda displacements: self.problem.balance(self.s, displacements)
+            )
+            if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
+                self._factor = None
+                self._factor = self.problem.factorize_tangent(self.s, refined.displacements)
+        except SingularError:
+            return self._failed("singular tangent")
+        reason = uncertainty(error)
+        return Equilibrium(
+            refined.displacements, not reason, self._steps, refined.residual, self._factor, reason, error
+        )
+
+    def _failed(self, reason: str) -> Equilibrium:
+        here = self._here
+        return Equilibrium(here.displacements, False, self._steps, here.residual, self._factor, reason)
+
+
+def error_estimate(
+    network: Network, factor: Factor, missing: np.ndarray, displacements: np.ndarray, linear: bool = False
+) -> float:
+    """Estimated error of displacements over their size: the Newton step that is left, and what rounding of forces does.
+
+    Parameters
+    ----------
+    network : Network
+    factor : Factor
+        Tangent factorized near them.
+    missing : ndarray of float, shape (unknowns,)
+        Load less resistance [m].
+    displacements : ndarray of float, shape (n_points, 2)
+        [m]
+    linear : bool, optional
+        Whether the network has linear kinematics.
+
+    Returns
+    -------
+    float
+        [1]
+    """
+    rounding = network.rounding(displacements, linear)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
+    return norm(factor.estimate(missing + signs * rounding)) / (norm(displacements.ravel()) or 1.0)
+
+
+def refine(
+    network: Network,
+    here: Iterate,
+    factor: Factor,
+    balance: Callable[[np.ndarray], tuple[np.ndarray, float]],
+    linear: bool = False,
+) -> tuple[Iterate, float]:
+    """Steps with one tangent for as long as each of them halves the estimated error.
+
+    Parameters
+    ----------
+    network : Network
+    here : Iterate
+    factor : Factor
+        Tangent factorized there.
+    balance : callable
+        Load less resistance and residual at displacements.
+    linear : bool, optional
+        Whether the network has linear kinematics.
+
+    Returns
+    -------
+    iterate : Iterate
+        Where they end.
+    error : float
+        Its estimated error [1].
+    """
+    error = error_estimate(network, factor, here.missing, here.displacements, linear)
+    while error > REFINED:
+        displacements = here.displacements + network.expand(factor.solve(here.missing))
+        there = Iterate(displacements, *balance(displacements))
+        better = error_estimate(network, factor, there.missing, displacements, linear)
+        if not better <= 0.5 * error or not linear and network.inverted(displacements):
+            break
+        here, error = there, better
+    return here, error
+
+
+def uncertainty(error: float) -> str:
+    """Why a solution of this estimated error is not good; empty where it is."""
+    return "" if error <= CORRECTION else f"ill-conditioned: {error:.1e} of the displacements is uncertain"
+
+
+def norm(vector: np.ndarray) -> float:
+    """Euclidean norm, infinite or NaN without a warning."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.linalg.norm(vector))

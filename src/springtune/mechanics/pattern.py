@@ -1,0 +1,192 @@
+"""Numbering of the unknowns of networks on one mesh, sparsity of their matrices, and order of elimination."""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from ..linalg.factors import Analysis
+from ..linalg.ordering import nested_dissection
+from ..mesh.cells import DIAGONALS, SIDES, Mesh
+from .energies import Energy
+
+DISSECTED = 100_000
+"""Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
+
+
+class Pattern:
+    """What the matrices of networks with one mesh and one set of held directions have in common.
+
+    All particles of a cell are joined by springs, so the springs' entries are all there are.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    held : ndarray of bool, shape (n_points, 2)
+        True where a particle cannot move in x or y.
+
+    Attributes
+    ----------
+    size : int
+        Number of unknowns.
+    number : ndarray of int, shape (n_points, 2)
+        Unknown of each direction of each particle, -1 where it is held.
+    indices, pointers : ndarray of int32
+        Rows of the entries of each column, ascending, and column pointers.
+    """
+
+    def __init__(self, mesh: Mesh, held: np.ndarray) -> None:
+        self.mesh, self.springs = mesh, mesh.edges
+        self.first, self.second = (np.ascontiguousarray(ends) for ends in self.springs.T)
+        self.shape = held.shape
+        self.places = np.flatnonzero(~held.ravel())
+        self.size = len(self.places)
+        number = np.full(held.size, -1)
+        number[self.places] = np.arange(self.size)
+        self.number = number.reshape(-1, 2)
+        self.indices, self.pointers, self.sources = self._sparsity()
+
+    def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows and column pointers of the matrix; for each entry its place in what `coupling_entries` puts together.
+
+        Block by block of two directions each: sorting those is a sixth of the work of sorting entries.
+        """
+        count, joined = self.shape[0], len(self.springs)
+        first, second, own = self.first, self.second, np.arange(self.shape[0])
+        columns, rows = np.concatenate([second, first, own]), np.concatenate([first, second, own])
+        order = np.argsort(columns * count + rows)
+        columns, rows = columns[order], rows[order]
+        sizes = np.bincount(columns, minlength=count)
+        # Place of entry (0, 0) of each block in what it comes from, and the steps to the next row and column of it.
+        place = np.concatenate([np.arange(joined), np.arange(joined), 4 * joined + own])[order]
+        down = np.repeat([2 * joined, joined, 2 * count], [joined, joined, count])[order]
+        right = np.repeat([joined, 2 * joined, count], [joined, joined, count])[order]
+        before = np.cumsum(sizes) - sizes
+        # Entry (a, d) of a block stands in column d of its particle's two, each twice as high as the blocks are many.
+        corner = 4 * before[columns] + 2 * (np.arange(len(order)) - before[columns])
+        height = 2 * sizes[columns]
+        row_of, source = np.empty((2, 4 * len(order)), dtype=np.int64)
+        kept = np.empty(4 * len(order), dtype=bool)
+        for a in range(2):
+            for d in range(2):
+                at = corner + d * height + a
+                row_of[at] = row = self.number[rows, a]
+                kept[at] = (row >= 0) & (self.number[columns, d] >= 0)
+                source[at] = place + a * down + d * right
+        ends = np.repeat(2 * sizes, 2).cumsum()
+        filled = np.concatenate([[0], np.cumsum(kept)[ends - 1]])
+        pointers = filled[np.concatenate([[True], self.number.ravel() >= 0])].astype(np.int32)
+        return row_of[kept].astype(np.int32), pointers, source[kept]
+
+    @cached_property
+    def codes(self) -> np.ndarray:
+        """One number for the place of each entry, ascending."""
+        return np.repeat(np.arange(self.size), np.diff(self.pointers)) * self.size + self.indices
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """Unknowns in the order of elimination, shape (size,)."""
+        order = self.number[nested_dissection(self.mesh.points, self.springs)].ravel()
+        return order[order >= 0]
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """Symbolic Cholesky factorization; in an order of CHOLMOD's own where ours would not gain what it costs."""
+        return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
+
+    @cached_property
+    def elimination(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Unknowns in the order of elimination; place and row of each entry in that order, and column pointers."""
+        order = self.order
+        rank = np.empty(self.size, dtype=np.int64)
+        rank[order] = np.arange(self.size)
+        sizes = np.diff(self.pointers)[order]
+        pointers = np.concatenate([[0], np.cumsum(sizes)])
+        places = np.repeat(self.pointers[order] - pointers[:-1], sizes) + np.arange(pointers[-1])
+        # The library sorts rows within columns several times faster than numpy does all entries.
+        numbered = csc_array((places.astype(float), rank[self.indices[places]], pointers), shape=(self.size, self.size))
+        numbered.sort_indices()
+        indices, pointers = numbered.indices.astype(np.int32), pointers.astype(np.int32)
+        return order, numbered.data.astype(np.int64), indices, pointers
+
+    def _codes(self, particles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which entries of the matrices of groups of particles are kept, and one number for the place of each."""
+        local = self.number[particles].reshape(len(particles), -1)
+        width = local.shape[1]
+        rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()
+        kept = np.flatnonzero((rows >= 0) & (columns >= 0))
+        return kept, columns[kept] * self.size + rows[kept]
+
+    def expand(self, unknowns: np.ndarray) -> np.ndarray:
+        """Field of shape (n_points, 2) from the vector of unknowns, 0 where a direction is held."""
+        full = np.zeros(self.shape)
+        full.ravel()[self.places] = unknowns
+        return full
+
+    def reduce(self, vectors: np.ndarray) -> np.ndarray:
+        """Entries of a field of shape (n_points, 2) that belong to unknowns."""
+        return vectors.ravel()[self.places]
+
+    def sum_springs(self, at_first: np.ndarray, at_second: np.ndarray | None = None) -> np.ndarray:
+        """Sum over springs of what is added at their first ends and taken off at their second, by default the same."""
+        count = self.shape[0]
+        at_second = at_first if at_second is None else at_second
+        total = np.empty(self.shape)
+        for axis in range(2):
+            total[:, axis] = np.bincount(self.first, at_first[:, axis], count)
+            total[:, axis] -= np.bincount(self.second, at_second[:, axis], count)
+        return total
+
+    def sum_cells(self, corners: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Sum over cells of what is added at their corners, shape (n_cells, m, 2)."""
+        places = corners.T.ravel()
+        total = [np.bincount(places, forces[:, :, axis].T.ravel(), self.shape[0]) for axis in range(2)]
+        return np.stack(total, axis=1)
+
+    def cell_couplings(self, energies: Sequence[Energy], displacements: np.ndarray | None = None) -> np.ndarray:
+        """Blocks of the tangent of energies that couple the ends of each spring, shape (2, 2, n_springs)."""
+        count = len(self.springs)
+        total = np.zeros((2, 2, count))
+        for energy in energies:
+            places = self._cell_springs[energy.corners.shape[1]]
+            blocks = np.ascontiguousarray(energy.couplings(displacements).transpose(1, 2, 0, 3))
+            for a in range(2):
+                for d in range(2):
+                    ours, turned = np.bincount(places, blocks[a, d].ravel(), 2 * count).reshape(2, count)
+                    total[a, d] += ours
+                    total[d, a] += turned
+        return total
+
+    @cached_property
+    def _cell_springs(self) -> dict[int, np.ndarray]:
+        """Spring of each pair of corners by number of corners, beyond the last one where it runs the other way."""
+        found = {}
+        for count, corners in self.mesh.cells.items():
+            first, second = np.transpose(SIDES[count] + DIAGONALS[count])
+            turned = corners[:, first] > corners[:, second]
+            found[count] = (self.mesh.cell_edges[count] + len(self.springs) * turned).T.ravel()
+        return found
+
+    def coupling_entries(self, couplings: np.ndarray) -> np.ndarray:
+        """Entries of the tangent from its blocks that couple the ends of each spring, shape (2, 2, n_springs).
+
+        A common displacement costs nothing: the block of a particle is what its springs' blocks lack to that.
+        """
+        count = self.shape[0]
+        own = np.empty((2, 2, count))
+        for a in range(2):
+            for d in range(a, 2):
+                own[a, d] = -np.bincount(self.first, couplings[a, d], count)
+                own[a, d] -= np.bincount(self.second, couplings[d, a], count)
+        own[1, 0] = own[0, 1]
+        return np.concatenate([couplings.ravel(), own.ravel()])[self.sources]
+
+    def entries(self, particles: np.ndarray, matrices: np.ndarray) -> np.ndarray:
+        """Entries of matrices of groups of joined particles, shape (n, 2 m, 2 m)."""
+        kept, codes = self._codes(particles)
+        return np.bincount(np.searchsorted(self.codes, codes), matrices.ravel()[kept], len(self.indices))
+
+    def matrix(self, data: np.ndarray) -> csc_array:
+        """Sparse matrix of these entries."""
+        return csc_array((data, self.indices, self.pointers), shape=(self.size, self.size))

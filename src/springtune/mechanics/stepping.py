@@ -1,0 +1,275 @@
+"""How a network in motion advances: one class of steps for each kind of integrator."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import cg
+
+from ..linalg.factors import Factor, factorize
+from .integrators import EXPLICIT, LAGGED, BackwardEuler
+
+if TYPE_CHECKING:
+    from .dynamics import Motion
+
+
+def make_stepper(motion: Motion, integrator: str | BackwardEuler, step: float, precision: str = "float64") -> Stepper:
+    """State of a run of one integrator.
+
+    Parameters
+    ----------
+    motion : Motion
+    integrator : str or BackwardEuler
+        One of `springtune.mechanics.integrators.INTEGRATORS`.
+    step : float
+        [s]
+    precision : str, optional
+        ``"float64"`` or ``"float32"``, of explicit schemes.
+
+    Returns
+    -------
+    Stepper
+    """
+    if integrator in EXPLICIT:
+        return ExplicitSteps(motion, integrator, step, precision)
+    if integrator == "implicit-midpoint":
+        return MidpointSteps(motion, step)
+    return BackwardEulerSteps(motion, step, integrator if isinstance(integrator, BackwardEuler) else BackwardEuler())
+
+
+class Stepper(ABC):
+    """State of a run and how it advances.
+
+    Attributes
+    ----------
+    failed : str
+        Why a step failed; empty where none did.
+    """
+
+    failed = ""
+
+    def begin(self, u: np.ndarray, v: np.ndarray) -> None:
+        """Start from displacements [m] and velocities [m/s], shape (n_points, 2)."""
+        self.u, self.v = u, v
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacements [m] and velocities [m/s] of now, shape (n_points, 2)."""
+        return self.u, self.v
+
+    @abstractmethod
+    def advance(self, steps: int) -> None:
+        """Take a number of steps."""
+
+
+class ExplicitSteps(Stepper):
+    """Compiled steps, of springs that keep their length law or of a linear network; others are taken in numpy.
+
+    Parameters are those of `make_stepper`.
+    """
+
+    def __init__(self, motion: Motion, integrator: str, step: float, precision: str) -> None:
+        self.motion, self.step = motion, step
+        self.half = integrator != "symplectic-euler"
+        self.kind = np.dtype(precision).type
+        network = motion.network
+        with np.errstate(divide="ignore"):
+            inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
+        half = 0.5 * motion.mass_damping * step
+        if integrator in LAGGED:
+            keep, gain = np.full(inverse.shape, 1 - 2 * half), step * inverse
+        else:
+            keep, gain = np.full(inverse.shape, (1 - half) / (1 + half)), step * inverse / (1 + half)
+        self.inverse = inverse
+        dampers = np.zeros(0) if motion.dampers is None else motion.dampers
+        if motion.linear:
+            from .kernels import advance_matrix as advance
+
+            matrix = motion.stiffness_matrix  # symmetric: its columns are its rows
+            damping = np.zeros(0) if motion.dampers is None else motion.damper_matrix.data
+            self._as = network.reduce
+            self._back = network.expand
+            index = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+            arrays = (matrix.data, damping, *map(network.reduce, (keep, gain, motion.load)))
+        elif network.energies:
+            advance, index, arrays = self._advance_energies, (), (keep, gain, motion.load)
+            self._as = self._back = np.array
+        else:
+            from .kernels import advance_springs as advance
+
+            self._as = self._back = np.array
+            index = (network.first.astype(np.int32), network.second.astype(np.int32))
+            arrays = (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, keep, gain, motion.load)
+        self._function, self._index = advance, index
+        self._arrays = [np.ascontiguousarray(part, dtype=self.kind) for part in arrays]
+
+    def begin(self, u: np.ndarray, v: np.ndarray) -> None:
+        """See `Stepper`."""
+        if self.half:  # the velocity half a step before the start
+            v = v - 0.5 * self.step * self._acceleration(u, v)
+        self.u = np.ascontiguousarray(self._as(u), dtype=self.kind)
+        self.v = np.ascontiguousarray(self._as(v), dtype=self.kind)
+        self.force = np.zeros_like(self.u)
+
+    def _acceleration(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        motion = self.motion
+        force = motion.network.expand(motion.missing(u) - _damper_forces(motion, u, v))
+        return force * self.inverse - motion.mass_damping * v
+
+    def advance(self, steps: int) -> None:
+        """See `Stepper`."""
+        self._function(*self._index, *self._arrays, self.u, self.v, self.force, self.kind(self.step), steps)
+
+    def _advance_energies(
+        self,
+        keep: np.ndarray,
+        gain: np.ndarray,
+        load: np.ndarray,
+        u: np.ndarray,
+        v: np.ndarray,
+        force: np.ndarray,
+        step: float,
+        steps: int,
+    ) -> None:
+        """As the kernels, of a network whose energies are not compiled."""
+        motion = self.motion
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(steps):
+                at, speed = u.astype(float), v.astype(float)
+                missing = motion.missing(at) - _damper_forces(motion, at, speed)
+                v *= keep
+                v += gain * motion.network.expand(missing)
+                u += step * v
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Stepper`."""
+        u, v = self._back(self.u).astype(float), self._back(self.v).astype(float)
+        if self.half and np.isfinite(v).all() and np.isfinite(u).all():
+            with np.errstate(over="ignore", invalid="ignore"):
+                v = v + 0.5 * self.step * self._acceleration(u, v)
+        return u, v
+
+
+def _damper_forces(motion: Motion, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
+    """Forces of the dampers along springs, shape (unknowns,)."""
+    if motion.dampers is None:
+        return 0.0
+    network = motion.network
+    if motion.linear:
+        return motion.damper_matrix @ network.reduce(v)
+    along = network.rest_vectors + network.stretch(u)
+    rate = np.einsum("ij,ij->i", along, network.stretch(v)) / np.einsum("ij,ij->i", along, along)
+    return -network.gather((motion.dampers * rate)[:, None] * along)
+
+
+class BackwardEulerSteps(Stepper):
+    r"""One linear solve a step, as SOFA's EulerImplicitSolver does.
+
+    .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
+
+    Parameters
+    ----------
+    motion : Motion
+    step : float
+        [s]
+    options : BackwardEuler
+    """
+
+    def __init__(self, motion: Motion, step: float, options: BackwardEuler) -> None:
+        self.motion, self.step, self.options = motion, step, options
+        self.solve: Callable[[np.ndarray], np.ndarray] | None = None
+
+    def advance(self, steps: int) -> None:
+        """See `Stepper`."""
+        motion, network, h, beta = self.motion, self.motion.network, self.step, self.options.stiffness_damping
+        for _ in range(steps):
+            if self.solve is None or not motion.linear:
+                self.stiffness = motion.stiffness_matrix if motion.linear else network.tangent(self.u)
+                self.damping = motion.damper_tangent(self.u)
+                mass = diags_array(motion.mass * (1 + h * motion.mass_damping))
+                matrix = mass + h * (h + beta) * self.stiffness
+                if self.damping is not None:
+                    matrix = matrix + h * self.damping
+                self.solve = self._solver(csc_array(matrix))
+            v = network.reduce(self.v)
+            right = motion.missing(self.u) - (h + beta) * (self.stiffness @ v)
+            right -= motion.mass_damping * motion.mass * v
+            if self.damping is not None:
+                right -= self.damping @ v
+            v = v + self.solve(h * right)
+            self.v = network.expand(v)
+            self.u = self.u + h * self.v
+
+    def _solver(self, matrix: csc_array) -> Callable[[np.ndarray], np.ndarray]:
+        if self.options.iterations is None:
+            return factorize(matrix, self.motion.network.solver).solve
+        # SOFA's test is of the residual over the right-hand side, as here.
+        return lambda right: cg(matrix, right, rtol=self.options.tolerance, maxiter=self.options.iterations)[0]
+
+
+class MidpointSteps(Stepper):
+    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``.
+
+    Parameters
+    ----------
+    motion : Motion
+    step : float
+        [s]
+    """
+
+    def __init__(self, motion: Motion, step: float) -> None:
+        self.motion, self.step = motion, step
+        self.factor: Factor | None = None
+        self._load = float(np.linalg.norm(motion.network.reduce(motion.load)))
+
+    def advance(self, steps: int) -> None:
+        """See `Stepper`."""
+        network = self.motion.network
+        for _ in range(steps):
+            v = network.reduce(self.v)
+            middle = self._mean_velocity(v)
+            if self.failed:
+                return
+            self.u = self.u + self.step * network.expand(middle)
+            self.v = network.expand(2 * middle - v)
+
+    def _mean_velocity(self, v: np.ndarray) -> np.ndarray:
+        """Mean velocity of the next step, by Newton's method; a factor serves as long as its steps converge."""
+        motion, network, h = self.motion, self.motion.network, self.step
+        inertia = 2 / h * motion.mass
+        damping = motion.mass_damping * motion.mass
+        middle, last, fresh = v.copy(), np.inf, self.factor is None
+        for _ in range(40):
+            at = self.u + 0.5 * h * network.expand(middle)
+            missing = motion.missing(at) - inertia * (middle - v) - damping * middle
+            missing -= _damper_forces(motion, at, network.expand(middle))
+            with np.errstate(over="ignore", invalid="ignore"):
+                size = float(np.linalg.norm(missing))
+                scale = float(np.linalg.norm(inertia * v)) + float(np.linalg.norm(motion.missing(self.u))) + self._load
+            if size <= 1e-12 * scale or scale == 0:
+                return middle
+            if not np.isfinite(size):
+                self.failed = "Newton's method diverged"
+                return middle
+            if self.factor is None or (size > 0.1 * last and not fresh):
+                self.factor = self._factorize(at, inertia + damping)
+                fresh = True
+            elif size >= last:
+                if size <= 1e-9 * scale:  # rounding
+                    return middle
+                fresh = False
+            middle = middle + self.factor.solve(missing)
+            last = size
+        self.failed = "Newton's method did not converge"
+        return middle
+
+    def _factorize(self, at: np.ndarray, diagonal: np.ndarray) -> Factor:
+        motion = self.motion
+        stiffness = motion.stiffness_matrix if motion.linear else motion.network.tangent(at)
+        matrix = diags_array(diagonal) + 0.5 * self.step * stiffness
+        if motion.dampers is not None:
+            matrix = matrix + motion.damper_tangent(at)
+        return factorize(csc_array(matrix), motion.network.solver)
