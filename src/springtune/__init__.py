@@ -12,13 +12,29 @@ Examples
 solved: 9.51 mm, error +0.1 %
 """
 
-TYPE_CHECKING = False
-"""What type checkers take for true; `typing` itself takes longer to import than all that is here."""
-
 __version__ = "0.1.0"
 
 _NAMES = {
-    "mesh": ("MESH_TYPES", "Mesh", "MeshError"),
+    "kinds": ("load_study",),
+    "kinds.benchmark.figures": (
+        "plot_benchmark",
+        "plot_benchmark_costs",
+        "plot_benchmark_curve",
+        "plot_benchmark_rates",
+    ),
+    "kinds.laying.figures": ("plot_laying",),
+    "kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
+    "kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
+    "kinds.stability.figures": (
+        "plot_stability_buckling",
+        "plot_stability_energy",
+        "plot_stability_limits",
+        "plot_stability_maps",
+        "plot_stability_meshes",
+        "plot_stability_rest",
+        "plot_stability_strains",
+    ),
+    "mesh": ("MESH_TYPES", "Mesh", "MeshError", "mesh_type"),
     "output.reading": ("open",),
     "prediction": ("Choice", "predict"),
     "problem.geometry": ("Beam",),
@@ -29,7 +45,8 @@ _NAMES = {
     "scene.meshes": ("make_mesh", "read_mesh"),
     "scene.moduli": ("Moduli", "moduli"),
     "scene.single": ("Result", "Scene"),
-    "springs": ("DEFINITIONS", "Definition", "DefinitionError", "Springs"),
+    "springs": ("DEFINITIONS", "Definition", "DefinitionError", "Springs", "definition"),
+    "study.messages": ("StudyError",),
     "units": ("UnitError",),
 }
 """Public names by the module that has them; a figure is added by a row of its module."""
@@ -53,18 +70,41 @@ __all__ = [
     "Scene",
     "Springs",
     "Status",
+    "StudyError",
     "UnitError",
     "__version__",
+    "definition",
+    "load_study",
     "make_mesh",
+    "mesh_type",
     "moduli",
     "open",
+    "plot_benchmark",
+    "plot_benchmark_costs",
+    "plot_benchmark_curve",
+    "plot_benchmark_rates",
+    "plot_block",
+    "plot_definitions_loads",
+    "plot_definitions_size",
+    "plot_deformed",
+    "plot_laying",
+    "plot_moduli",
+    "plot_sensitivity",
+    "plot_size",
+    "plot_stability_buckling",
+    "plot_stability_energy",
+    "plot_stability_limits",
+    "plot_stability_maps",
+    "plot_stability_meshes",
+    "plot_stability_rest",
+    "plot_stability_strains",
     "predict",
     "read_mesh",
     "sensitivity",
 ]
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
@@ -74,19 +114,3 @@ def __getattr__(name: str):
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-if TYPE_CHECKING:
-    from .mesh import MESH_TYPES, Mesh, MeshError
-    from .output.reading import open
-    from .prediction import Choice, predict
-    from .problem.geometry import Beam
-    from .problem.loads import LOADS
-    from .problem.materials import Material
-    from .problem.status import Status
-    from .scene.curve import Curve, sensitivity
-    from .scene.meshes import make_mesh, read_mesh
-    from .scene.moduli import Moduli, moduli
-    from .scene.single import Result, Scene
-    from .springs import DEFINITIONS, Definition, DefinitionError, Springs
-    from .units import UnitError

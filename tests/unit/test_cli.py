@@ -191,10 +191,10 @@ class TestSchema:
 @pytest.fixture(scope="module")
 def choices():
     """Beam, material, references and choices of the command without its text."""
-    beam, material = Beam("100x20", 0.1, 0.02, 1e-3), Material("steel", 210e9, 0.3)
+    beam, material = Beam(0.1, 0.02), Material(210e9, 0.3, name="steel")
     known = prediction.references(beam, material)
     mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-    return beam, material, known, prediction.predict(mesh, beam, material, known)
+    return beam, material, known, prediction.predict(beam, mesh, material, known)
 
 
 class TestPredict:
@@ -227,7 +227,7 @@ class TestPredict:
         beam, material, known, _ = choices
         known = known | {"bending": "its error estimate is 1"}
         mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-        lines = prediction_text("", beam, material, prediction.predict(mesh, beam, material, known), known).splitlines()
+        lines = prediction_text("", beam, material, prediction.predict(beam, mesh, material, known), known).splitlines()
         rows = [line for line in lines if line.startswith("  ")]
         assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
         assert "bending: no reference; its error estimate is 1" in lines

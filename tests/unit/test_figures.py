@@ -3,6 +3,7 @@
 import io
 import subprocess
 import sys
+from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from springtune.campaign import draw
+from springtune.jobs.dependencies import modules
 from springtune.kinds import outputs
 from springtune.kinds.base import FORMATS, Output
 from springtune.kinds.benchmark.figures import (
@@ -23,7 +25,7 @@ from springtune.kinds.benchmark.figures import (
     plot_benchmark_rates,
 )
 from springtune.kinds.laying.figures import plot_laying
-from springtune.kinds.moduli.figures import plot_definitions_loads, plot_definitions_size, plot_moduli
+from springtune.kinds.moduli.figures import definitions, plot_definitions_loads, plot_definitions_size, plot_moduli
 from springtune.kinds.scenes.figures import plot_block, plot_deformed, plot_sensitivity, plot_size
 from springtune.kinds.stability.figures import (
     PLOTS,
@@ -412,9 +414,33 @@ def test_the_only_label_is_taken(tree):
 def test_a_group_or_an_experiment_that_is_missing_is_named(tree):
     with pytest.raises(ValueError, match="no group '/laying'; it has '/moduli'"):
         plot_laying(xr.DataTree.from_dict({"/moduli": moduli()}))
+    for plot in (plot_deformed, plot_block):
+        with pytest.raises(ValueError, match="give the whole dataset"):
+            plot(tree["fields"].to_dataset())
     data = tree["stability"].to_dataset().sel(experiment=["limits", "rest"])
     with pytest.raises(ValueError, match="no experiment 'maps'; it has 'limits', 'rest'"):
         plot_stability_maps(data)
+
+
+def test_figures_of_a_load_without_the_main_kinematics_are_of_its_own(tree):
+    """As of a pressure that follows its face, which no linear network has."""
+    status = tree.status.where((tree["load"] == "pressure") == (tree.kinematics == "linear"), 0)
+    data = xr.DataTree(tree.to_dataset().assign(status=status, field_error=tree.field_error.where(status == 1)))
+    chosen = {selection["load"]: selection for stem, _, selection in definitions(data) if "size" in stem}
+    assert [chosen[load]["kinematics"] for load in LOADS] == ["nonlinear", "nonlinear", "linear"]
+    panels = plot_definitions_size(data, **chosen["pressure"])
+    assert [panel.get_title("left") for panel in panels] == TYPES and all(len(panel.lines) == 2 for panel in panels)
+    nothing = data.to_dataset().assign(field_error=np.nan * tree.field_error)
+    panels = plot_definitions_size(nothing, **chosen["pressure"])
+    assert [[text.get_text() for text in panel.texts] for panel in panels] == [["not solved"]] * 2
+
+
+def test_a_mesh_type_of_which_nothing_was_solved_has_an_empty_heat_map(tree):
+    data = tree.to_dataset()
+    data["status"] = data.status.where(data.mesh_type != "free", 5)
+    data["deformation_error"] = data.deformation_error.where(data.mesh_type != "free")
+    panel = plot_definitions_loads(data, **EVERY_PLOT[plot_definitions_loads][0])[0]
+    assert not panel.texts and np.ma.getmaskarray(panel.images[0].get_array()).all()
 
 
 # -- the stage ---------------------------------------------------------------------------------------------------------
@@ -461,3 +487,13 @@ def test_both_formats_show_the_same_and_are_the_same_again():
     assert np.corrcoef(rows, columns)[0, 1] < -0.9
     assert np.median(red.sum(axis=0)[red.any(axis=0)]) == pytest.approx(20 * 150 / 72 * np.hypot(1, 0.75), rel=0.25)
     assert one["pdf"].startswith(b"%PDF") and one["pdf"].rstrip().endswith(b"%%EOF")
+
+
+def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
+    def drawers(output):
+        files = {*modules("campaign.draw"), *modules(output.module)}
+        return {Path(path).parent.name for path in files if Path(path).name == "figures.py"}
+
+    kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
+    assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}
+    assert all(len(found) == 1 for found in kinds.values())

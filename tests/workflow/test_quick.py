@@ -211,7 +211,7 @@ def test_numbers_do_not_depend_on_the_number_of_cores(run, tree, repository):
     for section in ("laying", "stability", "benchmark"):
         del content[section]
         content["outputs"].remove(section)
-    run.write("alone.yaml", yaml.safe_dump(content))
+    run.write("alone.yaml", yaml.safe_dump(content, sort_keys=False))
     code, output = run.snakemake("alone.yaml", "--cores", "1", "--until", "collect")
     assert code == 0, output
     with xr.open_datatree(run.folder / "results/alone/dataset.nc", engine="h5netcdf") as again:

@@ -17,7 +17,7 @@ for job, made in DRAWN.items():
         name:
             f"figures_{job}"
         message:
-            f"Drawing {' and '.join(one.name for one in made)}"
+            f"Drawing figures: {', '.join(one.name for one in made)}"
         input:
             dataset=rules.collect.output,
             code=sorted({path for one in made for path in (*modules("campaign.draw"), *modules(one.module))}),

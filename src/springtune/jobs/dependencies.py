@@ -134,7 +134,7 @@ def _source(path: str | Path) -> bytes:
 
 def _executed(tree: ast.AST) -> Iterator[ast.AST]:
     """Nodes of a module, without what type checkers alone read."""
-    waiting = [tree]
+    waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
         if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):

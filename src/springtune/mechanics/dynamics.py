@@ -419,12 +419,16 @@ class Motion:
     ) -> tuple[str, str] | None:
         """Status and message of a run that came to nothing; None where it may go on."""
         size = np.abs(u).max()
-        extent = BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
-        if not np.isfinite(size) or size > extent or not np.isfinite(v).all():
+        if not np.isfinite(size) or size > self._farthest or not np.isfinite(v).all():
             return "diverged", self._why(integrator, step, done)
         if failed:
             return "diverged", f"{failed} in step {done}; take a smaller step"
         return None
+
+    @cached_property
+    def _farthest(self) -> float:
+        """Displacement beyond which a run has left its model [m]."""
+        return BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
 
     def _rest_end(self, u: np.ndarray, integrator: str, done: int) -> tuple[str, str]:
         """Status and message of a run that came to rest."""

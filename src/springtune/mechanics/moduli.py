@@ -36,13 +36,16 @@ class Elastic(Protocol):
     """
 
     @property
-    def relative(self) -> np.ndarray: ...
+    def relative(self) -> np.ndarray:
+        """Stiffness over the reference stiffness [1]."""
 
     @property
-    def energies(self) -> tuple[Energy, ...]: ...
+    def energies(self) -> tuple[Energy, ...]:
+        """Energies besides the springs'."""
 
     @property
-    def lateral(self) -> float: ...
+    def lateral(self) -> float:
+        """Pull on the faces over the axial stress [1]."""
 
 
 def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

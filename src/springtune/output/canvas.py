@@ -45,7 +45,7 @@ def png_and_pdf(figure):
             file.close()
         picture = io.BytesIO()
         image = Image.fromarray(np.asarray(pixels.buffer_rgba())).convert("RGB")
-        image.save(picture, "png", dpi=(dpi, dpi), compress_level=4)
+        image.save(picture, "png", dpi=(dpi, dpi), compress_level=3)
         return {"png": picture.getvalue(), "pdf": content.getvalue()}
 
 

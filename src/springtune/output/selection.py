@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 
-def group(data, name):
+def group(data, name, alone=True):
     """Dataset of a group: ``data`` itself unless it is a tree.
 
     Parameters
@@ -12,6 +12,8 @@ def group(data, name):
     data : xarray.DataTree or xarray.Dataset
     name : str
         Such as ``"sensitivity"``; ``"/"`` is the root.
+    alone : bool
+        Whether the group is enough for what is plotted.
 
     Returns
     -------
@@ -20,9 +22,11 @@ def group(data, name):
     Raises
     ------
     ValueError
-        If the tree has no such group.
+        If the tree has no such group, or there is no tree and the group is not enough.
     """
     if not isinstance(data, xr.DataTree):
+        if not alone:
+            raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
         return data
     if name == "/":
         return data.to_dataset()

@@ -1,6 +1,6 @@
 """Meshes of a beam: of a type, or from a file."""
 
-import os
+from pathlib import Path
 
 from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
 from ..problem.geometry import Beam
@@ -40,7 +40,7 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
     return make(beam.length, beam.height, edge)
 
 
-def read_mesh(path: str | os.PathLike[str], beam: Beam, unit: float | str = "1 m") -> Mesh:
+def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     """Read a mesh of a beam, of any format that meshio knows; its lower left corner is put at the origin.
 
     Parameters

@@ -44,7 +44,8 @@ class MeshModuli:
 
     def __init__(self, mesh: Mesh) -> None:
         self.sheet = Sheet(mesh, 1.0)
-        self._test, self._found = PatchTest(mesh), {}
+        self._test = PatchTest(mesh)
+        self._found: dict[tuple[Any, ...], tuple[float, float, float]] = {}
 
     def __call__(self, material: Material, definition: Any) -> Moduli:
         """As `moduli`."""

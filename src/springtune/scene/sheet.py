@@ -175,8 +175,10 @@ class Sheet:
         self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
-        self._most, self._derived = networks, None
-        self._patterns, self._networks = {}, {}
+        self._most = networks
+        self._derived: tuple[tuple[Any, ...], Springs, float] | None = None
+        self._patterns: dict[bytes, Network] = {}
+        self._networks: dict[bytes, tuple[Network, dict[tuple[LoadKind, float, bool], StaticProblem]]] = {}
 
     def derive(
         self,
@@ -210,7 +212,8 @@ class Sheet:
             If the definition cannot live on the mesh or with the material, or is not told what it needs.
         """
         definition = definition_of(definition)
-        key, given = (definition, material, stiffness), stiffness
+        key: tuple[Any, ...] = definition, material, stiffness
+        given: Any = stiffness
         if definition.needs == "cases":
             given = patch_cases(self.mesh, material, self.thickness) if case is None else self._cases(*case)
             key += case[:2] if case else ()
@@ -222,9 +225,9 @@ class Sheet:
             seconds = time.perf_counter() - begin
             self.deriving += seconds
             self._derived = key, springs, seconds
-        return self._derived[1:]
+        return self._derived[1], self._derived[2]
 
-    def _cases(self, kind, force, field):
+    def _cases(self, kind: LoadKind, force: float, field: np.ndarray | None) -> list[Case]:
         if field is None:
             raise DefinitionError("needs the reference's displacements, and there are none")
         return [Case(self.held(kind), force * self.weights(kind), force * field)]
@@ -244,14 +247,18 @@ class Sheet:
         """
         return self._known(directions, springs)[0]
 
-    def _known(self, directions, springs):
+    def _known(
+        self, directions: np.ndarray, springs: Springs
+    ) -> tuple[Network, dict[tuple[LoadKind, float, bool], StaticProblem]]:
         """Network, and its problems so far."""
         parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
         name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
-        network, problems = self._networks.pop(name, (None, {}))
-        if network is None:
+        if name in self._networks:
+            network, problems = self._networks.pop(name)
+        else:
             like = self._patterns.get(directions.tobytes())
             network = Network(self.mesh, directions, springs.relative, springs.energies, like)
+            problems = {}
             self._patterns.setdefault(directions.tobytes(), network)
         while len(self._networks) >= self._most:
             self._networks.pop(next(iter(self._networks)))

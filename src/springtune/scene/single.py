@@ -359,7 +359,7 @@ class Result:
 
 
 @lru_cache(maxsize=32)
-def _solve_unit(*problem):
+def _solve_unit(*problem: Any) -> "ReferenceSolution":
     from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
 
     return solve_unit(*problem)
@@ -373,12 +373,12 @@ def _reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> 
     return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)
 
 
-def _is(value, wanted, name, example):
+def _is(value: Any, wanted: type, name: str, example: str) -> None:
     if not isinstance(value, wanted):
         raise ValueError(f"{name}: {value!r} is not a {wanted.__name__}; give one such as {example}")
 
 
-def _fills(mesh, beam):
+def _fills(mesh: Mesh, beam: Beam) -> None:
     low, high, box = mesh.points.min(axis=0), mesh.points.max(axis=0), np.array([beam.length, beam.height])
     if np.abs(np.concatenate([low, high - box])).max() > FILLED * box.max():
         shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))

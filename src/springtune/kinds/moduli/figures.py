@@ -21,8 +21,6 @@ FLOOR = 1e-5
 def definitions(tree):
     """Figures that compare definitions: moduli, errors against mesh size by load, and heat maps by mesh type.
 
-    Of the beam, the kinematics and the material that most scenes are of.
-
     Parameters
     ----------
     tree : xarray.DataTree
@@ -35,20 +33,23 @@ def definitions(tree):
     root = group(tree, "/")
     for stem, selection in figures(root["load"].values.tolist(), root.mesh_type.values.tolist()).items():
         if "load" in selection:
-            yield stem, plot_definitions_size, _most(root, selection, ("kinematics", "beam", "material"))
+            yield stem, plot_definitions_size, _main(root, ("beam", "kinematics", "material"), selection)
         elif "mesh_type" in selection:
-            yield stem, plot_definitions_loads, _most(root, selection, ("kinematics", "beam"))
+            yield stem, plot_definitions_loads, _main(root, ("beam", "kinematics"), selection)
         else:
             yield stem, plot_moduli, {}
 
 
-def _most(root, selection, names):
-    """Selection with the labels that most scenes of it are of, one dimension after the other."""
-    here = root[["status"]].sel({name: [label] for name, label in selection.items()})
+def _main(root, names, selection):
+    """Labels that most scenes of a study have; where a selection has none of these, those that most of its own have."""
+    chosen = selection | {name: most_asked(root, name) for name in names}
+    if (root.status.sel(chosen) != 0).any():
+        return chosen
+    root = root[["status"]].sel({name: [label] for name, label in selection.items()})
     for name in names:
-        selection = selection | {name: most_asked(here, name)}
-        here = here.sel({name: [selection[name]]})
-    return selection
+        chosen[name] = most_asked(root, name)
+        root = root.sel({name: [chosen[name]]})
+    return chosen
 
 
 def _looks(names):
@@ -80,15 +81,13 @@ def _arrange(figure, axes, legend, title):
     style.arrange(figure, left=0.62, right=0.1, bottom=legend, top=0.6, wspace=0.06, hspace=hspace, title=title)
 
 
-def _legend(panel, columns=2):
-    panel.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.24),
-        fontsize=5.4,
-        ncols=columns,
-        handlelength=2.0,
-        columnspacing=0.6,
-    )
+def _legend(panel):
+    """Legend under a panel; a panel without lines says why."""
+    if not panel.get_legend_handles_labels()[0]:
+        panel.text(0.5, 0.5, "not solved", transform=panel.transAxes, ha="center", va="center")
+        return
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.24)}
+    panel.legend(**place, fontsize=5.4, ncols=2, handlelength=2.0, columnspacing=0.6)
 
 
 def _grouped(curves):
@@ -123,7 +122,7 @@ def plot_moduli(data, ax=None):
         If ``ax`` is not as many Axes as mesh types.
     """
     moduli = group(data, "moduli")
-    types = labels_of(moduli.status == 1, "mesh_type")
+    types = labels_of(moduli.status == 1, "mesh_type") or labels_of(moduli.status != 0, "mesh_type")
     looks = _looks(moduli.definition.values)
     wanted = moduli.poisson_ratio.values
     figure, axes = _panels(ax, types, 3.1)
@@ -174,7 +173,7 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
     chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
     root = root.sel(chosen)
     error = root.field_error
-    types = [name for name in root.mesh_type.values if np.isfinite(error.sel(mesh_type=name)).all("mesh_size").any()]
+    types = labels_of(np.isfinite(error).all("mesh_size"), "mesh_type") or labels_of(root.status != 0, "mesh_type")
     looks = _looks(root.definition.values)
     figure, axes = _panels(ax, types, 3.5)
     for panel, mesh_type in zip(axes.flat, types):
@@ -230,7 +229,8 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         materials = _spread(root, solved)
     for material in materials:
         choose(root.status != 0, material=material)
-    root = root.isel(definition=np.flatnonzero(solved.any(["mesh_size", "load", "material"])))
+    if solved.any():
+        root = root.isel(definition=np.flatnonzero(solved.any(["mesh_size", "load", "material"])))
     names, loads = root.definition.values, root["load"].values
     figsize = (2.1 + 1.35 * len(materials), 1.35 + 0.23 * len(names))
     figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=figsize)
@@ -264,6 +264,6 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
 def _spread(root, solved):
     """Materials of which most loads are there; of these the first, the middle and the last by Poisson's ratio."""
     counts = solved.any("mesh_size").sum(["definition", "load"]).values
-    full = np.flatnonzero(counts > 0.5 * counts.max())
+    full = np.flatnonzero(counts > 0.5 * counts.max() if counts.any() else counts == 0)
     order = full[np.argsort(root.material_poisson_ratio.values[full], kind="stable")]
     return root.material.values[[*dict.fromkeys((order[0], order[len(order) // 3], order[-1]))]].tolist()

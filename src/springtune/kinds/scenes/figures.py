@@ -33,9 +33,7 @@ def sensitivity(tree):
 
 
 @style.styled
-def plot_sensitivity(
-    data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"
-):  # fmt: skip
+def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"):
     """Deformation error against uniform stiffness, a line a mesh size, as in figures 7 and 8 of the paper.
 
     Marks show where each curve is lowest and where the stiffness of its lattice predicts that. Unstable equilibria are
@@ -165,9 +163,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     """
     root = group(data, "/")
     root, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
-    figure, axes = style.panels(
-        ax, ncols=len(beams), sharey=True, figsize=(1.2 + 2.2 * len(beams), 3.2)
-    )  # fmt: skip
+    figure, axes = style.panels(ax, ncols=len(beams), sharey=True, figsize=(1.2 + 2.2 * len(beams), 3.2))
     axes = axes[0]
     for panel, name in zip(axes, beams):
         here = root.sel(beam=name)
@@ -250,8 +246,7 @@ def plot_deformed(
     ValueError
         If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
     """
-    fields = group(data, "fields")
-    root = group(data, "/")
+    fields, root = group(data, "fields", alone=False), group(data, "/")
     kept = fields.definition.values.tolist()
     definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
     _, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
@@ -280,7 +275,8 @@ def _deformed(panel, fields, selection, beam):
     )
     kept = np.isfinite(outline[:, 0])
     outline, there = outline[kept], there[kept]
-    scale = _round(0.06 * np.ptp(outline[:, 0]) / np.abs(there).max())
+    largest = np.abs(there).max()
+    scale = _round(0.06 * np.ptp(outline[:, 0]) / largest) if largest > 0 else 1
     panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=1.0)
     panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.6", linewidth=0.6, linestyle=(0, (3, 3)))
     known = np.isfinite(fields.spring_first.values)
@@ -349,7 +345,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     ValueError
         If the selection leaves a choice, or nothing, or ``ax`` is not two Axes.
     """
-    root, faces = group(data, "/"), group(data, "block")
+    faces, root = group(data, "block", alone=False), group(data, "/")
     pressed = (root.status != 0).sel(load=["pressure"])
     chosen = choose(pressed, beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
     figure, ((left, right),) = style.panels(ax, ncols=2, figsize=(8.4, 4.2))
