@@ -5,7 +5,11 @@ rule collect:
         config=CONFIG,
         done=DONE,
         printed=STUDY.printed_path or [],
-        code=modules("campaign.collect", *(f"kinds.{name}.{part}" for name in KINDS for part in ("kind", "collect"))),
+        code=modules(
+            "campaign.collect",
+            *(f"kinds.{name}.{part}" for name in KINDS for part in ("kind", "collect")),
+            *(made.collect for made in outputs().values() if made.collect and made.name in STUDY.outputs),
+        ),
     output:
         RESULTS / "dataset.nc",
     params:

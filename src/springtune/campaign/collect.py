@@ -5,12 +5,13 @@ import platform
 import subprocess
 import sys
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
 
 from .. import __version__
 from ..jobs import bundles
 from ..jobs.keys import installed
-from ..kinds import kinds, load_study
+from ..kinds import kinds, load_study, outputs
 from ..output import dataset
 from .plan import COSTS_FILE, usual_costs
 
@@ -47,6 +48,9 @@ def run(config, folder, output):
     for kind in kinds():
         if study.parts[kind.name]:
             groups |= kind.module("collect").groups(study, folder)
+    for output in outputs().values():
+        if output.collect and output.name in study.outputs:
+            groups |= import_module(f"springtune.{output.collect}").groups(study, folder)
     dataset.write(output, groups, _attributes(study, config))
     print(*_objected(groups["/"]), sep="", end="")
     bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob("done/*_*.json")), usual_costs())

@@ -20,6 +20,8 @@ class Output:
         What it is, for the manual.
     figures : callable, optional
         Of a study: labels that each figure selects, a dict, by the stem of its files.
+    collect : str
+        Module with ``groups(study, folder)``: groups of the dataset that this output alone needs; from the package on.
     plot : str
         ``"module:function"`` of what draws the figures, from the package on: a function from a dataset's tree to
         triples of the stem, the function that plots and its selection.
@@ -40,6 +42,7 @@ class Output:
     name: str
     meaning: str
     figures: Callable = lambda study: {}
+    collect: str = ""
     plot: str = ""
     job: str = ""
     tables: Callable = lambda study: []

@@ -4,6 +4,7 @@ from typing import Annotated, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
+from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
 from .fields import (
     BeamName,
@@ -159,10 +160,8 @@ class GridConfig(Section):
 
     beam: Annotated[list[BeamName], OneOrMore()] = Field(description="Beams, by name.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(
-        description="`structured`: equilateral rows fitted to the box; "
-        "`free`: Delaunay inside an outline of imposed edge size; `right`, `alternating`: squares with one diagonal; "
-        "`braced`: squares with both; `isosceles-0.3`, `isosceles-0.5`: rows of triangles whose shape sets that "
-        "Poisson's ratio; or a name under `mesh_files`."
+        description="A name under `mesh_files`, or one of these. "
+        + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(
         description="Lengths of an edge; at most the smaller side of each beam."
