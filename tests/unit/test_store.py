@@ -64,6 +64,7 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     assert "mechanics/statics.py" not in mesh
     # References know the mesh of a network by its type alone, so an edit of a mesh does not solve them again.
     assert not any("springtune/mesh/" in path for path in code.modules("kinds.scenes.reference"))
+    assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again
 
 
 def test_definitions_belong_to_the_stages_that_choose_them_and_to_their_own_keys():

@@ -12,7 +12,6 @@ them.
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -21,10 +20,8 @@ from ..linalg import SOLVERS
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor
 from ..mesh.cells import Mesh
 from .energies import Energy
+from .follower import FollowerPressure
 from .pattern import Pattern
-
-if TYPE_CHECKING:
-    from .statics import FollowerPressure
 
 LARGE = 200_000
 """Unknowns beyond which multigrid takes the place of SuperLU: there it is as fast, and takes a third of the memory."""
@@ -252,7 +249,7 @@ class Network:
         return springs + sum(energy.value(displacements) for energy in self.energies)
 
     def tangent(
-        self, displacements: np.ndarray | None = None, follower: "tuple[float, FollowerPressure] | None" = None
+        self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> csc_array:
         """Derivative of the resistance by the unknowns [1], a sparse matrix, symmetric but for a pressure's part.
 
@@ -330,7 +327,7 @@ class Network:
         return self.factorize_tangent()
 
     def factorize_tangent(
-        self, displacements: np.ndarray | None = None, follower: "tuple[float, FollowerPressure] | None" = None
+        self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> Factor:
         """Factor of the tangent.
 

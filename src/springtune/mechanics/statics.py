@@ -11,9 +11,9 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..linalg.factors import Factor, SingularError
-from ..mesh.cells import Mesh
 from ..problem.status import Status
 from .expansion import Expansion
+from .follower import FollowerPressure
 from .network import Network
 from .newton import KEEP_TANGENT, MAX_FACTORIZATIONS, Equilibrium, Iterate, Newton, norm, refine, uncertainty
 
@@ -42,48 +42,6 @@ START_ORDER = 3
 """Orders of the series that starts Newton's method: together they cost half of a factorization."""
 
 
-class FollowerPressure:
-    """A pressure that turns and grows with the edges that it acts on, of total force 1 at rest.
-
-    Each edge of vector e carries ``e`` turned by a right angle, over the length of the side, half of it on either end.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    edges : ndarray of int, shape (n, 2)
-        Edges of a straight side.
-    axis : int
-        Axis along the side; the force is along the other one.
-    """
-
-    def __init__(self, mesh: Mesh, edges: np.ndarray, axis: int) -> None:
-        along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
-        self.edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)
-        self.rest = mesh.points[self.edges[:, 1]] - mesh.points[self.edges[:, 0]]
-        turn = np.array([[0.0, -1.0], [1.0, 0.0]]) * (1 if axis == 0 else -1)
-        self.turn = 0.5 * turn / np.abs(along).sum()
-        half = np.block([-self.turn, self.turn])
-        self.derivative = np.broadcast_to(np.vstack([half, half]), (len(edges), 4, 4))
-
-    def forces(self, displacements: np.ndarray) -> np.ndarray:
-        """Forces on the particles.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (n_points, 2)
-            [1]
-        """
-        sides = self.rest + displacements[self.edges[:, 1]] - displacements[self.edges[:, 0]]
-        field = np.zeros(displacements.shape)
-        np.add.at(field, self.edges, (sides @ self.turn.T)[:, None, :])
-        return field
-
-
 class StaticProblem:
     """A network under a load pattern.
 
@@ -106,6 +64,7 @@ class StaticProblem:
     --------
     A spring of length 1 and stiffness 1 between a clamp and a roller, pulled by a force of a tenth of the stiffness:
 
+    >>> from springtune.mesh.cells import Mesh
     >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
     >>> held = np.array([[True, True], [False, True], [True, True]])
     >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
