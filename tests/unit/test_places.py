@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import springtune
 from springtune.campaign.plan import stages
@@ -265,57 +264,3 @@ def test_a_mesh_type_is_one_file(added, tmp_path):
     beam = ("--beam", "100x20", "--material", "steel")
     text = python(folder, "-m", "springtune", "predict", *beam, "--mesh", "left", "--size", "10 mm")
     assert "left" in text and "recommended" in text
-
-
-@pytest.fixture(scope="module")
-def repository(tmp_path_factory):
-    """A copy of what a study runs on."""
-    folder, source = tmp_path_factory.mktemp("repository"), Path(__file__).parents[2]
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(source / "src", folder / "src", ignore=ignored)
-    for name in ("workflow", "profiles"):
-        shutil.copytree(source / name, folder / name)
-    (folder / "config").mkdir()
-    shutil.copy(source / "Snakefile", folder)
-    return folder
-
-
-def add_row(path, row, tuple_name):
-    """Put a row at the end of a tuple of a module."""
-    text = path.read_text()
-    begin = text.index(f"{tuple_name} = (")
-    end = text.index(")", begin) if "\n" not in row else text.index("\n)", begin) + 1
-    path.write_text(text[:end] + row + text[end:])
-
-
-def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_a_row_and_a_study(repository):
-    """What CONTRIBUTING.md writes down, run by Snakemake: both have their group, their figures and their keys."""
-    package, written = repository / "src/springtune", 0
-    for place, recipe in RECIPES.items():
-        if place.startswith("kinds/"):
-            (package / place).parent.mkdir(exist_ok=True)
-            (package / place).write_text(recipe)
-            written += 1
-    assert written == 7  # one module of a group, six of a kind
-    row = RECIPES["row of kinds/scenes/outputs.py"].partition("\n")[2]
-    add_row(package / "kinds/scenes/outputs.py", row, "OUTPUTS")
-    add_row(package / "kinds/__init__.py", ', "columns"', "KINDS")
-    study = re.search(r"^```yaml\n# config/columns.yaml\n(.*?)^```", CONTRIBUTING, re.DOTALL | re.MULTILINE)[1]
-    (repository / "config/columns.yaml").write_text(study)
-    command = ["-m", "snakemake", "--snakefile", "Snakefile", "--cores", "2", "--configfile", "config/columns.yaml"]
-    environment = os.environ | {"PYTHONPATH": str(repository / "src")}
-    done = subprocess.run(
-        [sys.executable, *command], cwd=repository, env=environment, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "rule columns:" in done.stdout + done.stderr  # under its own name
-    results = repository / "results/columns"
-    for stem in ("columns", "compliance"):
-        assert (results / f"figures/{stem}.png").stat().st_size and (results / f"figures/{stem}.pdf").stat().st_size
-    with xr.open_datatree(results / "dataset.nc", engine="h5netcdf") as tree:
-        # Euler's column with one end clamped, 2 L long; shear and the clamp take less than a percent of it.
-        euler = np.pi**2 * 210e9 * 1e-3 * 3e-3**3 / 12 / (2 * 60e-3) ** 2
-        assert tree["columns"].buckling_load.sel(definition="delingette").item() == pytest.approx(euler, rel=0.02)
-        # A bar of E t H: the clamp, which holds its end across, takes less than a percent.
-        compliance = tree["compliance"].compliance.sel(beam="60x3", material="steel", load="traction").item()
-        assert compliance == pytest.approx(60e-3 / (210e9 * 1e-3 * 3e-3), rel=0.01)

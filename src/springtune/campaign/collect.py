@@ -48,9 +48,9 @@ def run(config, folder, output):
     for kind in kinds():
         if study.parts[kind.name]:
             groups |= kind.module("collect").groups(study, folder)
-    for output in outputs().values():
-        if output.collect and output.name in study.outputs:
-            groups |= import_module(f"springtune.{output.collect}").groups(study, folder)
+    for made in outputs().values():
+        if made.collect and made.name in study.outputs:
+            groups |= import_module(f"springtune.{made.collect}").groups(study, folder)
     dataset.write(output, groups, _attributes(study, config))
     print(*_objected(groups["/"]), sep="", end="")
     bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob("done/*_*.json")), usual_costs())
