@@ -12,8 +12,9 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
 
+# Files in this order, those that take longest first: at the end no core waits for the other.
 test: $(VENV)/.test
-	pytest -n 2 --dist loadgroup -m "not slow"
+	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 slow: $(VENV)/.test

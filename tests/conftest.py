@@ -4,6 +4,9 @@ import os
 
 from hypothesis import settings
 
+# Two modules of one name cannot both be searched for examples, and these have none.
+collect_ignore_glob = ["conftest.py", "*/conftest.py"]
+
 # Tests run in several processes; threads of theirs would only fight for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

@@ -31,7 +31,7 @@ class Kind:
 
     Examples
     --------
-    >>> KINDS["stress"].unit
+    >>> QUANTITY_KINDS["stress"].unit
     'Pa'
     """
 
@@ -40,7 +40,7 @@ class Kind:
     example: str
 
 
-KINDS = {
+QUANTITY_KINDS = {
     kind.name: kind
     for kind in (
         Kind("length", "m", "200 mm"),
@@ -78,7 +78,7 @@ def parse(text: str, kind: str) -> float:
     text : str
         Number and unit, e.g. ``"200 mm"``.
     kind : str
-        Key of `KINDS`.
+        Key of `QUANTITY_KINDS`.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def parse(text: str, kind: str) -> float:
     ...
     springtune.units.UnitError: '200 mm' is a length; give a force such as '400 kN'
     """
-    wanted = KINDS[kind]
+    wanted = QUANTITY_KINDS[kind]
     remedy = f"give a {kind} such as '{wanted.example}'"
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
@@ -134,7 +134,7 @@ def _spelling(unit: str) -> str:
 
 
 def _article(kind: str) -> str:
-    return f"a {kind}" if kind in KINDS else kind
+    return f"a {kind}" if kind in QUANTITY_KINDS else kind
 
 
 def _measure(unit: str) -> tuple[str, Decimal] | None:
@@ -157,7 +157,7 @@ def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
         size = registry.Quantity(1.0, asked).to_base_units().magnitude
     except Exception:  # pint raises many kinds, tokenizer's and its own
         return None
-    for kind in KINDS.values():
+    for kind in QUANTITY_KINDS.values():
         if asked.dimensionality == registry.parse_units(kind.unit).dimensionality:
             return kind.name, Decimal(f"{size:.15g}")
     return f"of dimension {asked.dimensionality}", Decimal(1)

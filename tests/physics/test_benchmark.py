@@ -40,7 +40,7 @@ CLOSE = {
 
 
 def answer(scene, method, size=2e-3):
-    return APPROACHES[method](scene, size, benchmark._Clock())
+    return APPROACHES[method](scene, size, benchmark.Clock())
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from springtune.study import load_study
+from springtune.kinds import load_study
 
 REPOSITORY = Path(__file__).parents[2]
 PAGES = sorted(

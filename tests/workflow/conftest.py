@@ -42,14 +42,6 @@ class Run:
         return {str(path.relative_to(self.folder)): path.stat().st_mtime_ns for path in self.folder.glob(pattern)}
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the marks
-def pytest_collection_modifyitems(items):
-    """Tests of one file stay on one worker of pytest-xdist, since they share the folder that they run studies in."""
-    for item in items:
-        if item.path.parent == Path(__file__).parent:
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """An empty folder to run studies in, with the printed values beside them."""

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES, Mesh
-from springtune.study import StudyError, load_study
+from springtune.study import StudyError
 
 STUDY = """
 title: Reruns

@@ -30,6 +30,7 @@ for job, made in DRAWN.items():
             RESULTS / f"logs/figures_{job}.log",
         benchmark:
             RESULTS / f"benchmarks/figures_{job}.tsv"
+        priority: 1  # before the tables: what takes longest comes first
         shell:
             "python -m springtune.campaign.draw {input.dataset} {params.folder} {params.outputs} > {log} 2>&1"
 

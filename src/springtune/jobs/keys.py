@@ -5,10 +5,14 @@ import json
 import os
 from dataclasses import asdict
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..mesh import MESH_TYPES
 from .dependencies import digest, mesh_type_digest
+
+if TYPE_CHECKING:
+    from ..problem.geometry import Beam
+    from ..problem.materials import Material
 
 
 def hash_of(*parts: Any) -> str:
@@ -32,7 +36,7 @@ def hash_of(*parts: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
-def installed(package):
+def installed(package: str) -> str:
     """Version of a package; "none" where it is an extra that is not there, or not wanted."""
     from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
 
@@ -44,13 +48,13 @@ def installed(package):
 
 
 @cache
-def stage_key(module, *packages):
+def stage_key(module: str, *packages: str) -> list[str]:
     """What the results of a stage depend on besides their parameters: its modules and these packages."""
     return [digest(module), *(f"{package} {installed(package)}" for package in packages)]
 
 
 @cache
-def mesh_type_key(name):
+def mesh_type_key(name: str) -> list[str]:
     """What meshes of a type depend on besides their parameters; nothing that is known of meshes from files."""
     if name not in MESH_TYPES:
         return []
@@ -58,13 +62,13 @@ def mesh_type_key(name):
 
 
 @cache
-def beam_key(beam):
+def beam_key(beam: "Beam") -> dict[str, Any]:
     """What of a beam results depend on: a new label is not a new beam."""
     return asdict(beam) | {"name": ""}
 
 
 @cache
-def material_key(material, density=False):
+def material_key(material: "Material", density: bool = False) -> dict[str, Any]:
     """What of a material results depend on: statics depend on no density."""
     known = asdict(material) | {"name": ""}
     if not density:

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ..linalg.factors import Factor, SingularError
 from .network import Network
-
-if TYPE_CHECKING:
-    from .statics import StaticProblem
 
 TOLERANCE = 1e-10
 """Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
@@ -97,6 +94,20 @@ class Iterate(NamedTuple):
     residual: float
 
 
+class Balance(Protocol):
+    """What is solved: a network under a load, as `springtune.mechanics.statics.StaticProblem`."""
+
+    network: Network
+    load: np.ndarray
+    load_norm: float
+
+    def balance(self, s: float, displacements: np.ndarray) -> tuple[np.ndarray, float]:
+        """Load less resistance, and its norm over that of the load."""
+
+    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
+        """Factor of the tangent of resistance less load."""
+
+
 class Newton:
     """Newton's method with the exact tangent, under one load.
 
@@ -107,7 +118,7 @@ class Newton:
 
     Parameters
     ----------
-    problem : StaticProblem
+    problem : Balance
     s : float
         Force over the reference stiffness [m].
     max_factorizations : int, optional
@@ -118,7 +129,7 @@ class Newton:
 
     def __init__(
         self,
-        problem: StaticProblem,
+        problem: Balance,
         s: float,
         max_factorizations: int = MAX_FACTORIZATIONS,
         keep_tangent: float = KEEP_TANGENT,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
@@ -12,17 +12,41 @@ from scipy.sparse.linalg import cg
 
 from ..linalg.factors import Factor, factorize
 from .integrators import EXPLICIT, LAGGED, BackwardEuler
-
-if TYPE_CHECKING:
-    from .dynamics import Motion
+from .network import Network
 
 
-def make_stepper(motion: Motion, integrator: str | BackwardEuler, step: float, precision: str = "float64") -> Stepper:
+class Moving(Protocol):
+    """What advances: a network with masses and dampers under a load, as `springtune.mechanics.dynamics.Motion`."""
+
+    network: Network
+    linear: bool
+    load: np.ndarray
+    inertia: np.ndarray
+    mass: np.ndarray
+    mass_damping: float
+    dampers: np.ndarray | None
+
+    @property
+    def stiffness_matrix(self) -> csc_array:
+        """Tangent at rest [1]."""
+
+    @property
+    def damper_matrix(self) -> csc_array | None:
+        """Matrix of the dampers along springs at rest [s]; None without any."""
+
+    def damper_tangent(self, displacements: np.ndarray) -> csc_array | None:
+        """Derivative of the dampers' forces by the velocities [s]; or None."""
+
+    def missing(self, displacements: np.ndarray) -> np.ndarray:
+        """Load less resistance [m], shape (unknowns,)."""
+
+
+def make_stepper(motion: Moving, integrator: str | BackwardEuler, step: float, precision: str = "float64") -> Stepper:
     """State of a run of one integrator.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Moving
     integrator : str or BackwardEuler
         One of `springtune.mechanics.integrators.INTEGRATORS`.
     step : float
@@ -71,7 +95,7 @@ class ExplicitSteps(Stepper):
     Parameters are those of `make_stepper`.
     """
 
-    def __init__(self, motion: Motion, integrator: str, step: float, precision: str) -> None:
+    def __init__(self, motion: Moving, integrator: str, step: float, precision: str) -> None:
         self.motion, self.step = motion, step
         self.half = integrator != "symplectic-euler"
         self.kind = np.dtype(precision).type
@@ -153,7 +177,7 @@ class ExplicitSteps(Stepper):
         return u, v
 
 
-def _damper_forces(motion: Motion, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
+def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
     """Forces of the dampers along springs, shape (unknowns,)."""
     if motion.dampers is None:
         return 0.0
@@ -172,13 +196,13 @@ class BackwardEulerSteps(Stepper):
 
     Parameters
     ----------
-    motion : Motion
+    motion : Moving
     step : float
         [s]
     options : BackwardEuler
     """
 
-    def __init__(self, motion: Motion, step: float, options: BackwardEuler) -> None:
+    def __init__(self, motion: Moving, step: float, options: BackwardEuler) -> None:
         self.motion, self.step, self.options = motion, step, options
         self.solve: Callable[[np.ndarray], np.ndarray] | None = None
 
@@ -215,12 +239,12 @@ class MidpointSteps(Stepper):
 
     Parameters
     ----------
-    motion : Motion
+    motion : Moving
     step : float
         [s]
     """
 
-    def __init__(self, motion: Motion, step: float) -> None:
+    def __init__(self, motion: Moving, step: float) -> None:
         self.motion, self.step = motion, step
         self.factor: Factor | None = None
         self._load = float(np.linalg.norm(motion.network.reduce(motion.load)))

@@ -1,6 +1,7 @@
 """A figure as PNG and as PDF by one pass over it: most of the time of drawing is texts, ticks and layout."""
 
 import io
+from typing import ClassVar
 
 import matplotlib
 import numpy as np
@@ -50,9 +51,12 @@ def png_and_pdf(figure):
 
 
 class _Both(RendererBase):
-    """Draws on a page and in pixels; what it is asked about lengths is answered for the page."""
+    """Draws on a page and in pixels; what it is asked about lengths is answered for the page.
 
-    sizes = {}
+    Artists that ask to be rasterized stay vectors on the page.
+    """
+
+    sizes: ClassVar[dict] = {}
     """Width, height and descent of texts [pt], which many figures share."""
 
     def __init__(self, page, pixels):

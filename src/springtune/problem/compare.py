@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from .status import Status
 
-ROOT = 1e-10
+ROOT_TOLERANCE = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""
 
 HALVINGS = 12
@@ -127,7 +127,7 @@ def _root(solve, reference, first, last, error_first, error_last):
     def error(softness):
         return known[softness] if softness in known else solve(1.0 / softness) - reference
 
-    return float(1.0 / brentq(error, first, last, xtol=1e-15 * first, rtol=ROOT))
+    return float(1.0 / brentq(error, first, last, xtol=1e-15 * first, rtol=ROOT_TOLERANCE))
 
 
 def _last_root(solve, reference, softness, unsolved, error):

@@ -11,7 +11,7 @@ def quantity(value, kind: str, name: str) -> float:
     value : str or float
         E.g. ``"200 mm"`` or ``0.2``.
     kind : str
-        Key of `springtune.units.KINDS`.
+        Key of `springtune.units.QUANTITY_KINDS`.
     name : str
         What it is, for messages.
 
@@ -69,6 +69,6 @@ def positive(value, kind: str, name: str) -> float:
 
 
 def _remedy(kind):
-    from ..units import KINDS
+    from ..units import QUANTITY_KINDS
 
-    return f"give a {kind} such as '{KINDS[kind].example}', or a number in {KINDS[kind].unit}"
+    return f"give a {kind} such as '{QUANTITY_KINDS[kind].example}', or a number in {QUANTITY_KINDS[kind].unit}"

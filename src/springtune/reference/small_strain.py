@@ -43,14 +43,14 @@ FIRST_LEVEL, LAST_LEVEL = 3, 8
 SHRINKAGE = 0.2
 
 #: Largest ratio of neighbouring elements away from the corners, where the solution is smooth.
-GROWTH = 3.0
+GRADING = 3.0
 
 #: Extended precision, in which elements and residuals are evaluated: 64 bits of mantissa on x86, 53 where a platform
 #: has no more; estimates of rounding follow.
 EXTENDED = np.longdouble
 
 #: Relative rounding of a displacement from which on a solution is not refined any more.
-REFINED = 1e-13
+REFINED_UNTIL = 1e-13
 
 #: Most corrections of a solution.
 CORRECTIONS = 40
@@ -438,7 +438,7 @@ class _Grid:
             gain = residual @ correction
             lacking = 2 * abs(float(gain / size / softest))
             rounding = float(unit * work / size)
-            if not lacking > max(REFINED, rounding):
+            if not lacking > max(REFINED_UNTIL, rounding):
                 break
             turn = gain / before
             direction, norm, before = correction + turn * direction, gain + turn**2 * norm, gain
@@ -570,7 +570,7 @@ def _element_ends(length: float, layers: int, kind: LoadKind) -> tuple[np.ndarra
 def _graded(length: float, reach: float, layers: int) -> np.ndarray:
     """Ends of elements from 0 to length: `layers` that shrink towards 0 within its reach, and few beyond."""
     near = reach * SHRINKAGE ** np.arange(layers - 1, -1, -1.0)
-    count = ceil(log(length / reach, GROWTH))  # none where the reach is the length
+    count = ceil(log(length / reach, GRADING))  # none where the reach is the length
     return np.concatenate([[0.0], near, np.geomspace(reach, length, count + 1)[1:]])
 
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..mechanics.moduli import lateral_forces
 from ..mechanics.network import Network
-from ..mechanics.statics import Equilibrium, FollowerPressure, StaticProblem
+from ..mechanics.newton import Equilibrium
+from ..mechanics.statics import FollowerPressure, StaticProblem
 from ..mesh import Mesh
 from ..problem.boundary import held, loaded_edges, measured, weights
 from ..problem.loads import LoadKind

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..linalg.factors import SingularError
 from ..mechanics.network import Network
-from ..mechanics.statics import Equilibrium, StaticProblem
+from ..mechanics.newton import Equilibrium
+from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..problem.compare import deformation_error
 from ..problem.geometry import Beam

@@ -48,8 +48,8 @@ class Scalar:
 
 
 def quantity(kind: str, negative: str = "give a size above zero") -> Any:
-    """Type of a quantity above zero, of a key of `springtune.units.KINDS`."""
-    example = units.KINDS[kind].example
+    """Type of a quantity above zero, of a key of `springtune.units.QUANTITY_KINDS`."""
+    example = units.QUANTITY_KINDS[kind].example
 
     def read(value: str) -> float:
         try:

@@ -7,7 +7,7 @@ from ...output.selection import choose, group
 from ...problem.compare import unbeaten
 from .outputs import figures
 
-FAMILIES = {
+APPROACH_FAMILIES = {
     "springs alone": "#b5382a",
     "springs and energies": "#14213d",
     "finite elements": "#6a994e",
@@ -93,13 +93,13 @@ def plot_benchmark(data, ax=None, *, scene=None):
             continue
         kind = family(approach)
         shown = approach in SHOWN
-        look = {"color": FAMILIES[kind], "linewidth": 1.4 if shown else 0.4, "alpha": 1.0 if shown else 0.35}
+        look = {"color": APPROACH_FAMILIES[kind], "linewidth": 1.4 if shown else 0.4, "alpha": 1.0 if shown else 0.35}
         label = None if kind in labelled else kind
         labelled.add(kind)
         panel.plot(seconds[good], errors[good], marker="o", markersize=3 if shown else 1.5, label=label, **look)
         if shown:
             last = np.flatnonzero(good)[0]
-            ends.append((seconds[last], errors[last], approach, FAMILIES[kind]))
+            ends.append((seconds[last], errors[last], approach, APPROACH_FAMILIES[kind]))
         panel.plot(seconds[ring], errors[ring], "o", markersize=8, markerfacecolor="none", markeredgecolor="black",
                    markeredgewidth=0.8)  # fmt: skip
     estimate = 100 * float(case.reference_error_estimate)
@@ -115,7 +115,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
 
 def _scene(data, scene):
     data = group(data, "benchmark")
-    return data.sel(choose(data.seconds.notnull(), scene=scene))
+    return data.sel(choose(data.scene.notnull(), scene=scene))
 
 
 def _name_ends(panel, ends):

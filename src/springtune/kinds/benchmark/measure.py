@@ -64,7 +64,7 @@ class LoadedBeam:
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
 
 
-class _Clock:
+class Clock:
     """Seconds of each part of a run."""
 
     def __init__(self):
@@ -72,6 +72,7 @@ class _Clock:
 
     @contextmanager
     def __call__(self, part):
+        """Context whose seconds are a part's."""
         begin = time.perf_counter()
         yield
         self.seconds[part] += time.perf_counter() - begin
@@ -194,7 +195,7 @@ def _repeat(send, scene, approach, size, mesh, meshing, once):
     seconds, parts = [], []
     try:
         while True:
-            clock, begin = _Clock(), time.perf_counter()
+            clock, begin = Clock(), time.perf_counter()
             if mesh is None:
                 displacement, unknowns = APPROACHES[approach](scene, size, clock)
             else:

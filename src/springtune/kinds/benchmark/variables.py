@@ -6,7 +6,7 @@ from ...output.dataset import Group
 
 CASE = ("scene", "approach", "mesh_size")
 OF_SCENE = ("scene",)
-SOLVED = ("linear_solver", "mesh_size")
+SOLVER_AXES = ("linear_solver", "mesh_size")
 
 BENCHMARK = Group(
     "/benchmark",
@@ -43,8 +43,8 @@ BENCHMARK = Group(
         "reference_error_estimate": (OF_SCENE, "1", "estimated relative error of the reference", np.nan),
         "reference_seconds": (OF_SCENE, "s", "time of the reference", np.nan),
         "machine_load": (OF_SCENE, "1", "load of the machine at the start, processes", np.nan),
-        "solver_seconds": (SOLVED, "s", "time from a matrix to a solution, its sparsity analysed", np.nan),
-        "solver_again_seconds": (SOLVED, "s", "time of the next matrix of that sparsity", np.nan),
+        "solver_seconds": (SOLVER_AXES, "s", "time from a matrix to a solution, its sparsity analysed", np.nan),
+        "solver_again_seconds": (SOLVER_AXES, "s", "time of the next matrix of that sparsity", np.nan),
         "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", np.nan),
         "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", np.nan),
         "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", np.nan),

@@ -7,7 +7,7 @@ from ...output.dataset import most_asked
 from ...output.selection import choose, group, labels_of
 from .outputs import figures
 
-FAMILIES = (
+DEFINITION_FAMILIES = (
     ("uniform", "van-gelder", "lattice", "element-fit"),
     ("area", "angular", "delingette", "adjoint"),
     ("baudet", "baudet-corrected", "flechon", "axis-exact"),
@@ -54,7 +54,7 @@ def _main(root, names, selection):
 
 def _looks(names):
     """Look of the line of each definition."""
-    order = [name for family in FAMILIES for name in family]
+    order = [name for family in DEFINITION_FAMILIES for name in family]
     order += [name for name in names if name not in order]
     return {name: style.line(number) for number, name in enumerate(order)}
 
@@ -84,7 +84,7 @@ def _arrange(figure, axes, legend, title):
 def _legend(panel):
     """Legend under a panel; a panel without lines says why."""
     if not panel.get_legend_handles_labels()[0]:
-        panel.text(0.5, 0.5, "not solved", transform=panel.transAxes, ha="center", va="center")
+        panel.text(0.5, 0.5, "not solved on every mesh size", transform=panel.transAxes, ha="center", va="center")
         return
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.24)}
     panel.legend(**place, fontsize=5.4, ncols=2, handlelength=2.0, columnspacing=0.6)

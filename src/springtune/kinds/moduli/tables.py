@@ -55,8 +55,8 @@ def _csv(data, dimensions, values):
 
 # -- which definition to use -------------------------------------------------------------------------------------------
 
-MESH_TYPES = ("structured", "free", "braced", "alternating", "right")
-LOADS = ("traction", "bending", "shear")
+TABLE_MESH_TYPES = ("structured", "free", "braced", "alternating", "right")
+TABLE_LOADS = ("traction", "bending", "shear")
 
 
 ADVICE = (
@@ -80,7 +80,7 @@ def _advice(root):
     """What to use, with the range of its errors over all beams and mesh sizes, by mesh size over height."""
     kinematics = most_asked(root, "kinematics")
     materials = _materials(root, most_asked(root, "beam"))
-    loads = [load for load in LOADS if load in root["load"].values]
+    loads = [load for load in TABLE_LOADS if load in root["load"].values]
     here = root[["deformation_error", "status"]].sel(kinematics=kinematics)
     ratios = root.mesh_size.values / root.beam_height.values[:, None]
     heads = [f"{load}, ν = {nu:g}" for load in loads for nu in materials]
@@ -134,7 +134,7 @@ def decision(tree):
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
     advice = _advice(root)
     parts = ["### In short", "", *advice, ""] if advice else []
-    for mesh_type in MESH_TYPES:
+    for mesh_type in TABLE_MESH_TYPES:
         lines = _attained(root, moduli, mesh_type) if mesh_type in root.mesh_type.values else []
         if lines:
             parts += [f"### Mesh type `{mesh_type}`", "", *lines, ""]
@@ -159,7 +159,7 @@ def _attained(root, moduli, mesh_type):
     """Moduli and deformation errors of one and the same mesh size, the finest, of the beam that most scenes are of."""
     beam = most_asked(root, "beam")
     materials = _materials(root, beam)
-    loads = [load for load in LOADS if load in root["load"].values]
+    loads = [load for load in TABLE_LOADS if load in root["load"].values]
     fine, height = min(root.mesh_size.values), float(root.beam_height.sel(beam=beam))
     here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_asked(root, "kinematics"))
     ratios = [ratio for ratio in materials if ratio in moduli.poisson_ratio.values]

@@ -38,7 +38,7 @@ COPIED = (
 SMALL_STRAIN = "small-strain-plane-stress"
 """Name of the reference that all studies have."""
 
-FACE = {
+FACE_VARIABLES = {
     "displacement": "face_displacement",
     "face_mean": "face_mean_displacement",
     "face_profile": "face_profile",
@@ -165,7 +165,7 @@ def _scenes(study, folder, root, block, fields, objections):
             labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
             root.put(values, **labels)
             if LOADS[scene.load].kind.pressed:
-                block.put({new: result[old] for old, new in FACE.items() if old in result}, **labels)
+                block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **labels)
             if "displacements" in result:
                 x, y = result["displacements"].T
                 fields.put_rows({"displacement_x": x, "displacement_y": y}, **labels)

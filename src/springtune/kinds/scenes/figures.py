@@ -11,7 +11,7 @@ from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
 
-LIMIT = 60.0
+MOST_SHOWN = 60.0
 """Largest error shown [%]."""
 
 
@@ -108,7 +108,7 @@ def _sensitivity(curves, root, selection, ax):
     axes.plot([], [], marker="|", markersize=10, markeredgewidth=1.6, color="0.3", linestyle="", label="predicted")
     if unstable_shown:
         axes.plot([], [], color="0.3", linewidth=0.7, label="buckled: equilibrium unstable")
-    axes.set(xlim=(lowest / unit, highest / unit), ylim=(0, LIMIT), ylabel="|Deformation error| [%]")
+    axes.set(xlim=(lowest / unit, highest / unit), ylim=(0, MOST_SHOWN), ylabel="|Deformation error| [%]")
     axes.set_xlabel(f"Uniform spring stiffness [{'' if unit == 1 else '10⁶ '}N/m]")
     axes.legend(loc="upper center", bbox_to_anchor=(0.62, 1.0), ncols=2)
     axes.set_title(title)
@@ -301,7 +301,7 @@ def _round(value):
 
 # -- the pressed block -------------------------------------------------------------------------------------------------
 
-LOADS = ("traction", "compression", "pressure")
+BLOCK_LOADS = ("traction", "compression", "pressure")
 ENERGIES = ("area", "delingette")
 POISSON_LAW = (4 / 3) / (9 / 8)
 """Constrained modulus of a block held sideways at nu = 1/2 over that of a network, nu = 1/3 [1]."""
@@ -362,7 +362,7 @@ def _stiffness(panel, curves, root):
     """Linear kinematics: the reference's own, so that only the law of stiffness is seen."""
     curves = curves.sel(kinematics="linear")
     membrane = float(root.material_young_modulus) * 1e-3
-    for number, load in enumerate(LOADS):
+    for number, load in enumerate(BLOCK_LOADS):
         if load in curves["load"]:
             curve = curves.sel(load=load)
             # A linear network's displacement goes as 1/k.
@@ -386,7 +386,9 @@ def _stiffness(panel, curves, root):
                 rotation=90, va="top", fontsize=6.2, color="0.3",
             )  # fmt: skip
     for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
-        errors = 100 * np.abs(root.deformation_error.sel(definition=definition, kinematics="linear", load=list(LOADS)))
+        errors = 100 * np.abs(
+            root.deformation_error.sel(definition=definition, kinematics="linear", load=list(BLOCK_LOADS))
+        )
         look = style.line(3 + number) | {"marker": ""}
         worst = float(errors.max())
         panel.axhline(worst, label=f"{definition}, worst of the three ({worst:.2f} %)", **look)
