@@ -8,8 +8,6 @@ import click
 
 from . import __version__
 from .jobs.atomic import write_text
-from .problem.loads import LOADS
-from .reference.similarity import unit_problem
 
 SCHEMA = "study.schema.json"
 MANUAL = "README.md"
@@ -26,7 +24,8 @@ def main():
 @click.argument("config", type=click.Path(path_type=Path))
 def scenes(config):
     """Say what a study asks for, before anything runs."""
-    from .kinds import load_study  # here, so that --help does not wait for it
+    from .kinds import kinds, load_study  # here, so that --help does not wait for it
+    from .kinds.scenes.summary import summary
     from .study import StudyError
 
     try:
@@ -34,15 +33,17 @@ def scenes(config):
     except StudyError as error:
         click.echo(str(error), err=True)
         raise SystemExit(1) from None
-    click.echo(summary(study))
+    parts = [(kind, study.parts[kind.name]) for kind in kinds()]
+    click.echo(summary(study, [row for kind, part in parts if part for row in kind.summary(part)]))
 
 
 @main.command()
 def definitions():
     """List the definitions of spring stiffness."""
+    from .kinds.scenes.summary import aligned
     from .springs import DEFINITIONS
 
-    click.echo(_table([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
+    click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
 
 
 MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
@@ -200,6 +201,7 @@ def prediction_text(title, beam, material, choices, known, mesh_type="", sizes=(
     -------
     str
     """
+    from .kinds.scenes.summary import aligned
     from .prediction import CASES
 
     modulus = material.young_modulus
@@ -227,7 +229,7 @@ def prediction_text(title, beam, material, choices, known, mesh_type="", sizes=(
         "",
         f"recommended: {first}; with springs alone: {plain}",
         "",
-        _table(rows, left=2, right=(3, 4, 5, 6, 7)),
+        aligned(rows, left=2, right=(3, 4, 5, 6, 7)),
         "",
         f"Errors are of the displacement of the loaded side, above zero where too soft: {how},",
         "with linear kinematics (small strain), against the converged reference of small strain (error estimate "
@@ -357,100 +359,6 @@ def _tables(command, text, group, dataset, page):
             f"{page}: the marks around the generated tables are missing; put {begin.strip()} and {end.strip()}"
         )
     write_text(page, before + begin + "\n" + tables + "\n" + end + after)
-
-
-# -- scenes ------------------------------------------------------------------------------------------------------------
-
-
-def summary(study):
-    """What a study asks for and what of it is shared, as text.
-
-    Parameters
-    ----------
-    study : Study
-
-    Returns
-    -------
-    str
-    """
-    from .kinds import kinds
-
-    units = {unit_problem(one.beam, one.material, LOADS[one.load].kind) for one in study.references}
-    networks = _networks(study)
-    asked = sum(len(grid.scenes) for grid in study.grids)
-    users = len(study.scenes) + len(study.curves)
-    again = f"{asked} asked, {asked - len(study.scenes)} of them more than once" if asked > len(study.scenes) else ""
-    rows = [
-        ["scenes", len(study.scenes), again],
-        ["meshes", len(study.meshes), f"each serves {users / len(study.meshes):.3g} scenes and curves on average"],
-        [
-            "references",
-            len(study.references),
-            f"from {_count(len(units), 'solution')}: small strain scales with force, E t and size",
-        ],
-        ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
-        ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
-    ]
-    for kind in kinds():
-        rows += kind.summary(study.parts[kind.name]) if study.parts[kind.name] else []
-    if study.printed:
-        rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
-    lines = [f"{study.name}: {study.title}", "", _table(rows, left=0, right=(1,)), ""]
-    return "\n".join([*lines, _table(_contributions(study), left=0, right=(1, 2, 3, 4, 5))])
-
-
-def _count(number, noun):
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}{'e' if noun.endswith('ch') else ''}s"
-
-
-def _networks(study):
-    """Number of distinct tangents at rest, at most: uniform networks of a mesh differ by a factor only."""
-    from .springs import DEFINITIONS
-
-    found = {(curve.mesh, LOADS[curve.load].kind.held, "uniform") for curve in study.curves}
-    for scene in study.scenes:
-        uniform = DEFINITIONS[scene.definition].uniform
-        held = LOADS[scene.load].kind.held
-        found.add((scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.poisson_ratio)))
-    return len(found)
-
-
-def _within(study):
-    """Number of printed cells that the study has scenes for."""
-    cells = {
-        (scene.mesh.beam.name, scene.mesh.mesh_type, scene.mesh.mesh_size, scene.material.name, scene.load)
-        for scene in study.scenes
-    }
-    return sum((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load) in cells for cell in study.printed)
-
-
-def _contributions(study):
-    """Rows of what each grid asks for; new scenes are those that no grid above asks for."""
-    rows = [["grid", "scenes", "new", "meshes", "references", "curves"]]
-    seen = set()
-    for grid in study.grids:
-        meshes = {scene.mesh for scene in grid.scenes}
-        references = {(scene.mesh.beam, scene.material, scene.load) for scene in grid.scenes}
-        new = set(grid.scenes) - seen
-        seen |= new
-        rows.append([grid.name, len(grid.scenes), len(new), len(meshes), len(references), len(grid.curves)])
-    extra = set(study.curves) - {curve for grid in study.grids for curve in grid.curves}
-    if extra:
-        rows.append(["(calibration)", "", "", "", "", len(extra)])
-    return rows
-
-
-def _table(rows, left, right=()):
-    """Rows in columns, those in `right` flush right."""
-    texts = [[str(cell) for cell in row] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*texts)]
-    lines = []
-    for row in texts:
-        cells = [
-            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
-        ]
-        lines.append((" " * left + "  ".join(cells)).rstrip())
-    return "\n".join(lines)
 
 
 # -- schema and manual -------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Places to touch: a result group with its figure is a module and a row; a kind of study a package, a row and a study."""
+"""Places to touch: a result group with a figure is a module and a row; a kind of study a package, a row, a study."""
 
 import os
 import re

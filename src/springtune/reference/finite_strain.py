@@ -27,7 +27,7 @@ from ..problem.materials import Material
 COUNTS = (5, 8)
 """Elements over half the height of the two meshes that are solved; the second is the answer."""
 
-GRADING = 3
+GRADING_POWER = 3
 """Power law of the elements' coordinates towards the corners."""
 
 TOLERANCE = 1e-6
@@ -297,7 +297,7 @@ def _matrix(stress):
 
 def _element_ends(length, count, kind):
     """Ends of the elements along x and along y: of half of a symmetric beam, see `LoadKind.cut`, else of the whole."""
-    near = np.linspace(0, 1, count + 1) ** GRADING
+    near = np.linspace(0, 1, count + 1) ** GRADING_POWER
     both = np.concatenate([near, 2 - near[-2::-1]])
     if kind.along == 0:
         half = _spread(near, length / 2, count)

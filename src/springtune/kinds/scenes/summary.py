@@ -1,0 +1,93 @@
+"""What a study asks for, before anything runs."""
+
+from ...problem.loads import LOADS
+from ...reference.similarity import unit_problem
+from ...springs import DEFINITIONS
+
+
+def summary(study, further):
+    """What a study asks for and what of it is shared, as text.
+
+    Parameters
+    ----------
+    study : Study
+    further : list of list
+        Rows on what it asks for besides scenes: a name, a number and a remark each.
+
+    Returns
+    -------
+    str
+    """
+    units = {unit_problem(one.beam, one.material, LOADS[one.load].kind) for one in study.references}
+    networks = _networks(study)
+    asked = sum(len(grid.scenes) for grid in study.grids)
+    users = len(study.scenes) + len(study.curves)
+    again = f"{asked} asked, {asked - len(study.scenes)} of them more than once" if asked > len(study.scenes) else ""
+    rows = [
+        ["scenes", len(study.scenes), again],
+        ["meshes", len(study.meshes), f"each serves {users / len(study.meshes):.3g} scenes and curves on average"],
+        [
+            "references",
+            len(study.references),
+            f"from {_count(len(units), 'solution')}: small strain scales with force, E t and size",
+        ],
+        ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
+        ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
+    ]
+    rows += further
+    if study.printed:
+        rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
+    lines = [f"{study.name}: {study.title}", "", aligned(rows, left=0, right=(1,)), ""]
+    return "\n".join([*lines, aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))])
+
+
+def _count(number, noun):
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}{'e' if noun.endswith('ch') else ''}s"
+
+
+def _networks(study):
+    """Number of distinct tangents at rest, at most: uniform networks of a mesh differ by a factor only."""
+    found = {(curve.mesh, LOADS[curve.load].kind.held, "uniform") for curve in study.curves}
+    for scene in study.scenes:
+        uniform = DEFINITIONS[scene.definition].uniform
+        held = LOADS[scene.load].kind.held
+        found.add((scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.poisson_ratio)))
+    return len(found)
+
+
+def _within(study):
+    """Number of printed cells that the study has scenes for."""
+    cells = {
+        (scene.mesh.beam.name, scene.mesh.mesh_type, scene.mesh.mesh_size, scene.material.name, scene.load)
+        for scene in study.scenes
+    }
+    return sum((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load) in cells for cell in study.printed)
+
+
+def _contributions(study):
+    """Rows of what each grid asks for; new scenes are those that no grid above asks for."""
+    rows = [["grid", "scenes", "new", "meshes", "references", "curves"]]
+    seen = set()
+    for grid in study.grids:
+        meshes = {scene.mesh for scene in grid.scenes}
+        references = {(scene.mesh.beam, scene.material, scene.load) for scene in grid.scenes}
+        new = set(grid.scenes) - seen
+        seen |= new
+        rows.append([grid.name, len(grid.scenes), len(new), len(meshes), len(references), len(grid.curves)])
+    extra = set(study.curves) - {curve for grid in study.grids for curve in grid.curves}
+    if extra:
+        rows.append(["(calibration)", "", "", "", "", len(extra)])
+    return rows
+
+
+def aligned(rows, left, right=()):
+    """Rows in columns, those in `right` flush right."""
+    texts = [[str(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*texts)]
+    lines = []
+    for row in texts:
+        cells = [
+            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
+        ]
+        lines.append((" " * left + "  ".join(cells)).rstrip())
+    return "\n".join(lines)
