@@ -11,11 +11,11 @@ from springtune.kinds.benchmark.approaches import APPROACHES
 from springtune.kinds.benchmark.measure import LoadedBeam
 from springtune.kinds.benchmark.names import OTHER_APPROACHES, approach_names
 from springtune.kinds.benchmark.tables import comparison
+from springtune.kinds.benchmark.variables import BENCHMARK
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.output.dataset import BENCHMARK_VARIABLES
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL
@@ -85,13 +85,19 @@ def test_calculix_takes_part(name, references):
     assert answer(SCENES[name], "calculix-cps8")[0] == pytest.approx(references[name], rel=2e-3)
 
 
-def test_a_race_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
-    methods = approach_names(["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "free-form"])
-    assert methods == ("lattice/structured", "lattice/braced", "delingette/structured", "linear-triangles", "free-form")
-    found = benchmark.run(SCENES["traction"], methods, (2e-3, 5e-3, 1e-2), 1e-6, ["lattice/braced"], 10.0)
-    sizes = {"scene": 1, "method": len(methods), "mesh_size": 3}
+def test_a_case_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
+    approaches = approach_names(["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "free-form"])
+    assert approaches == (
+        "lattice/structured",
+        "lattice/braced",
+        "delingette/structured",
+        "linear-triangles",
+        "free-form",
+    )
+    found = benchmark.run(SCENES["traction"], approaches, (2e-3, 5e-3, 1e-2), 1e-6, ["lattice/braced"], 10.0)
+    sizes = {"scene": 1, "approach": len(approaches), "mesh_size": 3}
     for name, values in found.items():
-        assert np.shape(values) == tuple(sizes[one] for one in BENCHMARK_VARIABLES[name][0] if one != "scene"), name
+        assert np.shape(values) == tuple(sizes[one] for one in BENCHMARK.variables[name][0] if one != "scene"), name
     assert np.isfinite(found["seconds"][1]).all() and np.isfinite(found["seconds"][0]).tolist() == [False, False, True]
     assert "left out" in found["message"][0, 0] and (found["peak_memory"][1] >= 0).all()
     assert np.abs(found["error"][2, 2]) < 0.01
@@ -100,11 +106,11 @@ def test_a_race_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
 
 
 def test_errors_are_checked_on_a_second_beam():
-    """A definition's error there is what a race of that beam has, and the assured error is the largest of all."""
+    """A definition's error there is what a run of that beam has, and the assured error is the largest of all."""
     second = Beam(0.06, 0.015, 1e-3, "60x15")
-    methods, sizes = ("lattice/structured", "linear-triangles"), (2e-3, 5e-3)
-    found = benchmark.run(SCENES["block"], methods, sizes, 10.0, second_beam=second)
-    there = benchmark.run(replace(SCENES["block"], beam=second), methods, sizes, 10.0)
+    approaches, sizes = ("lattice/structured", "linear-triangles"), (2e-3, 5e-3)
+    found = benchmark.run(SCENES["block"], approaches, sizes, 10.0, second_beam=second)
+    there = benchmark.run(replace(SCENES["block"], beam=second), approaches, sizes, 10.0)
     assert found["second_error"] == pytest.approx(there["error"], rel=1e-9)
     assert np.isnan(found["assured_error"][:, 0]).all()  # nothing finer was run
     both = np.abs([found["error"], found["second_error"]])
@@ -127,9 +133,9 @@ def test_a_case_that_fails_is_stored_with_its_message():
 
 def test_comparison_flags_what_became_slower():
     values = np.full((1, 3, 2), 0.1)
-    coordinates = {"scene": ["a"], "method": ["x", "y", "z"], "mesh_size": [1e-3, 2e-3]}
-    old = xr.Dataset({"seconds": (("scene", "method", "mesh_size"), values),
-                      "seconds_spread": (("scene", "method", "mesh_size"), 0.01 * values)}, coordinates)  # fmt: skip
+    coordinates = {"scene": ["a"], "approach": ["x", "y", "z"], "mesh_size": [1e-3, 2e-3]}
+    old = xr.Dataset({"seconds": (("scene", "approach", "mesh_size"), values),
+                      "seconds_spread": (("scene", "approach", "mesh_size"), 0.01 * values)}, coordinates)  # fmt: skip
     new = 2.0 * old  # a machine half as fast
     assert comparison(old, new)[1] == 0
     new["seconds"][0, 1] *= 2

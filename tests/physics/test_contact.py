@@ -7,13 +7,13 @@ import pytest
 from netgen.geom2d import SplineGeometry
 from netgen.meshing import MeshingParameters
 
+from springtune.kinds.laying.kind import REFERENCE_SIZES
 from springtune.kinds.laying.lay import lay
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, oriented_outline
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, signed_areas
 from springtune.problem.compare import band
 from springtune.problem.geometry import Strip, Trapezoid
-from springtune.problem.loads import REFERENCE_SIZES
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 

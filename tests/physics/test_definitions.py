@@ -300,7 +300,7 @@ def test_stage_measures_the_mesh_that_is_made(tmp_path, mesh_type):
     """Rows fitted to a box are no exact lattice: on 100 x 20 mm at 2 mm, E is off by +3.3 % and nu is .356."""
     box = {"length": 0.1, "height": HEIGHT}
     asked = [{"key": "one", "definition": "lattice", "poisson_ratio": 0.3}]
-    task = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "asked": asked}
+    task = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "measurements": asked}
     atomic.write_json(tmp_path / "tasks.json", {"folder": str(tmp_path), "patches": [task]})
     moduli.run(tmp_path / "tasks.json", tmp_path / "done.json")
     found = store.read(tmp_path / "one.h5", ["one"])["one"]

@@ -18,6 +18,8 @@ from springtune import prediction
 from springtune.cli import BEGIN, END, MANUAL, SCHEMA, main, manual_text, prediction_text, schema_text
 from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 from springtune.study import sections, study_model
 
@@ -179,6 +181,15 @@ class TestSchema:
     def test_every_section_is_in_the_manual(self):
         models = {model.__name__ for model in sections(study_model(kinds())).values()}
         assert models == {*json.loads(schema_text())["$defs"], "StudyConfig"}
+
+
+@pytest.fixture(scope="module")
+def choices():
+    """Beam, material, references and choices of the command without its text."""
+    beam, material = Beam(0.1, 0.02), Material(210e9, 0.3, name="steel")
+    known = prediction.references(beam, material)
+    mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
+    return beam, material, known, prediction.predict(beam, mesh, material, known)
 
 
 class TestPredict:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.campaign import collect
+from springtune.campaign import collect, page
 from springtune.jobs import store
-from springtune.kinds.scenes import tables as page
 
 STUDY = """
 title: A beam that bends too far

@@ -1,4 +1,4 @@
-"""Places to touch: a result group with a figure is a module and a row; a kind of study a package, a row, a study."""
+"""Places to touch: a result group with its figure is a module and a row, a study kind a package, a row and a study."""
 
 import os
 import re
@@ -66,9 +66,9 @@ def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_a_row_and_a_study
     for stem in ("columns", "compliance"):
         assert (results / f"figures/{stem}.png").stat().st_size and (results / f"figures/{stem}.pdf").stat().st_size
     with xr.open_datatree(results / "dataset.nc", engine="h5netcdf") as tree:
-        # Euler's column with one end clamped, 2 L long; shear and the clamp take less than a percent of it.
+        # Euler's column with one end clamped, 2 L long; twelve rows of linear triangles bend one percent too stiffly.
         euler = np.pi**2 * 210e9 * 1e-3 * 3e-3**3 / 12 / (2 * 60e-3) ** 2
-        assert tree["columns"].buckling_load.sel(definition="delingette").item() == pytest.approx(euler, rel=0.02)
+        assert tree["columns"].buckling_load.sel(definition="delingette").item() == pytest.approx(euler, rel=0.015)
         # A bar of E t H: the clamp, which holds its end across, takes less than a percent.
         compliance = tree["compliance"].compliance.sel(beam="60x3", material="steel", load="traction").item()
         assert compliance == pytest.approx(60e-3 / (210e9 * 1e-3 * 3e-3), rel=0.01)

@@ -43,7 +43,7 @@ FIRST_LEVEL, LAST_LEVEL = 3, 8
 SHRINKAGE = 0.2
 
 #: Largest ratio of neighbouring elements away from the corners, where the solution is smooth.
-GRADING = 3.0
+ELEMENT_GROWTH = 3.0
 
 #: Extended precision, in which elements and residuals are evaluated: 64 bits of mantissa on x86, 53 where a platform
 #: has no more; estimates of rounding follow.
@@ -570,7 +570,7 @@ def _element_ends(length: float, layers: int, kind: LoadKind) -> tuple[np.ndarra
 def _graded(length: float, reach: float, layers: int) -> np.ndarray:
     """Ends of elements from 0 to length: `layers` that shrink towards 0 within its reach, and few beyond."""
     near = reach * SHRINKAGE ** np.arange(layers - 1, -1, -1.0)
-    count = ceil(log(length / reach, GRADING))  # none where the reach is the length
+    count = ceil(log(length / reach, ELEMENT_GROWTH))  # none where the reach is the length
     return np.concatenate([[0.0], near, np.geomspace(reach, length, count + 1)[1:]])
 
 

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ..mechanics.follower import FollowerPressure
 from ..mechanics.moduli import lateral_forces
 from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
-from ..mechanics.statics import FollowerPressure, StaticProblem
+from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..problem.boundary import held, loaded_edges, measured, weights
 from ..problem.loads import LoadKind

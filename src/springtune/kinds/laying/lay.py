@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanics.contact import Body, Contact, ContactError, Obstacle
-from ...mechanics.statics import FollowerPressure
+from ...mechanics.follower import FollowerPressure
 from ...mesh import MESH_TYPES, Mesh
 from ...scene.sheet import Sheet
 
