@@ -7,8 +7,7 @@
 include: "workflow/rules/common.smk"
 include: "workflow/rules/stages.smk"
 include: "workflow/rules/collect.smk"
-include: "workflow/rules/figures.smk"
-include: "workflow/rules/tables.smk"
+include: "workflow/rules/outputs.smk"
 
 
 rule all:
@@ -19,5 +18,4 @@ rule all:
         # Stages before the dataset, too: what they store is made again where it is missing.
         DONE,
         rules.collect.output,
-        rules.figures_all.input,
-        TABLES,
+        OUTPUTS.values(),

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from springtune.campaign import draw
+from springtune.campaign import present
 from springtune.jobs.dependencies import modules
 from springtune.kinds import outputs
 from springtune.kinds.base import FORMATS, Output
@@ -457,7 +457,7 @@ def test_the_stage_draws_what_it_is_told(tree, tmp_path):
     chosen = {"beam": ["100x20"], "material": ["steel"], "load": ["traction"]}
     small, curves = tree.to_dataset().sel(chosen), tree["sensitivity"].to_dataset().sel(chosen)
     xr.DataTree.from_dict({"/": small, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
-    stems = draw.run(path, tmp_path / "figures", "size", "sensitivity")
+    stems = present.run(path, tmp_path, "size", "sensitivity")
     assert stems == [
         "size_structured_steel_traction",
         "size_free_steel_traction",
@@ -492,7 +492,7 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
-        files = {*modules("campaign.draw"), *modules(output.module)}
+        files = {*modules("campaign.present"), *modules(output.module)}
         return {Path(path).parent.name for path in files if Path(path).name == "figures.py"}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}

@@ -35,7 +35,7 @@ def table_files(output, study):
     list of str
     """
     if not output.page:
-        return output.tables(study)
+        return list(output.tables(study))
     return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
 
 

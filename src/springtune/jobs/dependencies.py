@@ -133,12 +133,14 @@ def _source(path: str | Path) -> bytes:
 
 
 def _executed(tree: ast.AST) -> Iterator[ast.AST]:
-    """Nodes of a module, without what type checkers alone read."""
+    """Statements of a module, without what type checkers alone read."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
         if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
-            waiting += ast.iter_child_nodes(node)
+            for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+                inside = getattr(node, part, ())
+                waiting += inside if isinstance(inside, list) else ()  # a lambda's body is an expression
             yield node
 
 

@@ -26,7 +26,7 @@ class Output:
         ``"module:function"`` of what draws the figures, from the package on: a function from a dataset's tree to
         triples of the stem, the function that plots and its selection.
     job : str
-        Name of the job that draws; outputs that share it are drawn by one process. By default its own name.
+        Name of the job that makes it; outputs that share it are made by one process. By default its own name.
     tables : callable, optional
         Of a study: names of the files of its tables.
     write : str
@@ -52,8 +52,8 @@ class Output:
     usual: bool = False
 
     @property
-    def drawn_by(self):
-        """Name of the job that draws the figures."""
+    def made_by(self):
+        """Name of the job that makes it."""
         return self.job or self.name
 
     @property

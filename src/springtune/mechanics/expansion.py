@@ -10,7 +10,6 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..linalg.factors import Factor
 from .network import Network
@@ -224,6 +223,8 @@ class Expansion:
         apart = [self._shares(sigma, less) @ self.loads - s for sigma in (0.0, farthest)]
         if apart[0] * apart[1] >= 0:  # the last one but for rounding, or for what the approximants differ by
             return farthest
+        from scipy.optimize import brentq  # here: the import takes as long as many scenes, which do without
+
         return brentq(lambda sigma: self._shares(sigma, less) @ self.loads - s, 0.0, farthest, xtol=1e-300, rtol=1e-14)
 
     def value(self, weights: np.ndarray, s: float, farthest: float) -> tuple[float, float]:

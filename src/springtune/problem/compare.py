@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from .status import Status
 
@@ -123,6 +122,8 @@ def _root(solve, reference, first, last, error_first, error_last):
     known = {first: error_first, last: error_last}
     if 0.0 in known.values():
         return float(1.0 / next(softness for softness, error in known.items() if error == 0))
+
+    from scipy.optimize import brentq  # here: most jobs that compare look for no best stiffness
 
     def error(softness):
         return known[softness] if softness in known else solve(1.0 / softness) - reference

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -28,6 +27,8 @@ def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points:
         With the grid of a `ReferenceSolution` within 1e-5 of the largest displacement, most of it near a clamp's
         corners.
     """
+    from scipy.interpolate import RectBivariateSpline  # here: whoever wants the outline alone does without
+
     return np.stack([RectBivariateSpline(x, y, displacements[:, :, axis]).ev(*points.T) for axis in range(2)], axis=1)
 
 

@@ -8,8 +8,6 @@ A cantilever under a dead load at its end is the elastica :math:`\theta'' = -\al
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ellipeinc, ellipkinc
 
 MOST_EFFECT = 0.01
 """Largest effect of finite rotation on a displacement, relative, with which a reference of small strain applies."""
@@ -76,6 +74,8 @@ def elastica(load: float) -> float:
     """
     if load < 1e-4:
         return load / 3 * (1 - 4 / 35 * load**2)
+    from scipy.optimize import brentq  # here: few beams turn as far
+    from scipy.special import ellipeinc, ellipkinc
 
     def parts(turn, integral):
         parameter = (1 + np.sin(turn)) / 2

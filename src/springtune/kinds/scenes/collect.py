@@ -2,7 +2,6 @@
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import CubicSpline
 
 from ...jobs import atomic, store
 from ...mesh import read_mesh
@@ -266,6 +265,8 @@ def _with_face_error(data):
 
 def _face_reference(folder, asked, kind):
     """Middle, mean and profile of a pressed face of a reference."""
+    from scipy.interpolate import CubicSpline  # here: only pressed faces need it
+
     if kind == SMALL_STRAIN:
         result, scale = _reference(folder, asked, ["x", "displacements"]), asked.force
         if "x" in result:

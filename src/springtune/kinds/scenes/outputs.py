@@ -52,7 +52,6 @@ OUTPUTS = (
         "figures of sensitivity curves",
         figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, _cells(study.curves)),
         plot=f"{PLOTS}:sensitivity",
-        job="errors",
         usual=True,
     ),
     Output(
@@ -60,7 +59,7 @@ OUTPUTS = (
         "figures of errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
         plot=f"{PLOTS}:size",
-        job="errors",
+        job="scenes",
         usual=True,
     ),
     Output(
@@ -68,9 +67,10 @@ OUTPUTS = (
         "figures of deformed networks (and the group `/fields` behind them)",
         figures=lambda study: distinct("deformed", SCENE_LABELS, _cells(study.scenes)),
         plot=f"{PLOTS}:deformed",
+        job="scenes",
         usual=True,
     ),
-    Output("tables", "tables as the paper's, on one page", page=True, usual=True),
+    Output("tables", "tables as the paper's, on one page", page=True, job="scenes", usual=True),
     Output(
         "block",
         "the figure of a pressed face",
