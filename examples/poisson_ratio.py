@@ -14,10 +14,10 @@ def main():
     # Ten rows of exactly equilateral triangles: others are isotropic only nearly.
     beam = st.Beam(0.2, 10 * 0.002 * math.sqrt(3) / 2)
     mesh = st.make_mesh(beam, "structured", "2 mm")
-    for asked in (0.0, 0.3, 0.49):
-        material = st.Material("1 MPa", asked)
+    for ratio in (0.0, 0.3, 0.49):
+        material = st.Material("1 MPa", ratio)
         springs, coupled = (st.moduli(mesh, material, name).poisson_ratio for name in ("uniform", "delingette"))
-        print(f"material {asked:.2f}: springs alone {springs:.4f}, with coupling {coupled:.4f}")
+        print(f"material {ratio:.2f}: springs alone {springs:.4f}, with coupling {coupled:.4f}")
     return springs
 
 

@@ -7,16 +7,19 @@ Poisson's ratio of the network. Meshes too large for that have bands from coarse
 
 from dataclasses import dataclass, field, fields, replace
 from math import inf, nan, sqrt
+from typing import Any
 
 import numpy as np
 
 from .linalg.factors import SingularError
 from .mechanics.energies import AreaEnergy
 from .mechanics.moduli import PatchTest
-from .mesh import MESH_TYPES
-from .problem.loads import LOADS
+from .mesh import MESH_TYPES, Mesh
+from .problem.geometry import Beam
+from .problem.loads import LOADS, LoadKind
+from .problem.materials import Material
 from .problem.status import Status
-from .reference.small_strain import ReferenceNotConvergedError, solve_small_strain
+from .reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
 from .scene.curve import face_edge
 from .scene.sheet import Sheet
 from .springs import DefinitionError, Springs, lattice
@@ -44,9 +47,6 @@ SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
 BANDS_FROM = 10_000
 """Particles of the finest mesh that a band is from."""
 
-MESHED = 10_000_000
-"""Particles beyond which no mesh is made anywhere: its edges alone take gigabytes."""
-
 FEWEST_CELLS = 4
 """Cells across a beam from which on errors are taken to change regularly with the mesh size."""
 
@@ -55,6 +55,15 @@ COARSER, TRIED = 6, 30
 
 MARGIN, LEAST_MARGIN = 1.0, 5e-4
 """What is added to a band at either end, over its width, and at least [1]."""
+
+
+Number = float | tuple[float, float]
+"""A number, or the two bounds of a band."""
+
+References = dict[str, ReferenceSolution | str]
+"""References of 1 N by load, or why there is none."""
+
+_Solved = tuple[dict[str, float], tuple[float, float], dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -84,28 +93,44 @@ class Choice:
     failures : dict of str to str
         What has no number on this mesh, a load, the ``"patch test"`` or the ``"springs"`` themselves, and why: the
         network is unstable or singular at rest, or too ill-conditioned, or the definition refuses the mesh.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+    >>> choices = st.predict(beam, st.make_mesh(beam, "structured", "5 mm"), steel)
+    >>> [choice.definition for choice in choices if not choice.energies]
+    ['patch', 'van-gelder', 'lattice', 'uniform']
+    >>> best = choices[0]
+    >>> print(f"{best.inside:.4g} N/m inside, {best.outline:.4g} N/m on the outline, {best.extra}")
+    1.742e+08 N/m inside, 8.71e+07 N/m on the outline, area energy, K_A = -1.078e+04 MPa; 0.93393 times area
+    >>> print(*(f"{100 * error:+.1f} %" for error in (best.traction, best.bending, best.shear)))
+    +0.4 % -6.3 % +1.6 %
+    >>> print(f"{100 * best.worst:.1f} % at worst; E off by {100 * abs(best.young_modulus_error):.1f} %, "
+    ...       f"nu = {best.poisson_ratio:.3f}")
+    6.3 % at worst; E off by 0.0 %, nu = 0.345
     """
 
     definition: str
-    inside: float
-    outline: float
+    inside: Number
+    outline: Number
     extra: str
     energies: bool
-    traction: float
-    bending: float
-    shear: float
-    young_modulus_error: float
-    poisson_ratio: float
-    failures: dict = field(default_factory=dict)
+    traction: Number
+    bending: Number
+    shear: Number
+    young_modulus_error: Number
+    poisson_ratio: Number
+    failures: dict[str, str] = field(default_factory=dict)
 
     @property
-    def worst(self):
+    def worst(self) -> float:
         """Largest size of an error under the loads that have a reference [1]; infinite where the network fails."""
         errors = np.abs([np.broadcast_to(getattr(self, load), 2) for load in CASES])
         return inf if self.failures or np.isnan(errors).all() else float(np.nanmax(errors))
 
 
-def references(beam, material):
+def references(beam: Beam, material: Material) -> References:
     """References of the loads.
 
     Parameters
@@ -118,7 +143,7 @@ def references(beam, material):
     dict of str to ReferenceSolution or str
         For 1 N, by load; where there is none the reason.
     """
-    found = {}
+    found: References = {}
     for load in CASES:
         try:
             found[load] = solve_small_strain(beam, material, 1.0, kind=LOADS[load].kind)
@@ -127,7 +152,7 @@ def references(beam, material):
     return found
 
 
-def predict(beam, mesh, material, known=None):
+def predict(beam: Beam, mesh: Mesh, material: Material, known: References | None = None) -> list[Choice]:
     """Choices for a mesh, solved on it, the best one by its worst load first.
 
     Parameters
@@ -158,7 +183,8 @@ def predict(beam, mesh, material, known=None):
     patch-area: 6.3 % at worst
     """
     known = references(beam, material) if known is None else known
-    sheet, seen, choices, refusals = _Sheet(mesh, beam, material, known), set(), [], []
+    sheet, seen, refusals = _Sheet(mesh, beam, material, known), set(), []
+    choices: list[Choice] = []
     for name in ON_QUADS if len(mesh.quads) else ON_TRIANGLES:
         try:
             springs = sheet.springs(name)
@@ -179,25 +205,14 @@ def predict(beam, mesh, material, known=None):
     return sorted(choices, key=lambda choice: choice.worst)
 
 
-def particles(mesh_type, beam, size):
-    """Number of particles that a mesh would have, about.
-
-    Parameters
-    ----------
-    mesh_type : str
-        Key of `springtune.mesh.MESH_TYPES`.
-    beam : Beam
-    size : float
-        Length of an edge [m].
-
-    Returns
-    -------
-    float
-    """
-    return (beam.length / size + 1.5) * (beam.height / (MESH_TYPES[mesh_type].row_height * size) + 1.0)
-
-
-def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
+def extrapolate(
+    mesh_type: str,
+    size: float,
+    beam: Beam,
+    material: Material,
+    known: References | None = None,
+    most: int = BANDS_FROM,
+) -> tuple[list[Choice], list[float]]:
     """Choices for a mesh that is too large to solve: bands from coarser meshes of its type.
 
     What a network gets wrong depends on the shape of its cells, which are stretched to fit the beam, and changes about
@@ -233,7 +248,7 @@ def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
         If no definition can live on meshes of the type.
     """
     finest = sqrt(beam.length * beam.height / most)
-    while particles(mesh_type, beam, finest) > most:
+    while MESH_TYPES[mesh_type].particles(beam.length, beam.height, finest) > most:
         finest *= 1.02
     if 2 * finest > min(beam.length, beam.height) / FEWEST_CELLS:
         raise ValueError(
@@ -253,18 +268,19 @@ def extrapolate(mesh_type, size, beam, material, known=None, most=BANDS_FROM):
     return sorted(choices, key=lambda choice: choice.worst), sizes
 
 
-def _like(mesh_type, beam, size, sizes, sign):
+def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int) -> float:
     """Of some mesh sizes that whose cells are next to those of a size in their stretch, on one side of it if any is."""
     stretch, box = MESH_TYPES[mesh_type].stretch, (beam.length, beam.height)
     apart = sign * np.array([stretch(*box, one) / stretch(*box, size) - 1 for one in sizes])
     return float(sizes[np.argmin(np.where(apart >= -1e-9, np.abs(apart), 1 + np.abs(apart)))])
 
 
-def _band(choices, sizes, size):
+def _band(choices: list[Choice], sizes: list[float], size: float) -> Choice:
     """Bands of a definition at a size, from choices on meshes of other sizes."""
-    bands, failures = {}, {}
+    bands: dict[str, Any] = {}  # by attribute
+    failures: dict[str, str] = {}
     for part in fields(Choice):
-        if part.type is float:
+        if part.type is Number:
             values = np.array([getattr(choice, part.name) for choice in choices])
             values = np.append(values, np.polyval(np.polyfit(sizes, values, 1), size))
             low, high = values.min(), values.max()
@@ -278,7 +294,7 @@ def _band(choices, sizes, size):
     return replace(choices[0], **bands, extra=extra, failures=failures)
 
 
-def _band_in_words(texts):
+def _band_in_words(texts: list[list[str]]) -> str:
     """One text of several that differ in their numbers, given in words."""
     merged = []
     for words in zip(*texts):
@@ -290,44 +306,56 @@ def _band_in_words(texts):
 class _Sheet:
     """A mesh on which springs are solved; networks that differ in their reference stiffness alone once."""
 
-    def __init__(self, mesh, beam, material, known):
+    def __init__(self, mesh: Mesh, beam: Beam, material: Material, known: References) -> None:
         self.mesh, self.beam, self.material, self.known = mesh, beam, material, known
         # Loads that hold the same follow each other.
-        self._sheet, self._found, self._test = Sheet(mesh, beam.thickness, networks=1), {}, PatchTest(mesh)
+        self._sheet, self._test = Sheet(mesh, beam.thickness, networks=1), PatchTest(mesh)
+        self._found: dict[tuple[bytes, ...], _Solved] = {}
 
-    def springs(self, name):
+    def springs(self, name: str) -> Springs:
         """Springs of a definition."""
         if name != "uniform":
             return self._sheet.derive(name, self.material)[0]
         return Springs(lattice.predicted_stiffness(self.material, self.beam, face_edge(self.mesh)), uniform(self.mesh))
 
     @staticmethod
-    def key(springs):
+    def key(springs: Springs) -> tuple[bytes, ...]:
         """What tells networks apart but for their reference stiffness."""
         return springs.relative.tobytes(), *(energy.key for energy in springs.energies)
 
-    def choice(self, name, springs):
+    def choice(self, name: str, springs: Springs) -> Choice:
         """What springs are worth."""
         displacements, moduli, failures = self._solved(springs)
-        numbers = dict.fromkeys(CASES, nan)
+        errors = dict.fromkeys(CASES, nan)
         for load, displacement in displacements.items():
-            if not isinstance(self.known[load], str):
-                numbers[load] = displacement / (springs.reference * float(self.known[load].displacement)) - 1
+            known = self.known[load]
+            if not isinstance(known, str):
+                errors[load] = displacement / (springs.reference * float(known.displacement)) - 1
         young, ratio = moduli
         young *= springs.reference / (self.material.young_modulus * self.beam.thickness)
-        numbers |= {"young_modulus_error": float(young) - 1, "poisson_ratio": float(ratio)}
-        return Choice(name, *self._parts(name, springs), bool(springs.energies), **numbers, failures=failures)
+        return Choice(
+            name,
+            *self._parts(name, springs),
+            bool(springs.energies),
+            traction=errors["traction"],
+            bending=errors["bending"],
+            shear=errors["shear"],
+            young_modulus_error=float(young) - 1,
+            poisson_ratio=float(ratio),
+            failures=failures,
+        )
 
-    def failed(self, name, part, reason):
+    def failed(self, name: str, part: str, reason: str) -> Choice:
         """Choice of a definition that gives no springs here."""
-        numbers = dict.fromkeys((*CASES, "young_modulus_error", "poisson_ratio"), nan)
-        return Choice(name, nan, nan, "", name in NEED_ENERGIES, **numbers, failures={part: reason})
+        return Choice(name, nan, nan, "", name in NEED_ENERGIES, nan, nan, nan, nan, nan, {part: reason})
 
-    def _solved(self, springs):
+    def _solved(self, springs: Springs) -> _Solved:
         """Displacement of each load for unit force over reference stiffness [1]; E and nu; what has none and why."""
         key = self.key(springs)
         if key not in self._found:
-            displacements, moduli, failures = {}, (nan, nan), {}
+            displacements: dict[str, float] = {}
+            failures: dict[str, str] = {}
+            moduli = nan, nan
             for load in CASES:
                 try:
                     displacements[load] = self._displacement(springs, LOADS[load].kind)
@@ -340,7 +368,7 @@ class _Sheet:
             self._found[key] = displacements, moduli, failures
         return self._found[key]
 
-    def _displacement(self, springs, kind):
+    def _displacement(self, springs: Springs, kind: LoadKind) -> float:
         try:
             found = self._sheet.solve(kind, springs, springs.reference, "linear")
         except SingularError as error:
@@ -349,11 +377,11 @@ class _Sheet:
             raise SingularError(found.message)
         return found.displacement
 
-    def _parts(self, name, springs):
+    def _parts(self, name: str, springs: Springs) -> tuple[float, float, str]:
         """Stiffness of sides inside and on the outline, and in words what else there is."""
         outline, several = self.mesh.on_outline, self.mesh.cells_per_edge > 1
 
-        def common(values):
+        def common(values: np.ndarray) -> float:
             values = springs.reference * values
             alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
             return float(np.median(values)) if alike else nan

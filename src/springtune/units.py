@@ -67,7 +67,20 @@ _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity of the wanted kind; the message says why and what to write instead."""
+    """A text that is not a quantity of the wanted kind; the message says why and what to write instead.
+
+    What takes quantities catches it and says of which argument, as a plain ValueError.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> from springtune.units import parse
+    >>> try:
+    ...     parse("200 GPa", "length")
+    ... except st.UnitError as error:
+    ...     print(error)
+    '200 GPa' is a stress; give a length such as '200 mm'
+    """
 
 
 def parse(text: str, kind: str) -> float:
@@ -153,11 +166,11 @@ def _registry() -> "pint.UnitRegistry[float]":
 def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     registry = _registry()
     try:
-        asked = registry.parse_units(unit)
-        size = registry.Quantity(1.0, asked).to_base_units().magnitude
+        given = registry.parse_units(unit)
+        size = registry.Quantity(1.0, given).to_base_units().magnitude
     except Exception:  # pint raises many kinds, tokenizer's and its own
         return None
     for kind in QUANTITY_KINDS.values():
-        if asked.dimensionality == registry.parse_units(kind.unit).dimensionality:
+        if given.dimensionality == registry.parse_units(kind.unit).dimensionality:
             return kind.name, Decimal(f"{size:.15g}")
-    return f"of dimension {asked.dimensionality}", Decimal(1)
+    return f"of dimension {given.dimensionality}", Decimal(1)

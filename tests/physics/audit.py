@@ -44,7 +44,7 @@ from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
 
 PROMISED = 1e-6
-"""Largest error of the displacements of a solved scene, relative: `springtune.mechanics.statics.CORRECTION`."""
+"""Largest error of the displacements of a solved scene, relative: `springtune.mechanics.newton.CORRECTION`."""
 
 MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size from which two modes have merged; a load 1e-6 above the one that merges

@@ -1,4 +1,4 @@
-"""The rivals of the benchmark against each other and the reference, and how a race is run."""
+"""The approaches of the benchmark against each other and the reference, and how a case is run."""
 
 from dataclasses import replace
 
@@ -39,8 +39,8 @@ CLOSE = {
 }
 
 
-def answer(scene, method, size=2e-3):
-    return APPROACHES[method](scene, size, benchmark.Clock())
+def answer(scene, approach, size=2e-3):
+    return APPROACHES[approach](scene, size, benchmark.Clock())
 
 
 @pytest.fixture(scope="module")
@@ -52,15 +52,15 @@ def references():
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_rival_comes_near_the_reference(name, references):
+def test_every_other_approach_comes_near_the_reference(name, references):
     linear, quadratic, boundary, free = CLOSE[name]
     allowed = dict.fromkeys(OTHER_APPROACHES, linear)
     allowed |= {"quadratic-triangles": quadratic, "boundary-elements": boundary, "free-form": free}
-    for method in OTHER_APPROACHES:
-        if method.startswith("calculix") or "backward" in method:
+    for approach in OTHER_APPROACHES:
+        if approach.startswith("calculix") or "backward" in approach:
             continue
-        found, unknowns = answer(SCENES[name], method)
-        assert found == pytest.approx(references[name], rel=allowed[method]), method
+        found, unknowns = answer(SCENES[name], approach)
+        assert found == pytest.approx(references[name], rel=allowed[approach]), approach
         assert unknowns > 0
 
 
@@ -68,8 +68,8 @@ def test_every_rival_comes_near_the_reference(name, references):
 def test_ways_to_linear_triangles_agree(name):
     """scikit-fem, vertex and edge tensors, condensed responses, motion to rest and springs with coupling are one."""
     first, _ = answer(SCENES[name], "linear-triangles", 4e-3)
-    for method in ("tensor-mass", "condensation", "relaxation"):
-        assert answer(SCENES[name], method, 4e-3)[0] == pytest.approx(first, rel=1e-6), method
+    for approach in ("tensor-mass", "condensation", "relaxation"):
+        assert answer(SCENES[name], approach, 4e-3)[0] == pytest.approx(first, rel=1e-6), approach
 
 
 def test_boundary_elements_converge(references):

@@ -36,6 +36,17 @@ def words(text):
     return [" ".join(line.split()) for line in text.splitlines()]
 
 
+@pytest.mark.parametrize("command", ["which", "stability", "bench"])
+def test_a_missing_dataset_is_told_with_what_to_run(tmp_path, command):
+    for path in (tmp_path / "none.nc", tmp_path):
+        result = run(command, path)
+        assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
+        assert f"{path}: there is no such dataset; run config/" in result.stderr
+    (tmp_path / "text.nc").write_text("no dataset")
+    result = run(command, tmp_path / "text.nc")
+    assert result.exit_code == 1 and "text.nc: cannot be read" in result.stderr and "run config/" in result.stderr
+
+
 class TestBench:
     def test_dataset_without_a_benchmark_is_refused(self, tmp_path):
         xr.DataTree.from_dict({"/": xr.Dataset()}).to_netcdf(tmp_path / "old.nc", engine="h5netcdf")

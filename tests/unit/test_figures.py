@@ -41,6 +41,8 @@ from springtune.kinds.stability.figures import (
 from springtune.output import style
 from springtune.output.canvas import png_and_pdf
 
+from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
+
 
 @pytest.fixture(autouse=True)
 def closed():
@@ -51,146 +53,9 @@ def closed():
     plt.close("all")
 
 
-# -- a dataset of which every number is told from the others -----------------------------------------------------------
-
-BEAMS, TYPES, SIZES = ["100x20", "200x40"], ["structured", "free"], [1e-3, 2e-3, 5e-3]
-MATERIALS, LOADS, DEFINITIONS = ["steel", "rubber"], ["traction", "compression", "pressure"], ["paper", "area"]
-SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
-LABELS = {
-    "beam": BEAMS,
-    "mesh_type": TYPES,
-    "mesh_size": SIZES,
-    "material": MATERIALS,
-    "load": LOADS,
-    "definition": DEFINITIONS,
-    "kinematics": ["nonlinear", "linear"],
-}
-
-
-def variables(labels, **dimensions):
-    """Dataset of distinct numbers over dimensions: each variable counts on where the one before it ended."""
-    data, start = xr.Dataset(coords=labels), 1
-    for name, dims in dimensions.items():
-        shape = [len(labels[dim]) for dim in dims]
-        count = int(np.prod(shape))
-        data[name] = (dims, 1e-3 * np.arange(start, start + count).reshape(shape))
-        start += count
-    return data
-
-
-def root():
-    load, mesh = ("beam", "material", "load"), ("beam", "mesh_type", "mesh_size", "material", "load")
-    data = variables(
-        LABELS, deformation_error=SCENE, field_error=SCENE, stiffness=SCENE, reference_displacement=load, force=load,
-        paper_displacement=mesh, paper_reference_displacement=mesh, paper_stiffness=mesh,
-        material_young_modulus=("material",), material_poisson_ratio=("material",),
-    )  # fmt: skip
-    return data.assign(status=xr.ones_like(data.deformation_error, dtype=np.int8))
-
-
-def sensitivity():
-    dims = ("beam", "mesh_type", "mesh_size", "material", "load", "kinematics")
-    labels = {name: LABELS[name] for name in dims} | {"stiffness_ratio": [0.5, 0.7, 0.9, 1.1]}
-    curve = (*dims, "stiffness_ratio")
-    data = variables(labels, deformation_error=curve, displacement=curve)
-    data["stiffness"] = 1e3 * data.stiffness_ratio.broadcast_like(data.displacement)
-    data["best_stiffness"] = data.stiffness.isel(stiffness_ratio=0, drop=True) + 300
-    data["predicted_stiffness"] = data.best_stiffness + 50
-    return data.assign(status=xr.ones_like(data.displacement, dtype=np.int8))
-
-
-def fields():
-    places = {"particle": range(4), "outline_point": range(5), "spring": range(3), "coordinate": range(2)}
-    mesh, load = ("beam", "mesh_type", "mesh_size"), ("material", "load")
-    labels = LABELS | places
-    data = variables(
-        labels, x=(*mesh, "particle"), y=(*mesh, "particle"),
-        displacement_x=(*mesh, "definition", *load, "particle"),
-        displacement_y=(*mesh, "definition", *load, "particle"),
-        outline_x=("beam", "outline_point"), outline_y=("beam", "outline_point"),
-        reference_displacement_x=("beam", *load, "outline_point"),
-        reference_displacement_y=("beam", *load, "outline_point"),
-    )  # fmt: skip
-    ends = xr.DataArray([[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]], dims=("end", "spring"))
-    shape = data.x.isel(particle=0, drop=True) * 0
-    return data.assign(spring_first=shape + ends[0], spring_second=shape + ends[1])
-
-
-def block():
-    labels = LABELS | {"face_position": [0.0, 0.5, 1.0], "reference": ["small-strain", "neo-hooke"]}
-    data = variables(
-        labels, face_profile=(*SCENE, "face_position"),
-        reference_face_profile=("beam", "material", "load", "reference", "face_position"),
-    )  # fmt: skip
-    return data
-
-
-def moduli():
-    labels = {name: LABELS[name] for name in ("mesh_type", "definition", "mesh_size")} | {"poisson_ratio": [0.0, 0.3]}
-    data = variables(labels, effective_poisson_ratio=tuple(labels))
-    return data.assign(status=xr.ones_like(data.effective_poisson_ratio, dtype=np.int8))
-
-
-def laying():
-    labels = {"loading": ["gravity", "pressure"], "friction": [0.0, 0.3], "definition": DEFINITIONS, "mesh_size": SIZES}
-    places = {"corner": range(4), "strip_point": range(5), "reference_point": range(5)}
-    cell = ("loading", "friction")
-    every = (*cell, "definition", "mesh_size")
-    data = variables(
-        labels | places, trapezoid_x=("corner",), trapezoid_y=("corner",), strip_x=(*every, "strip_point"),
-        strip_y=(*every, "strip_point"), reference_x=(*cell, "reference_point"), reference_y=(*cell, "reference_point"),
-        reference_elongation=cell, reference_elongation_error_estimate=cell, area_error=every, elongation=every,
-    )  # fmt: skip
-    return data.assign(status=xr.ones_like(data.elongation, dtype=np.int8))
-
-
-def stability():
-    labels = {
-        "definition": DEFINITIONS, "mesh_size": SIZES, "integrator": ["central-difference", "backward-euler"],
-        "damper": ["mass", "springs"], "damping_ratio": [0.0, 0.1], "step_ratio": [0.5, 1.0, 2.0],
-        "map_damping_ratio": [0.1, 1.0], "sample": range(5), "critical_ratio": [0.5, 1.0, 2.0],
-        "cg_iterations": [5, 0], "implicit_steps": [10, 50], "sliver_angle": [30.0, 5.0], "perturbation": [0.0, 0.2],
-        "strain_load": ["axial", "follower-pressure"], "strain": [-0.1, 0.1], "rows": [10, 20], "arch_point": range(4),
-    }  # fmt: skip
-    scheme = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
-    strained = ("strain_load", "definition", "strain")
-    data = variables(
-        labels, dt_limit_predicted=scheme, dt_limit_measured=scheme, omega_max=("definition", "mesh_size"),
-        dt_particle_bound=("definition", "mesh_size"), behaviour=("integrator", "step_ratio", "map_damping_ratio"),
-        step_ratio_predicted=("integrator", "map_damping_ratio"), energy=("integrator", "sample"),
-        energy_drift=("integrator",), steps_to_rest=("critical_ratio",),
-        truncated_error=("cg_iterations", "implicit_steps", "mesh_size"),
-        sliver_step_limit=("definition", "sliver_angle"),
-        perturbed_step_limit=("definition", "perturbation"), perturbed_error=("definition", "perturbation"),
-        strain_status=strained, negative_pivots=strained, strain_load_share=strained,
-        buckling_load=("definition", "rows"), euler_load=("definition",), arch_deflection=("definition", "arch_point"),
-        arch_load=("definition", "arch_point"), arch_negative_pivots=("definition", "arch_point"),
-    )  # fmt: skip
-    data["strain_message"] = xr.full_like(data.strain_status, "", dtype=object)
-    done = ["limits", "maps", "drift", "rest", "slivers", "strains", "buckling"]
-    return data.assign_coords(experiment=done)
-
-
-def benchmark():
-    labels = {
-        "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
-        "mesh_size": SIZES, "curve_count": [1, 11],
-    }  # fmt: skip
-    cell, fit = ("scene", "approach", "mesh_size"), ("scene", "approach")
-    parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorizing", "solving")], cell)
-    return variables(
-        labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts, cost_exponent=fit, error_rate=fit,
-        reference_error_estimate=("scene",), reference_seconds=("scene",), separate_seconds=("curve_count",),
-        curve_seconds=("curve_count",),
-    )  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def tree():
-    groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
-    groups |= {"stability": stability, "benchmark": benchmark}
-    # Groups are written and read one by one, so that labels of one need not be those of another.
-    return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})
+    return dataset()
 
 
 SCENES = {"mesh_type": "free", "material": "steel", "load": "traction"}

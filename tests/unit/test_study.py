@@ -16,7 +16,7 @@ from springtune.kinds.moduli.kind import Measurement
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.study import Curve, MeshSpec, Reference, Scene, StudyError
+from springtune.study import CurveSpec, MeshSpec, Reference, SceneSpec, StudyError
 
 CONFIG = Path(__file__).parents[2] / "config"
 LATTICE = math.sqrt(3) / 2
@@ -106,7 +106,7 @@ class TestExpansion:
         study = load(SMALL)
         long, short = Beam(0.2, 0.03, 0.001, "long"), Beam(0.1, 0.02, 0.002, "short")
         steel = Material(210e9, 0.3, name="steel")
-        assert study.scenes[0] == Scene(
+        assert study.scenes[0] == SceneSpec(
             MeshSpec(long, "structured", 0.002), steel, "traction", 300e3, "paper", "nonlinear"
         )
         assert study.references == (
@@ -114,7 +114,7 @@ class TestExpansion:
             Reference(short, steel, "traction", 20e3),
             Reference(short, steel, "compression", -20e3),
         )
-        assert study.curves[-1] == Curve(MeshSpec(short, "free", 0.005), steel, "traction", 20e3, "linear")
+        assert study.curves[-1] == CurveSpec(MeshSpec(short, "free", 0.005), steel, "traction", 20e3, "linear")
         assert study.stiffness_table == {("structured", "steel"): 170e6, ("free", "steel"): 185e6}
         assert study.calibration == ("long", "traction")
         assert study.printed == ()

@@ -4,15 +4,19 @@ import json
 import platform
 import subprocess
 import sys
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
+
+import xarray as xr
 
 from .. import __version__
 from ..jobs import bundles
 from ..jobs.keys import installed
 from ..kinds import kinds, load_study, outputs
 from ..output import dataset
+from ..study.model import Study
 from .plan import COSTS_FILE, usual_costs
 
 SOFTWARE = (
@@ -31,7 +35,7 @@ SOFTWARE = (
 )
 
 
-def run(config, folder, output):
+def run(config: str | Path, folder: str | Path, output: str | Path) -> None:
     """Build the dataset of a study from its stored results.
 
     Parameters
@@ -44,7 +48,7 @@ def run(config, folder, output):
         NetCDF file to write.
     """
     study, folder = load_study(config), Path(folder)
-    groups = {}
+    groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:
             groups |= kind.module("collect").groups(study, folder)
@@ -56,18 +60,18 @@ def run(config, folder, output):
     bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob("done/*_*.json")), usual_costs())
 
 
-def _objected(root):
+def _objected(root: xr.Dataset) -> Iterator[str]:
     """Lines on scenes whose errors are missing or not the networks' own."""
-    asked, there = root.status != 0, root.reference_displacement.notnull()
+    requested, there = root.status != 0, root.reference_displacement.notnull()
     for scenes, what in (
-        (asked & ~there, "have no reference and no error"),
-        (asked & there & (root.reference_applies == 0), "are beyond the reference of small strain"),
+        (requested & ~there, "have no reference and no error"),
+        (requested & there & (root.reference_applies == 0), "are beyond the reference of small strain"),
     ):
         if scenes.any():
-            yield f"{int(scenes.sum())} of {int(asked.sum())} scenes {what}: `message` says why\n"
+            yield f"{int(scenes.sum())} of {int(requested.sum())} scenes {what}: `message` says why\n"
 
 
-def _attributes(study, config):
+def _attributes(study: Study, config: str | Path) -> dict[str, str]:
     software = {name: installed(name) for name in SOFTWARE} | {"python": platform.python_version()}
     return {
         "title": study.title,
@@ -82,7 +86,7 @@ def _attributes(study, config):
     }
 
 
-def _git_commit(folder):
+def _git_commit(folder: Path) -> str:
     """Commit of the checkout that holds the study, with "+changes" where files differ from it; empty outside of git."""
     try:
         answer = subprocess.run(

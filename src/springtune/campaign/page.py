@@ -4,13 +4,14 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
+import xarray as xr
 
 from ..jobs.atomic import write_text
 from ..kinds import kinds
 from ..output.tables import csv_text
 
 
-def write(tree, folder):
+def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     """Write one CSV file a table and a page with all of them.
 
     Parameters

@@ -5,14 +5,22 @@ file of a bundle changes only when its tasks do, so Snakemake reruns a job only 
 then computes only results that are not stored yet.
 """
 
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 from ..jobs import atomic, bundles
 from ..kinds import kinds
+
+if TYPE_CHECKING:
+    from ..kinds.base import Output, Stage
+    from ..study.model import Study
 
 COSTS_FILE = "costs.json"
 """File beside the studies' folders: what tasks cost on this machine."""
 
 
-def stages():
+def stages() -> "tuple[Stage, ...]":
     """Stages of all study kinds.
 
     Returns
@@ -22,7 +30,7 @@ def stages():
     return tuple(stage for kind in kinds() for stage in kind.stages)
 
 
-def table_files(output, study):
+def table_files(output: "Output", study: "Study") -> list[str]:
     """Files of the tables of an output: where it is the page, each table of all study kinds as CSV, and the page.
 
     Parameters
@@ -39,12 +47,12 @@ def table_files(output, study):
     return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
 
 
-def usual_costs():
+def usual_costs() -> dict[str, tuple[float, float]]:
     """Seconds of tasks before any was measured, see `springtune.jobs.bundles.Costs`."""
     return {name: cost for kind in kinds() for name, cost in kind.costs.items()}
 
 
-def write_tasks(study, folder, cores):
+def write_tasks(study: "Study", folder: Path, cores: int) -> dict[str, list[str]]:
     """Write the task files of a study under ``folder/tasks``, those whose content changed.
 
     Parameters
@@ -66,13 +74,14 @@ def write_tasks(study, folder, cores):
         contents = {
             label: stage.content(study, folder, values) for label, values in shared[stage.like or stage.name].items()
         }
-        labels[stage.name] = [label for label, content in contents.items() if content]
-        for label in labels[stage.name]:
-            _write(folder, f"{stage.name}_{label}", contents[label], stage.products(contents[label]))
+        asked = {label: content for label, content in contents.items() if content}
+        labels[stage.name] = list(asked)
+        for label, content in asked.items():
+            _write(folder, f"{stage.name}_{label}", content, stage.products(content))
     return labels
 
 
-def _write(folder, name, content, products):
+def _write(folder: Path, name: str, content: dict[str, Any], products: Iterable[Path]) -> None:
     path = folder / "tasks" / f"{name}.json"
     if not path.exists() or atomic.read_json(path) != content:
         atomic.write_json(path, content)
@@ -82,16 +91,17 @@ def _write(folder, name, content, products):
         done.unlink()
 
 
-def _bundles(study, folder, cores):
+def _bundles(study: "Study", folder: Path, cores: int) -> dict[str, dict[str, list[Any]]]:
     """Values of the members of each bundle, by stage and label."""
     notes = folder / "tasks/bundles.json"
-    known = atomic.read_json(notes) if notes.exists() else {"cores": 0}
+    known: dict[str, Any] = atomic.read_json(notes) if notes.exists() else {"cores": 0}
     # More cores want more bundles; what is solved stays solved, whichever bundle it is in.
-    before = known if known["cores"] >= cores else {"cores": cores}
+    before: dict[str, Any] = known if known["cores"] >= cores else {"cores": cores}
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
-    found, shared = {}, {}
+    found: dict[str, dict[str, list[str]]] = {}
+    shared = {}
     for stage in stages():
-        if stage.like:
+        if stage.members is None:  # it works on another one's bundles
             continue
         members = stage.members(study, costs)
         if stage.alone:

@@ -2,16 +2,21 @@
 
 import gc
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
 from ..jobs import atomic
 from ..kinds import outputs
 
+if TYPE_CHECKING:
+    from ..kinds.base import Output
 
-def run(dataset, folder, *names):
+
+def run(dataset: str | Path, folder: str | Path, *names: str) -> list[str]:
     """Draw the figures of outputs into ``folder/figures`` and write their tables into ``folder/tables``.
 
     Parameters
@@ -28,8 +33,8 @@ def run(dataset, folder, *names):
     """
     with xr.open_datatree(dataset, engine="h5netcdf") as tree:
         tree.load()
-    made = []
-    for output in map(outputs().get, names):
+    made: list[str] = []
+    for output in (outputs()[name] for name in names):
         if output.plot:
             made += _draw(output, tree, Path(folder) / "figures")
         if output.page:
@@ -41,7 +46,7 @@ def run(dataset, folder, *names):
     return made
 
 
-def _draw(output, tree, folder):
+def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[str]:
     # Here, since what only writes tables does without.
     import matplotlib.pyplot as plt
     import numpy as np

@@ -12,9 +12,8 @@ from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
 
-from ..mesh import MESH_TYPES
-from ..registry import Declared
-from ..springs import DEFINITIONS
+from ..mesh import MESH_TYPES, MeshType
+from ..springs import DEFINITIONS, Definition
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -40,7 +39,7 @@ def modules(*names: str, definitions: bool = False, mesh_types: bool = False) ->
     ['atomic.py']
     """
     found = {path for name in names for path in _closure(_place(name))}
-    declared: list[Declared] = [*DEFINITIONS.values()] if definitions else []
+    declared: list[Definition | MeshType] = [*DEFINITIONS.values()] if definitions else []
     declared += MESH_TYPES.values() if mesh_types else ()
     for file in {one.file for one in declared if one.file}:
         found |= set(_closure(file))
@@ -93,7 +92,7 @@ def mesh_type_digest(name: str) -> str:
     return _declared_digest(MESH_TYPES[name])
 
 
-def _declared_digest(one: Declared) -> str:
+def _declared_digest(one: Definition | MeshType) -> str:
     if one.file is None:  # of a notebook: the function is all that is known
         return hashlib.sha256(inspect.getsource(one.function).encode()).hexdigest()
     return _file_digest(one.file)

@@ -2,13 +2,18 @@
 
 from functools import cache
 from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from ..study import Study
+    from .base import Kind, Output
 KINDS = ("scenes", "moduli", "laying", "stability", "benchmark")
 """Packages of the study kinds, in the order of the dataset's groups."""
 
 
 @cache
-def kinds():
+def kinds() -> "tuple[Kind, ...]":
     """All study kinds.
 
     Returns
@@ -19,7 +24,7 @@ def kinds():
 
 
 @cache
-def outputs():
+def outputs() -> "dict[str, Output]":
     """What is made from a dataset, of all study kinds.
 
     Returns
@@ -31,7 +36,7 @@ def outputs():
     return {output.name: output for module in modules for output in module.OUTPUTS}
 
 
-def load_study(path):
+def load_study(path: str | Path) -> "Study":
     """Read, validate and expand a study.
 
     Parameters
@@ -41,12 +46,22 @@ def load_study(path):
 
     Returns
     -------
-    Study
+    springtune.study.Study
+        Its scenes and curves and all that they need, in a canonical order.
 
     Raises
     ------
     StudyError
         If anything is wrong with the file; nothing else is raised.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> study = st.load_study("config/paper.yaml")
+    >>> len(study.scenes), len(study.curves)
+    (270, 90)
+    >>> study.axes["mesh_size"]
+    (0.001, 0.002, 0.005)
     """
     from ..study import load
 

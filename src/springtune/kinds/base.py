@@ -1,8 +1,20 @@
 """What a study kind is: all that study, plan, collect, drawing, tables and the rules loop over."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..jobs.bundles import Costs
+    from ..study.config import StudyConfig
+    from ..study.expand import Declared
+    from ..study.messages import Problems
+    from ..study.model import Study
 
 FORMATS = ("png", "pdf")
 """Endings of a figure's files."""
@@ -41,27 +53,27 @@ class Output:
 
     name: str
     meaning: str
-    figures: Callable = lambda study: {}
+    figures: Callable[[Study], Mapping[str, Mapping[str, object]]] = lambda study: {}
     collect: str = ""
     plot: str = ""
     job: str = ""
-    tables: Callable = lambda study: []
+    tables: Callable[[Study], Iterable[str]] = lambda study: []
     write: str = ""
     page: bool = False
-    lack: Callable = lambda study: ""
+    lack: Callable[[Study], str] = lambda study: ""
     usual: bool = False
 
     @property
-    def made_by(self):
+    def made_by(self) -> str:
         """Name of the job that makes it."""
         return self.job or self.name
 
     @property
-    def module(self):
+    def module(self) -> str:
         """Module that draws the figures, from the package on."""
         return self.plot.partition(":")[0]
 
-    def stems(self, study):
+    def stems(self, study: Study) -> list[str]:
         """Stems of the figures of a study, none where it does not ask for the output."""
         return list(self.figures(study)) if self.name in study.outputs else []
 
@@ -102,12 +114,12 @@ class Stage:
     name: str
     module: str
     message: str
-    content: Callable
-    products: Callable
-    members: Callable | None = None
+    content: Callable[[Study, Path, list[Any]], dict[str, Any] | None]
+    products: Callable[[dict[str, Any]], Iterable[Path]]
+    members: Callable[[Study, Costs], Mapping[str, tuple[float, Any]]] | None = None
     like: str = ""
-    same: tuple = ()
-    every: tuple = ()
+    same: tuple[str, ...] = ()
+    every: tuple[str, ...] = ()
     alone: bool = False
     definitions: bool = False
     mesh_types: bool = False
@@ -146,28 +158,28 @@ class Kind:
 
     name: str
     package: str
-    study_fields: dict = field(default_factory=dict)
-    grid_fields: dict = field(default_factory=dict)
-    check: Callable = lambda config, problems: None
-    expand: Callable = lambda config, declared: ()
-    axes: Callable = lambda part: {}
-    summary: Callable = lambda part: []
-    stages: tuple = ()
-    outputs: tuple = ()
-    tables: Callable | None = None
-    costs: dict = field(default_factory=dict)
+    study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    check: Callable[[StudyConfig, Problems], None] = lambda config, problems: None
+    expand: Callable[[StudyConfig, Declared], Any] = lambda config, declared: ()
+    axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}
+    summary: Callable[[Any], list[list[object]]] = lambda part: []
+    stages: tuple[Stage, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    tables: Callable[[Study], list[str]] | None = None
+    costs: dict[str, tuple[float, float]] = field(default_factory=dict)
 
-    def module(self, name):
+    def module(self, name: str) -> ModuleType:
         """A module of its package."""
         return import_module(f"{self.package}.{name}")
 
 
-def stem(name, selection):
+def stem(name: str, selection: Mapping[str, str]) -> str:
     """Stem of the files of a figure that has one for each selection."""
     return "_".join([name, *selection.values()])
 
 
-def distinct(name, labels, cells):
+def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, str]]) -> dict[str, dict[str, str]]:
     """Distinct selections of a study's cells, in order, by stem.
 
     Parameters

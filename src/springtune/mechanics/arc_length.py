@@ -124,7 +124,7 @@ def _next(
         tangent = problem.factorize_tangent(last.load, displacements).solve(problem.load_at(displacements))
         sign = np.sign(s) if direction is None else np.sign(direction @ tangent) or 1.0
         while length > shortest:
-            rise = sign * length / np.linalg.norm(tangent)
+            rise = float(sign * length / np.linalg.norm(tangent))
             found = _correct(problem, last, rise * tangent, rise, abs(s) * problem.load_norm)
             if found is not None:
                 return found, length

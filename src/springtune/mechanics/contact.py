@@ -136,7 +136,7 @@ class Body:
         self.outline = oriented_outline(network.mesh)
         self.neighbours = neighbours(self.outline)
         self.displacements = np.zeros(network.held.shape)
-        self._solved = self._solve = None
+        self._solver: tuple[csc_array, Callable[[np.ndarray], np.ndarray]] | None = None
 
     @property
     def points(self) -> np.ndarray:
@@ -190,8 +190,8 @@ class Body:
         callable
             Displacements [m] of forces [N], shape (unknowns,) or (unknowns, n).
         """
-        if self._solved is tangent:
-            return self._solve
+        if self._solver is not None and self._solver[0] is tangent:
+            return self._solver[1]
         scale = float(np.abs(tangent.diagonal()).mean())
         # A little resistance to any motion: free bodies are held by contact alone, which the tangent does not know.
         for added in SHIFTS:
@@ -200,8 +200,8 @@ class Body:
             with suppress(SingularError):  # a zero pivot
                 if not factor.negative_pivots:
                     break
-        self._solved, self._solve = tangent, factor.solve
-        return self._solve
+        self._solver = tangent, factor.solve
+        return self._solver[1]
 
 
 @dataclass
@@ -313,7 +313,8 @@ class Contact:
         self.floor, self.size, self.friction = floor, size, friction
         self.all = self.bodies + self.obstacles
         self.iterations, self.share = 0, 0.0
-        self.contacts, self.forces, self.drag = None, np.zeros(0), 0.0
+        self.contacts: Contacts | None = None
+        self.forces, self.drag = np.zeros(0), np.zeros((0, 2))
         self._anchor = [body.displacements.copy() for body in self.bodies]
 
     # -- geometry ------------------------------------------------------------------------------------------------------
@@ -506,7 +507,7 @@ class Contact:
             return None
         known = self._known(contacts)
         more = self._turning(contacts, known)
-        drag = 0.0
+        drag = np.zeros((len(known), 2))
         if self.friction:
             rubbing, stiffening, drag = self._friction(contacts, known)
             missing = [part + force for part, force in zip(missing, rubbing)]
@@ -607,7 +608,7 @@ class Contact:
 
     def _turning(self, contacts: Contacts, forces: np.ndarray) -> list[csc_array | None]:
         """Stiffness of the contact forces as the edges turn that they act on: the curvature of the gaps, by body."""
-        parts = [None] * len(self.bodies)
+        parts: list[csc_array | None] = [None] * len(self.bodies)
         for number, body in enumerate(self.bodies):
             met = np.flatnonzero((contacts.targets == number) & (forces > 0))
             if not len(met) or body.moves_little:
@@ -649,10 +650,11 @@ class Contact:
 
     def contact_force(self) -> np.ndarray:
         """Sum of the contact forces and friction on the bodies from obstacles and floor [N], shape (2,)."""
-        bodies = len(self.bodies)
-        forces = self.forces[:, None] * self.contacts.normals + self.drag
-        outer = (self.contacts.owners < bodies) & ((self.contacts.targets < 0) | (self.contacts.targets >= bodies))
-        inner = (self.contacts.owners >= bodies) & (self.contacts.targets >= 0)
+        bodies, contacts = len(self.bodies), self.contacts
+        assert contacts is not None  # solved
+        forces = self.forces[:, None] * contacts.normals + self.drag
+        outer = (contacts.owners < bodies) & ((contacts.targets < 0) | (contacts.targets >= bodies))
+        inner = (contacts.owners >= bodies) & (contacts.targets >= 0)
         return forces[outer].sum(axis=0) - forces[inner].sum(axis=0)
 
 

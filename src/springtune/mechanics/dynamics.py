@@ -292,18 +292,18 @@ class Motion:
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
             raise ValueError("no load, so no mode is loaded; give a load or a damping")
-        basis = []
+        found: list[np.ndarray] = []
         vector = factor.solve(load)
         for _ in range(min(12, len(load))):
             for _ in range(2):
-                for other in basis:
+                for other in found:
                     vector = vector - (other @ (self.mass * vector)) * other
             size = np.sqrt(vector @ (self.mass * vector))
-            if size <= 1e-12 * (np.sqrt(basis[0] @ (self.mass * basis[0])) if basis else 0.0):
+            if size <= 1e-12 * (np.sqrt(found[0] @ (self.mass * found[0])) if found else 0.0):
                 break
-            basis.append(vector / size)
-            vector = factor.solve(self.mass * basis[-1])
-        basis = np.array(basis)
+            found.append(vector / size)
+            vector = factor.solve(self.mass * found[-1])
+        basis = np.array(found)
         squares, shapes = np.linalg.eigh(basis @ (self.stiffness_matrix @ basis.T))
         shares = (shapes.T @ (basis @ load)) ** 2 / squares
         return float(np.sqrt(squares[int(np.argmax(shares))]))
@@ -387,7 +387,8 @@ class Motion:
         stepper = make_stepper(self, integrator, step, precision)
         stepper.begin(*self._beginning(start, velocities))
         pace = sample or (CHECK if name in EXPLICIT else 1)
-        done, samples = 0, []
+        samples: list[list[float]] = []
+        done = 0
         while True:
             u, v = stepper.state()
             end = self._end(stepper.failed, u, v, name, step, done)
@@ -404,8 +405,8 @@ class Motion:
             count = min(pace, steps - done)
             stepper.advance(count)
             done += count
-        samples = np.array(samples).reshape(-1, 4)
-        return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), samples)
+        sampled = np.array(samples).reshape(-1, 4)
+        return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), sampled)
 
     def _beginning(self, start: np.ndarray | None, velocities: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         shape = self.network.held.shape

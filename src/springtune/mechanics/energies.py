@@ -9,6 +9,7 @@ Inside, fields are held corner by corner, shape (2, m, n_cells): arithmetic on w
 faster than on their short vectors.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,7 +38,7 @@ def preceding(field: np.ndarray) -> np.ndarray:
     return np.roll(field, 1, axis=-2)
 
 
-class Energy:
+class Energy(ABC):
     """Base of the energies.
 
     Attributes
@@ -50,6 +51,22 @@ class Energy:
 
     points: np.ndarray
     corners: np.ndarray
+
+    @abstractmethod
+    def _moduli(self) -> tuple[np.ndarray, ...]:
+        """Moduli over the reference stiffness, each with a row for each cell."""
+
+    @abstractmethod
+    def _values(self, moved: np.ndarray) -> np.ndarray:
+        """Energy of each cell [m2] at displacements of its corners."""
+
+    @abstractmethod
+    def _forces(self, moved: np.ndarray) -> np.ndarray:
+        """Its derivative by the corners' positions [m], shape (2, m, n_cells)."""
+
+    @abstractmethod
+    def _couplings(self, moved: np.ndarray) -> np.ndarray:
+        """Its second derivatives by two corners, as of `couplings`."""
 
     def value(self, displacements: np.ndarray) -> float:
         """Energy over the reference stiffness [m2] at displacements of shape (n_points, 2)."""
@@ -256,9 +273,10 @@ class BiquadraticEnergy(Energy):
         return preceding(field) - following(field)
 
     @cached_property
-    def _halves(self) -> list[np.ndarray | None]:
+    def _halves(self) -> tuple[np.ndarray, np.ndarray | None]:
         """Half the stiffnesses, row by row."""
-        return [None if part is None else 0.5 * np.ascontiguousarray(part.T) for part in (self.tensile, self.coupling)]
+        coupling = None if self.coupling is None else 0.5 * np.ascontiguousarray(self.coupling.T)
+        return 0.5 * np.ascontiguousarray(self.tensile.T), coupling
 
     def _stresses(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Sides, change of their squared lengths, and derivative of the energy by the latter."""

@@ -85,7 +85,7 @@ class Expansion:
         self._d = (network.rest_vectors + network.stretch(self.coefficients[0])).T[None].copy()
         self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
         self._inverse = 1.0 / self._length
-        self._first = None
+        self._first = np.zeros(0)
         self.extend(order)
 
     def extend(self, order: int) -> None:
@@ -122,7 +122,7 @@ class Expansion:
         self.loads = loads
         for name in ("_products", "_radius"):
             self.__dict__.pop(name, None)
-        self._denominators = {}
+        self._denominators: dict[int, np.ndarray] = {}
 
     def predict(self, s: float) -> np.ndarray:
         """Displacements at ``s`` [m], shape (n_points, 2), from the series cut off before its smallest term."""
@@ -232,7 +232,7 @@ class Expansion:
         series = np.tensordot(self.coefficients, weights, axes=2)
         best, second, third = (self._shares(self.parameter(s, farthest, less), less) @ series for less in range(3))
         error = max(abs(best - second), abs(second - third)) / abs(best) if best else np.inf
-        return best, error if np.isfinite(error) else np.inf
+        return float(best), error if np.isfinite(error) else np.inf
 
     def measure(self, weights: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Weighted sum of the displacements at each of many ``s``, by Pade approximants.

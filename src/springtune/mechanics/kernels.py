@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 
-def _compiled(function: Callable) -> Callable:
+def _compiled(function: Callable[..., None]) -> Callable[..., None]:
     """Compiled when first called, and kept on disk where there is a place to write."""
     try:
         return njit(cache=True, error_model="numpy")(function)

@@ -264,7 +264,7 @@ class Network:
         -------
         csc_array, shape (unknowns, unknowns)
         """
-        couplings = self._spring_couplings(displacements) if self.has_springs else 0.0
+        couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros(())
         if self.energies:
             at_rest = displacements is None
             of_cells = self._rest_couplings if at_rest else self._pattern.cell_couplings(self.energies, displacements)

@@ -144,7 +144,9 @@ class StablePath:
         self._sign = np.sign(targets[0])
         loads, places = np.unique(np.abs(targets), return_inverse=True)
         self._last_load, loads = loads[-1], self._sign * loads
-        self._series, self._pieces, self._turns = [], [], False
+        self._series: list[tuple[Expansion, float]] = []
+        self._pieces: list[tuple[Expansion, float, float, float]] = []
+        self._turns = False
         self.stable_to, self._unstable_from, self.end = 0.0, np.inf, ""
         values, good, count = self._by_series(loads)
         stable = np.zeros(len(loads), dtype=bool)
@@ -248,7 +250,7 @@ class StablePath:
             with np.errstate(over="ignore", invalid="ignore"):
                 missing = s * self.problem.load - network.resistance(displacements)
                 step = network.expand(factor.solve(missing))
-                before, size = size, np.linalg.norm(step) / np.linalg.norm(displacements)
+                before, size = size, float(np.linalg.norm(step) / np.linalg.norm(displacements))
             if not size < before:
                 break
             displacements = displacements + step
@@ -280,6 +282,7 @@ class StablePath:
     def _stable_at(self, load: float) -> bool:
         """Whether the point that a series of the load predicts is stable."""
         series = self._series_of(load)
+        assert series is not None
         return self.problem.network.is_stable(series.at(self._sign * load - series.s)[1])
 
     def _is_stable(self, load: float) -> bool:
@@ -312,6 +315,7 @@ class StablePath:
         for place in np.flatnonzero(doubtful):
             s = loads[place]
             series = self._series_of(abs(s))
+            assert series is not None
             guess = series.at(s - series.s)[1]
             point = self._corrected(s, values[place], guess, self._far.factor, True)
             if not point.error <= CURVE_TOLERANCE:
@@ -328,6 +332,7 @@ class StablePath:
                     break
                 group = group[: -1 - len(group) // 8]
             for start, place in enumerate(group):  # the nearest to the path's turn is the worst
+                assert last is not None
                 s = loads[place]
                 if self._corrected(s, values[place], rest.at(s)[1], last.factor, False).error <= CURVE_TOLERANCE:
                     found[group[start:]] = True
@@ -353,7 +358,7 @@ class StablePath:
         """Whether the series about rest is by now of another path, which the beam would leave."""
         network, displacements = self.problem.network, self.problem.rest.at(s)[1]
         missing = s * self.problem.load - network.resistance(displacements)
-        near = np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm
+        near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
         return near and not network.is_stable(displacements)
 
     def _reach(self, load: float) -> float:
@@ -373,7 +378,7 @@ class StablePath:
     def _missed(self, displacements: np.ndarray, guess: np.ndarray) -> float:
         """Relative error of the weighted displacement of a guess."""
         value = np.tensordot(displacements, self.weights, axes=2)
-        return abs(np.tensordot(guess, self.weights, axes=2) / value - 1.0)
+        return float(abs(np.tensordot(guess, self.weights, axes=2) / value - 1.0))
 
     def _solve(self, s: float, guess: np.ndarray) -> tuple[np.ndarray | None, Factor | None]:
         """Displacements of the equilibrium next to a guess and its tangent factorized; None where there is none.
@@ -388,7 +393,7 @@ class StablePath:
         if network.inverted(guess):
             return None, None
         found = self.problem.newton(s, guess, FEW_FACTORIZATIONS)
-        if not found.converged or network.largest_change(found.displacements - guess) > NEAR:
+        if not found.converged or found.factor is None or network.largest_change(found.displacements - guess) > NEAR:
             return None, None
         try:
             return found.displacements, found.factor if found.factor.negative_pivots == 0 else None
@@ -398,7 +403,9 @@ class StablePath:
     def _solved(self, s: float, guess: np.ndarray) -> float:
         """Weighted displacement of the stable equilibrium next to a guess; NaN where there is none."""
         displacements, factor = self._solve(s, guess)
-        return np.nan if factor is None else float(np.tensordot(displacements, self.weights, axes=2))
+        if displacements is None or factor is None:
+            return np.nan
+        return float(np.tensordot(displacements, self.weights, axes=2))
 
     def _last_point(self) -> tuple[float, np.ndarray | None, Factor | None]:
         """Load, displacements (None at rest) and tangent of the last point; no tangent where it is not stable."""
@@ -436,7 +443,7 @@ class StablePath:
         for _ in range(MAX_STEP_HALVINGS):
             s, guess = series.at(farthest)
             displacements, factor = self._solve(s, guess) if farthest else (None, None)
-            if factor is not None:
+            if displacements is not None and factor is not None:
                 self._pieces.append((series, farthest, abs(s), self._missed(displacements, guess)))
                 self._last, self.stable_to = (s, displacements, factor), abs(s)
                 break

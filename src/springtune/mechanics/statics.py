@@ -4,6 +4,7 @@ The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is t
 [m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
@@ -182,7 +183,7 @@ class StaticProblem:
         network = self.network
         mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
         if len(mass) <= 4 * MODES:
-            tangent = network.tangent(displacements, (s, self.follower))
+            tangent = network.tangent(displacements, self._follower_at(s))
             values = np.linalg.eigvals(tangent.toarray() / mass[:, None])
             return values[np.argsort(abs(values))][:MODES]
         # The largest eigenvalues of the inverse.
@@ -190,7 +191,7 @@ class StaticProblem:
         start = np.random.default_rng(0).standard_normal(len(mass))
         return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
 
-    def judge(self, s: float, found: Equilibrium):
+    def judge(self, s: float, found: Equilibrium) -> tuple[Status, str, float]:
         """What an equilibrium is worth.
 
         Parameters
@@ -210,6 +211,7 @@ class StaticProblem:
         """
         if not found.converged:
             return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
+        assert found.factor is not None  # of what converged
         try:
             pivots, flutters = self.stability(s, found.displacements, found.factor)
         except SingularError:
@@ -246,7 +248,7 @@ class StaticProblem:
             Its factor is that of the tangent at the solution.
         """
         iterations = 0
-        starts = [lambda s: s * self.slope]
+        starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
         if not self.network.energies and self.follower is None:  # the series is of springs under dead loads
             starts.insert(0, lambda s: self.start.predict(s))
         for start in starts:
@@ -261,6 +263,7 @@ class StaticProblem:
 
     def _unstable(self, s: float, found: Equilibrium) -> bool:
         """Whether a path leaves an equilibrium; flutter on the way is no matter of where it leads."""
+        assert found.factor is not None  # of what converged
         try:
             return self.stability(s, found.displacements, found.factor)[0] > 0
         except SingularError:
@@ -300,7 +303,10 @@ class StaticProblem:
         displacements : ndarray of float, shape (n_points, 2)
             [m]
         """
-        return self.network.factorize_tangent(displacements, self.follower and (s, self.follower))
+        return self.network.factorize_tangent(displacements, self._follower_at(s))
+
+    def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
+        return None if self.follower is None else (s, self.follower)
 
     def newton(
         self,

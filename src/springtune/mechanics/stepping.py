@@ -22,9 +22,12 @@ class Moving(Protocol):
     linear: bool
     load: np.ndarray
     inertia: np.ndarray
-    mass: np.ndarray
     mass_damping: float
     dampers: np.ndarray | None
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Inertia of each unknown [s2], shape (unknowns,)."""
 
     @property
     def stiffness_matrix(self) -> csc_array:
@@ -109,25 +112,30 @@ class ExplicitSteps(Stepper):
             keep, gain = np.full(inverse.shape, (1 - half) / (1 + half)), step * inverse / (1 + half)
         self.inverse = inverse
         dampers = np.zeros(0) if motion.dampers is None else motion.dampers
+        self._function: Callable[..., None]
+        self._as: Callable[..., np.ndarray]
+        self._back: Callable[..., np.ndarray]
+        self._index: tuple[np.ndarray, ...]
         if motion.linear:
-            from .kernels import advance_matrix as advance
+            from .kernels import advance_matrix
 
+            self._function = advance_matrix
             matrix = motion.stiffness_matrix  # symmetric: its columns are its rows
-            damping = np.zeros(0) if motion.dampers is None else motion.damper_matrix.data
+            damping = np.zeros(0) if motion.damper_matrix is None else motion.damper_matrix.data
             self._as = network.reduce
             self._back = network.expand
-            index = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+            self._index = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
             arrays = (matrix.data, damping, *map(network.reduce, (keep, gain, motion.load)))
         elif network.energies:
-            advance, index, arrays = self._advance_energies, (), (keep, gain, motion.load)
+            self._function, self._index, arrays = self._advance_energies, (), (keep, gain, motion.load)
             self._as = self._back = np.array
         else:
-            from .kernels import advance_springs as advance
+            from .kernels import advance_springs
 
+            self._function = advance_springs
             self._as = self._back = np.array
-            index = (network.first.astype(np.int32), network.second.astype(np.int32))
+            self._index = (network.first.astype(np.int32), network.second.astype(np.int32))
             arrays = (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, keep, gain, motion.load)
-        self._function, self._index = advance, index
         self._arrays = [np.ascontiguousarray(part, dtype=self.kind) for part in arrays]
 
     def begin(self, u: np.ndarray, v: np.ndarray) -> None:

@@ -39,12 +39,28 @@ class Mesh:
 
     Examples
     --------
+    A square of two triangles; its diagonal is the second edge:
+
     >>> import numpy as np
-    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> import springtune as st
+    >>> points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> mesh = st.Mesh(points, triangles=np.array([[0, 1, 2], [0, 2, 3]]))
     >>> mesh.edges.tolist()
     [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]
-    >>> mesh.area
-    1.0
+    >>> mesh.cells_per_edge.tolist(), mesh.on_outline.tolist()
+    ([1, 2, 1, 1, 1], [True, False, True, True, True])
+    >>> {corners: mesh.cell_edges[corners].tolist() for corners in mesh.cells}
+    {3: [[3, 1, 0], [4, 2, 1]]}
+    >>> mesh.edge_lengths.round(3).tolist()
+    [1.0, 1.414, 1.0, 1.0, 1.0]
+    >>> mesh.area, mesh.particle_areas.round(3).tolist()
+    (1.0, [0.333, 0.167, 0.333, 0.167])
+
+    As one quadrilateral it has both diagonals:
+
+    >>> square = st.Mesh(points, triangles=np.zeros((0, 3), dtype=int), quads=np.array([[0, 1, 2, 3]]))
+    >>> len(square.edges), square.on_outline.sum().item()
+    (6, 4)
     """
 
     points: np.ndarray
@@ -119,6 +135,17 @@ class Mesh:
         Returns
         -------
         ndarray of float, shape (n_edges,)
+
+        Examples
+        --------
+        Edges of the cells, counted:
+
+        >>> import numpy as np
+        >>> import springtune as st
+        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
+        >>> counts = mesh.sum_to_edges({3: np.ones((len(mesh.triangles), 3))})
+        >>> bool((counts == mesh.cells_per_edge).all())
+        True
         """
         total = np.zeros(len(self.edges))
         for count, part in values.items():
@@ -134,7 +161,30 @@ class Mesh:
         return shares
 
     def side_shares(self, edges: np.ndarray, axis: int) -> np.ndarray:
-        """Share of each particle in the extent of edges along an axis [m], shape (n_points,): half of each edge's."""
+        """Share of each particle in the extent of edges along an axis: half of each edge's.
+
+        Parameters
+        ----------
+        edges : ndarray of int, shape (n, 2)
+            Indices of the particles at the ends of each edge.
+        axis : int
+            0 for x, 1 for y.
+
+        Returns
+        -------
+        ndarray of float, shape (n_points,)
+            [m]
+
+        Examples
+        --------
+        By which an even force on the right side is spread over its particles:
+
+        >>> import springtune as st
+        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")
+        >>> shares = mesh.side_shares(mesh.outline_edges(0, 0.2), axis=1)
+        >>> shares[shares > 0].round(6).tolist()
+        [0.01, 0.02, 0.01]
+        """
         shares = np.zeros(len(self.points))
         extent = np.abs(self.points[edges[:, 1], axis] - self.points[edges[:, 0], axis])
         np.add.at(shares, edges, 0.5 * extent[:, None])
@@ -153,13 +203,39 @@ class Mesh:
         Returns
         -------
         ndarray of int, shape (n, 2)
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")
+        >>> mesh.points[mesh.outline_edges(0, 0.2)].tolist()
+        [[[0.2, 0.0], [0.2, 0.02]], [[0.2, 0.02], [0.2, 0.04]]]
         """
         outline = self.edges[self.on_outline]
         tolerance = 1e-9 * np.ptp(self.points[:, coordinate])
         return outline[(np.abs(self.points[outline, coordinate] - value) <= tolerance).all(axis=1)]
 
     def inverted(self, points: np.ndarray) -> bool:
-        """Whether any corner of any cell is turned inside out at other positions of the particles [m]."""
+        """Whether any corner of any cell is turned inside out at other positions of the particles.
+
+        Parameters
+        ----------
+        points : ndarray of float, shape (n_points, 2)
+            Those positions [m].
+
+        Returns
+        -------
+        bool
+
+        Examples
+        --------
+        Not where the mesh is turned by half a turn, but where it is mirrored:
+
+        >>> import springtune as st
+        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
+        >>> mesh.inverted(mesh.points * [-1, -1]), mesh.inverted(mesh.points * [-1, 1])
+        (False, True)
+        """
         for count, corners in self.cells.items():
             for i in range(1 if count == 3 else count):
                 if (signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) <= 0).any():

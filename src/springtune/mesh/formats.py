@@ -20,7 +20,19 @@ DIGITS = 1e-6
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be used; the message says why and what to do."""
+    """A mesh that cannot be used; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> from springtune.mesh import write_mesh
+    >>> write_mesh("own.vtu", st.make_mesh(st.Beam("100 mm", "20 mm"), "right", "5 mm"))
+    >>> try:
+    ...     st.read_mesh("own.vtu", st.Beam("200 mm", "40 mm"))
+    ... except st.MeshError as error:
+    ...     print(error)
+    own.vtu: extends over 100 x 20 mm, its beam over 200 x 40 mm; correct the unit or the beam
+    """
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:
@@ -62,6 +74,8 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
         If the file cannot be read, has cells other than linear triangles and quadrilaterals or none of these, cells of
         points that it does not have, points that are nowhere or not in one plane, or cells without area.
     """
+    if not Path(path).is_file():
+        raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     import meshio
 
     try:
@@ -148,8 +162,8 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
     points = mesh.points - mesh.points.min(axis=0)
     extent = points.max(axis=0)
     if np.abs(extent / box - 1).max() > DIGITS:
-        shown, asked = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
-        raise MeshError(f"{path}: extends over {shown} mm, its beam over {asked} mm; correct the unit or the beam")
+        shown, wanted = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
+        raise MeshError(f"{path}: extends over {shown} mm, its beam over {wanted} mm; correct the unit or the beam")
     # Sides shall be straight.
     near = np.abs(points - extent) <= DIGITS * extent
     points = np.where(near, box, np.where(points <= DIGITS * extent, 0.0, points))

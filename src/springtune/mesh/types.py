@@ -8,6 +8,9 @@ from typing import TypeVar
 from ..registry import Declared, Registry
 from .cells import Mesh
 
+MOST_MESHED = 10_000_000
+"""Particles beyond which no mesh is made: its edges alone take gigabytes."""
+
 
 def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
     """Whole numbers of cells along a box and of rows over its height that come nearest to a size.
@@ -90,6 +93,34 @@ class MeshType(Declared):
         cells, rows = nearest_counts(length, height, size, self.row_height)
         return length / cells / (height / (self.row_height * rows))
 
+    def particles(self, length: float, height: float, size: float) -> float:
+        """How many particles a mesh would have, about; parameters as of a call."""
+        return (length / size + 1.5) * (height / (self.row_height * size) + 1.0)
+
+    def refusal(self, length: float, height: float, size: float, box: str) -> str:
+        """Why no mesh of a size is made, with the remedy; empty where one is.
+
+        Parameters
+        ----------
+        length, height, size
+            As of a call.
+        box : str
+            What the box is, for the text, such as ``"beam '200x40'"``.
+
+        Returns
+        -------
+        str
+        """
+        side = min(length, height)
+        if size > side:
+            return f"is larger than {box}; give at most its smaller side"
+        count = self.particles(length, height, size)
+        if count <= MOST_MESHED:
+            return ""
+        least = 1.1 * size * math.sqrt(count / MOST_MESHED)
+        remedy = f"at least {1e3 * least:.2g} mm" if least < side else "a shorter beam"
+        return f"makes some {count:.2g} particles of {box}, more than can be meshed ({MOST_MESHED:.0e}); give {remedy}"
+
 
 MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type")
 """Mesh types by name, in the order of their labels."""
@@ -128,15 +159,16 @@ def mesh_type(
     Examples
     --------
     >>> import numpy as np
-    >>> from springtune.mesh import MESH_TYPES, Mesh, mesh_type
-    >>> @mesh_type("two")
+    >>> import springtune as st
+    >>> @st.mesh_type("two")
     ... def two(length, height, size):
     ...     "Two triangles, whatever the size."
     ...     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [length, height]
-    ...     return Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
-    >>> len(MESH_TYPES["two"](0.2, 0.04, 5e-3).edges)
-    5
-    >>> MESH_TYPES.discard("two")
+    ...     return st.Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "two", "5 mm")
+    >>> len(mesh.edges), mesh.points.max(axis=0).tolist()
+    (5, [0.2, 0.04])
+    >>> st.MESH_TYPES.discard("two")
     """
 
     def declare(function: Function) -> Function:

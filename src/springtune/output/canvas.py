@@ -1,14 +1,21 @@
 """A figure as PNG and as PDF by one pass over it: most of the time of drawing is texts, ticks and layout."""
 
 import io
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal, cast
 
 import matplotlib
 import numpy as np
 from matplotlib.backend_bases import GraphicsContextBase, RendererBase
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.backends.backend_pdf import PdfFile, RendererPdf
-from matplotlib.transforms import Affine2D, TransformedBbox, TransformedPath
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.path import Path
+from matplotlib.text import Text
+from matplotlib.transforms import Affine2D, Affine2DBase, Transform, TransformedBbox, TransformedPath
+from matplotlib.typing import ColorType
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from .style import SETTINGS
@@ -17,7 +24,7 @@ POINTS = 72
 """Units of a PDF page in an inch."""
 
 
-def png_and_pdf(figure):
+def png_and_pdf(figure: Figure) -> dict[str, bytes]:
     """A figure in both formats. Without dates in them the same figure gives the same files.
 
     Parameters
@@ -30,15 +37,15 @@ def png_and_pdf(figure):
         Content of the file by its ending.
     """
     with matplotlib.rc_context(SETTINGS):
-        size = figure.get_size_inches()
+        width, height = figure.get_size_inches()
         dpi = matplotlib.rcParams["savefig.dpi"]
         figure.dpi = POINTS
         content = io.BytesIO()
         file = PdfFile(content, metadata={"CreationDate": None})
         try:
-            file.newPage(*size)
-            page = RendererPdf(file, dpi, size[1], size[0])
-            pixels = RendererAgg(*(size * dpi), dpi)
+            file.newPage(width, height)
+            page = RendererPdf(file, dpi, height, width)
+            pixels = RendererAgg(width * dpi, height * dpi, dpi)
             figure.draw(_Both(page, pixels))
             page.finalize()
             file.finalize()
@@ -56,82 +63,135 @@ class _Both(RendererBase):
     Artists that ask to be rasterized stay vectors on the page.
     """
 
-    sizes: ClassVar[dict] = {}
+    sizes: ClassVar[dict[tuple[str, int, bool | Literal["TeX"]], tuple[float, float, float]]] = {}
     """Width, height and descent of texts [pt], which many figures share."""
 
-    def __init__(self, page, pixels):
+    def __init__(self, page: RendererPdf, pixels: RendererAgg) -> None:
         super().__init__()
         self.page, self.pixels = page, pixels
         self.scale = pixels.dpi / POINTS
         self.enlarged = Affine2D().scale(self.scale)
 
-    def draw_path(self, gc, path, transform, rgbFace=None):
+    def draw_path(
+        self, gc: GraphicsContextBase, path: Path, transform: Transform, rgbFace: ColorType | None = None
+    ) -> None:
         self.page.draw_path(gc, path, transform, rgbFace)
         self.pixels.draw_path(self._large(gc), path, transform + self.enlarged, rgbFace)
 
-    def draw_markers(self, gc, marker_path, marker_trans, path, trans, rgbFace=None):
+    def draw_markers(
+        self,
+        gc: GraphicsContextBase,
+        marker_path: Path,
+        marker_trans: Transform,
+        path: Path,
+        trans: Transform,
+        rgbFace: ColorType | None = None,
+    ) -> None:
         self.page.draw_markers(gc, marker_path, marker_trans, path, trans, rgbFace)
         self.pixels.draw_markers(
             self._large(gc), marker_path, marker_trans + self.enlarged, path, trans + self.enlarged, rgbFace
         )
 
-    def draw_path_collection(self, gc, master_transform, paths, all_transforms, offsets, offset_trans, *rest, **more):
+    # What is handed on as it is depends on the version of matplotlib.
+    def draw_path_collection(
+        self,
+        gc: GraphicsContextBase,
+        master_transform: Transform,
+        paths: Sequence[Path],
+        all_transforms: Sequence[ArrayLike],
+        offsets: ArrayLike | Sequence[ArrayLike],
+        offset_trans: Transform,
+        *rest: Any,
+        **more: Any,
+    ) -> None:
         self.page.draw_path_collection(
             gc, master_transform, paths, all_transforms, offsets, offset_trans, *rest, **more
         )
         self.pixels.draw_path_collection(
-            self._large(gc), (master_transform + self.enlarged).frozen(), paths, all_transforms, offsets,
-            (offset_trans + self.enlarged).frozen(), *rest, **more,
+            self._large(gc), self._frozen(master_transform), paths, all_transforms, offsets,
+            self._frozen(offset_trans), *rest, **more,
         )  # fmt: skip
 
-    def draw_quad_mesh(self, gc, master_transform, width, height, coordinates, offsets, offsetTrans, *rest, **more):
-        self.page.draw_quad_mesh(gc, master_transform, width, height, coordinates, offsets, offsetTrans, *rest, **more)
+    def draw_quad_mesh(
+        self,
+        gc: GraphicsContextBase,
+        master_transform: Transform,
+        meshWidth: int,
+        meshHeight: int,
+        coordinates: ArrayLike,
+        offsets: ArrayLike | Sequence[ArrayLike],
+        offsetTrans: Transform,
+        *rest: Any,
+        **more: Any,
+    ) -> None:
+        self.page.draw_quad_mesh(
+            gc, master_transform, meshWidth, meshHeight, coordinates, offsets, offsetTrans, *rest, **more
+        )
         self.pixels.draw_quad_mesh(
-            self._large(gc), (master_transform + self.enlarged).frozen(), width, height, coordinates, offsets,
-            (offsetTrans + self.enlarged).frozen(), *rest, **more,
+            self._large(gc), self._frozen(master_transform), meshWidth, meshHeight, coordinates, offsets,
+            self._frozen(offsetTrans), *rest, **more,
         )  # fmt: skip
 
-    def draw_image(self, gc, x, y, im, transform=None):
+    def draw_image(
+        self, gc: GraphicsContextBase, x: float, y: float, im: ArrayLike, transform: Affine2DBase | None = None
+    ) -> None:
         # Made for as many pixels as there are.
         self.page.draw_image(gc, x, y, im, transform)
         self.pixels.draw_image(self._large(gc), round(self.scale * x), round(self.scale * y), im)
 
-    def draw_text(self, gc, x, y, s, prop, angle, ismath=False, mtext=None):
+    def draw_text(
+        self,
+        gc: GraphicsContextBase,
+        x: float,
+        y: float,
+        s: str,
+        prop: FontProperties,
+        angle: float,
+        ismath: bool | Literal["TeX"] = False,
+        mtext: Text | None = None,
+    ) -> None:
         self.page.draw_text(gc, x, y, s, prop, angle, ismath, mtext)
         height = self.pixels.height - self.scale * y
         self.pixels.draw_text(self._large(gc), self.scale * x, height, s, prop, angle, ismath, mtext)
 
-    def get_text_width_height_descent(self, s, prop, ismath):
+    def get_text_width_height_descent(
+        self, s: str, prop: FontProperties, ismath: bool | Literal["TeX"]
+    ) -> tuple[float, float, float]:
         key = (s, hash(prop), ismath)
         if key not in self.sizes:
             self.sizes[key] = self.page.get_text_width_height_descent(s, prop, ismath)
         return self.sizes[key]
 
-    def _large(self, gc):
+    def _frozen(self, transform: Transform) -> Transform:
+        """A transform to pixels, as it is now."""
+        return cast(Transform, (transform + self.enlarged).frozen())
+
+    def _large(self, gc: GraphicsContextBase) -> GraphicsContextBase:
         """Where and how to draw, in pixels."""
         large = GraphicsContextBase()
         large.copy_properties(gc)
         box, (path, transform) = gc.get_clip_rectangle(), gc.get_clip_path()
         if box is not None:
-            large.set_clip_rectangle(TransformedBbox(box, self.enlarged))
-        if path is not None:
-            large.set_clip_path(TransformedPath(path, transform + self.enlarged))
+            large.set_clip_rectangle(TransformedBbox(box, self.enlarged))  # type: ignore[arg-type]  # any box serves
+        if path is not None and transform is not None:
+            clip = TransformedPath(path, transform + self.enlarged)  # type: ignore[arg-type]  # it is a plain Path
+            large.set_clip_path(clip)
         return large
 
-    def new_gc(self):
+    def new_gc(self) -> GraphicsContextBase:
         return self.page.new_gc()
 
-    def flipy(self):
+    def flipy(self) -> bool:
         return False
 
-    def get_canvas_width_height(self):
+    def get_canvas_width_height(self) -> tuple[float, float]:
         return self.page.get_canvas_width_height()
 
-    def points_to_pixels(self, points):
+    def points_to_pixels(self, points: ArrayLike) -> ArrayLike:
         return points
 
-    def get_image_magnification(self):
+    def get_image_magnification(self) -> float:
         return self.page.get_image_magnification()
 
-    def option_image_nocomposite(self):
+    def option_image_nocomposite(self) -> bool:
         return self.page.option_image_nocomposite()

@@ -1,6 +1,7 @@
 """The dataset of a study: dense labelled arrays, their units, and what is missing and why."""
 
 import os
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,7 +13,10 @@ from ..problem.status import Status
 STATUS = tuple(map(str, Status))
 """Meanings of the flags of `status`; a flag's value is its place here."""
 
-DIMENSIONS = {
+Label = str | float
+"""Of a cell along a dimension: a text, or a number such as a mesh size [m]."""
+
+DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "beam": "beam, length x height in mm",
     "mesh_type": "mesh type",
     "mesh_size": ("asked length of an edge", "m"),
@@ -41,11 +45,11 @@ class Group:
     """
 
     name: str
-    variables: dict
-    dimensions: dict = field(default_factory=dict)
-    flags: dict = field(default_factory=dict)
+    variables: dict[str, tuple[tuple[str, ...], str, str, float | str]]
+    dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
-    def empty(self, axes, names=None):
+    def empty(self, axes: Mapping[str, Sequence[Label]], names: Collection[str] | None = None) -> xr.Dataset:
         """Dataset whose cells hold nothing yet.
 
         Parameters
@@ -64,7 +68,7 @@ class Group:
         for name, (dimensions, units, long_name, nothing) in chosen.items():
             shape = [len(axes[dimension]) for dimension in dimensions]
             values = np.full(shape, nothing, dtype=object if isinstance(nothing, str) else None)
-            attributes = {"long_name": long_name, "units": units}
+            attributes: dict[str, object] = {"long_name": long_name, "units": units}
             meanings = ({"status": STATUS} | self.flags).get(name.rpartition("_")[2])
             if meanings:
                 values = values.astype("int8")
@@ -93,19 +97,19 @@ class Filler:
         That is written into.
     """
 
-    def __init__(self, data):
+    def __init__(self, data: xr.Dataset) -> None:
         self.data = data
         # Looking an array up costs more than writing a cell of it.
-        self._arrays = {name: (array.dims, array.values) for name, array in data.data_vars.items()}
+        self._arrays = {name: ([str(one) for one in array.dims], array.values) for name, array in data.items()}
         self._places = {name: {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords}
 
-    def put(self, values, **labels):
+    def put(self, values: Mapping[str, object], **labels: Label) -> None:
         """Write values of variables by name into the cells of these labels."""
         for name, value in values.items():
             dimensions, array = self._arrays[name]
             array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
 
-    def put_rows(self, values, **labels):
+    def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
         """Write rows that may be shorter than the last dimension."""
         for name, row in values.items():
             dimensions, array = self._arrays[name]
@@ -113,14 +117,14 @@ class Filler:
             array[place][: len(row)] = row
 
 
-def most_asked(root, dimension):
+def most_requested(root: xr.Dataset, dimension: str) -> str:
     """Label of a dimension that most scenes of a dataset's root are of."""
-    asked = root.status != 0
-    counts = asked.sum([name for name in asked.dims if name != dimension])
+    requested = root.status != 0
+    counts = requested.sum([name for name in requested.dims if name != dimension])
     return str(counts[dimension].values[int(counts.values.argmax())])
 
 
-def write(path, groups, attributes):
+def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
     """Write a dataset; the file appears whole or not at all.
 
     Parameters

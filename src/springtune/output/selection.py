@@ -1,10 +1,18 @@
 """What of a dataset a figure shows: its group, and the labels that it selects."""
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
 
+if TYPE_CHECKING:
+    from .dataset import Label
 
-def group(data, name, alone=True):
+
+def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.Dataset:
     """Dataset of a group: ``data`` itself unless it is a tree.
 
     Parameters
@@ -35,7 +43,7 @@ def group(data, name, alone=True):
     return data[name].to_dataset()
 
 
-def choose(present, **selection):
+def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
     """Labels that a figure is of: those given, and those that leave no choice.
 
     Parameters
@@ -78,18 +86,18 @@ def choose(present, **selection):
     return chosen
 
 
-def labels_of(present, name):
+def labels_of(present: xr.DataArray, name: str) -> list[Label]:
     """Labels of a dimension that have any cell present: list, in the dataset's order."""
     there = present.any([dimension for dimension in present.dims if dimension != name])
     return there[name].values[there.values].tolist()
 
 
-def cells(present, names):
+def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label]]:
     """Labels of every cell present over some dimensions: list of dicts, the last name fastest."""
     there = present.any([dimension for dimension in present.dims if dimension not in names]).transpose(*names)
     labels = [there[name].values.tolist() for name in names]
     return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
 
 
-def _listed(labels):
+def _listed(labels: Iterable[object]) -> str:
     return ", ".join(repr(label) for label in labels) or "nothing"

@@ -1,12 +1,18 @@
 """One style for all figures: readable in grey, at the width of a text column."""
 
+from collections.abc import Callable
 from functools import wraps
+from typing import Any, Literal, ParamSpec, TypeVar
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import FigureBase
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 
-SETTINGS = {
+P = ParamSpec("P")
+Drawn = TypeVar("Drawn")
+
+SETTINGS: dict[Any, object] = {
     "axes.axisbelow": True,
     "axes.grid": True,
     "axes.labelsize": 9,
@@ -31,7 +37,7 @@ SETTINGS = {
 }
 
 # Of falling darkness, each with its own dashes and marker: the order survives a grey print.
-LINES = (
+LINES: tuple[dict[str, Any], ...] = (
     {"color": "#14213d", "linestyle": "-", "marker": "o"},
     {"color": "#b5382a", "linestyle": "--", "marker": "s"},
     {"color": "#e09f3e", "linestyle": "-.", "marker": "D"},
@@ -42,7 +48,7 @@ LINES = (
 LOGARITHMIC = {"xscale": "log", "yscale": "log"}
 
 
-def line(number):
+def line(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of the line of that number; beyond the fifth, colours come back with other markers."""
     turn, colour = divmod(number, len(LINES))
     return {"color": LINES[colour]["color"]} | {
@@ -50,18 +56,27 @@ def line(number):
     }
 
 
-def styled(plot):
+def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
     """Decorator: a function that plots in `SETTINGS`, which are put back after it."""
 
     @wraps(plot)
-    def inside(*arguments, **keywords):
+    def inside(*arguments: P.args, **keywords: P.kwargs) -> Drawn:
         with matplotlib.rc_context(SETTINGS):
             return plot(*arguments, **keywords)
 
     return inside
 
 
-def panels(ax, nrows=1, ncols=1, *, figsize, layout=None, **shared):
+def panels(
+    ax: Figure | SubFigure | Axes | np.ndarray | None,
+    nrows: int = 1,
+    ncols: int = 1,
+    *,
+    figsize: tuple[float, float],
+    layout: Literal["constrained", "compressed", "tight"] | None = None,
+    sharex: bool = False,
+    sharey: bool = False,
+) -> tuple[Figure | SubFigure | None, np.ndarray]:
     """Axes to plot on, and the figure where that is to be arranged.
 
     Parameters
@@ -74,8 +89,8 @@ def panels(ax, nrows=1, ncols=1, *, figsize, layout=None, **shared):
         Width and height of a figure that is made [inch].
     layout : str, optional
         Layout engine of a figure that is made.
-    **shared
-        ``sharex`` and ``sharey`` of the panels of a figure.
+    sharex, sharey : bool, optional
+        Whether the panels of a figure share their axes.
 
     Returns
     -------
@@ -93,21 +108,31 @@ def panels(ax, nrows=1, ncols=1, *, figsize, layout=None, **shared):
         import matplotlib.pyplot as plt
 
         ax = plt.figure(figsize=figsize, layout=layout)
-    if isinstance(ax, FigureBase):
-        return ax, ax.subplots(nrows, ncols, squeeze=False, **shared)
+    if isinstance(ax, Figure | SubFigure):
+        return ax, ax.subplots(nrows, ncols, squeeze=False, sharex=sharex, sharey=sharey)
     given = np.asarray(ax, dtype=object)
     if given.size != nrows * ncols:
         raise ValueError(f"the plot has {nrows} x {ncols} panels, ax has {given.size} Axes")
     return None, given.reshape(nrows, ncols)
 
 
-def size(figure):
+def size(figure: Figure | SubFigure) -> tuple[float, float]:
     """Width and height of a figure, or of a part of one [inch]."""
     box = figure.bbox.transformed(figure.dpi_scale_trans.inverted())
     return box.width, box.height
 
 
-def arrange(figure, *, left, right, bottom, top, wspace=None, hspace=None, title=None):
+def arrange(
+    figure: Figure | SubFigure | None,
+    *,
+    left: float,
+    right: float,
+    bottom: float,
+    top: float,
+    wspace: float | None = None,
+    hspace: float | None = None,
+    title: str | None = None,
+) -> None:
     """Margins of a figure [inch] and the title above its panels, at the upper left."""
     if figure is None:
         return

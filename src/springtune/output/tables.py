@@ -1,12 +1,20 @@
 """Rows of tables: cells of a dataset, CSV and Markdown."""
 
+from __future__ import annotations
+
 import csv
 import io
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+
+if TYPE_CHECKING:
+    from .dataset import Label
 
 
-def cells_with_values(values, dimensions):
+def cells_with_values(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator[dict[str, Label]]:
     """Labels of the cells that have a value."""
     stacked = values.transpose(*dimensions)
     labels = [stacked[name].values.tolist() for name in dimensions]
@@ -14,7 +22,7 @@ def cells_with_values(values, dimensions):
         yield {name: label[i] for name, label, i in zip(dimensions, labels, place)}
 
 
-def csv_text(rows):
+def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
     """Rows as CSV; a number that is not there is an empty field."""
     text = io.StringIO()
     columns = list(dict.fromkeys(name for row in rows for name in row))
@@ -25,13 +33,13 @@ def csv_text(rows):
     return text.getvalue()
 
 
-def _number(value):
+def _number(value: object) -> object:
     if not isinstance(value, float):
         return value
     return "" if np.isnan(value) else f"{value:.8g}"
 
 
-def markdown_table(heads, rows):
+def markdown_table(heads: list[str], rows: Iterable[list[str]]) -> list[str]:
     """Lines of a table: texts in the first column, numbers flush right in the others."""
     lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
     return [f"| {' | '.join(line)} |" for line in lines]

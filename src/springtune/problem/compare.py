@@ -113,11 +113,13 @@ def best_stiffness(
         first, last = across[0] if across else (known[-1] if len(known) else 0, len(error) - 1)
         between = f"between {1 / softness[last]:.6g} and {1 / softness[first]:.6g} N/m"
         return Best(np.nan, Status.NOT_CONVERGED, f"the curve may meet the reference in its gap {between}")
-    asked = f"from {stiffness[0]:.6g} to {stiffness[-1]:.6g} N/m"
-    return Best(np.nan, Status.FAILED, f"the curve does not meet the reference {asked}; widen `sensitivity`")
+    between = f"from {stiffness[0]:.6g} to {stiffness[-1]:.6g} N/m"
+    return Best(np.nan, Status.FAILED, f"the curve does not meet the reference {between}; widen `sensitivity`")
 
 
-def _root(solve, reference, first, last, error_first, error_last):
+def _root(
+    solve: Callable[[float], float], reference: float, first: float, last: float, error_first: float, error_last: float
+) -> float:
     """Stiffness between two softnesses at which the displacement is the reference's."""
     known = {first: error_first, last: error_last}
     if 0.0 in known.values():
@@ -125,13 +127,15 @@ def _root(solve, reference, first, last, error_first, error_last):
 
     from scipy.optimize import brentq  # here: most jobs that compare look for no best stiffness
 
-    def error(softness):
+    def error(softness: float) -> float:
         return known[softness] if softness in known else solve(1.0 / softness) - reference
 
     return float(1.0 / brentq(error, first, last, xtol=1e-15 * first, rtol=ROOT_TOLERANCE))
 
 
-def _last_root(solve, reference, softness, unsolved, error):
+def _last_root(
+    solve: Callable[[float], float], reference: float, softness: float, unsolved: float, error: float
+) -> float | None:
     """Stiffness between a softness that has an equilibrium and one that has none; None where there is no root."""
     for _ in range(HALVINGS):
         middle = 0.5 * (softness + unsolved)
@@ -153,12 +157,12 @@ def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    errors, second : ndarray of float, shape (n_methods, n_sizes)
+    errors, second : ndarray of float, shape (n_approaches, n_sizes)
         Errors on the beam and on the second one, from the finest mesh size to the coarsest [1].
 
     Returns
     -------
-    ndarray of float, shape (n_methods, n_sizes)
+    ndarray of float, shape (n_approaches, n_sizes)
         NaN for the finest size that was run, and from where a finer one failed or has no second beam.
     """
     errors, second = np.abs(errors), np.abs(second)

@@ -1,6 +1,7 @@
 """Geometry of the bodies that a study asks for."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .quantities import positive
 
@@ -23,7 +24,8 @@ class Beam:
 
     Examples
     --------
-    >>> Beam("200 mm", "40 mm")
+    >>> import springtune as st
+    >>> st.Beam("200 mm", "40 mm")
     Beam(length=0.2, height=0.04, thickness=0.001, name='200x40')
     """
 
@@ -31,6 +33,12 @@ class Beam:
     height: float
     thickness: float = 1e-3
     name: str = ""
+
+    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
+
+        def __init__(
+            self, length: float | str, height: float | str, thickness: float | str = 1e-3, name: str = ""
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         for side in ("length", "height", "thickness"):

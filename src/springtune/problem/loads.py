@@ -186,3 +186,6 @@ LOADS = {
 
 LOAD_KINDS = {load.kind.name: load.kind for load in LOADS.values()}
 """Kinds of load by name."""
+
+KINEMATICS = ("nonlinear", "linear")
+"""Kinematics under a load: springs that keep their length law, or their tangent at rest."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from numbers import Real
+from typing import TYPE_CHECKING
 
 from .quantities import positive
 
@@ -28,7 +29,8 @@ class Material:
 
     Examples
     --------
-    >>> Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+    >>> import springtune as st
+    >>> st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
     Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel')
     """
 
@@ -36,6 +38,16 @@ class Material:
     poisson_ratio: float
     density: float | None = None
     name: str = "material"
+
+    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
+
+        def __init__(
+            self,
+            young_modulus: float | str,
+            poisson_ratio: float,
+            density: float | str | None = None,
+            name: str = "material",
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__  # of a frozen class

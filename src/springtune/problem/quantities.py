@@ -1,9 +1,11 @@
-"""Quantities that a person gives: a text with its unit, or a number in SI units."""
+"""What a person gives: quantities, as a text with its unit or a number in SI units, and names of what there is."""
 
 import math
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 
-def quantity(value, kind: str, name: str) -> float:
+def quantity(value: float | str, kind: str, name: str) -> float:
     """Number in SI units of a text with its unit, or of a number that is in SI units already.
 
     Parameters
@@ -45,7 +47,7 @@ def quantity(value, kind: str, name: str) -> float:
     return number
 
 
-def positive(value, kind: str, name: str) -> float:
+def positive(value: float | str, kind: str, name: str) -> float:
     """As `quantity`, of one that has to be above zero.
 
     Parameters
@@ -68,7 +70,30 @@ def positive(value, kind: str, name: str) -> float:
     return number
 
 
-def _remedy(kind):
+def _remedy(kind: str) -> str:
     from ..units import QUANTITY_KINDS
 
     return f"give a {kind} such as '{QUANTITY_KINDS[kind].example}', or a number in {QUANTITY_KINDS[kind].unit}"
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """``did you mean ...? `` if one of the words is near, and all of them.
+
+    Parameters
+    ----------
+    word : str
+    words : iterable of str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> nearest("latice", ["lattice", "uniform"])
+    "did you mean 'lattice'? known: lattice, uniform"
+    """
+    words = list(words)
+    near = get_close_matches(word, words, n=1, cutoff=0.6)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}known: {', '.join(words)}"

@@ -25,9 +25,10 @@ class Status(IntEnum):
 
     Examples
     --------
-    >>> str(Status.NOT_CONVERGED), int(Status.NOT_CONVERGED)
+    >>> import springtune as st
+    >>> str(st.Status.NOT_CONVERGED), int(st.Status.NOT_CONVERGED)
     ('not_converged', 3)
-    >>> Status(4)
+    >>> st.Status(4)
     <Status.UNSTABLE: 4>
     """
 
@@ -38,5 +39,5 @@ class Status(IntEnum):
     UNSTABLE = 4
     FAILED = 5
 
-    def __str__(self):
+    def __str__(self) -> str:
         return self.name.lower()

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -84,10 +85,19 @@ def side_weights(points: np.ndarray, normal: int, along: int, value: float, quad
     return weights / weights.sum()
 
 
-def _deck(points, elements, kind, material, thickness, load, held, finite):
+def _deck(
+    points: np.ndarray,
+    elements: np.ndarray,
+    kind: str,
+    material: Material,
+    thickness: float,
+    load: np.ndarray,
+    held: np.ndarray,
+    finite: bool,
+) -> str:
     """Input of the program, see `solve`."""
 
-    def lines(rows):
+    def lines(rows: Iterable[Iterable[object]]) -> str:
         return "\n".join(", ".join(map(str, row)) for row in rows)
 
     forces = [(n + 1, axis + 1, repr(float(load[n, axis]))) for n, axis in np.argwhere(load != 0)]

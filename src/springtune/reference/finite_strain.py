@@ -12,6 +12,7 @@ buckle; where it acts along it, as in bending and shear, the whole, since large 
 shrink towards the corners, and the load grows in steps where it must.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -192,7 +193,7 @@ class _Sheet:
         displacement = float(np.interp(0.5, positions, profile)) if self.kind.pressed else mean
         return _Solved(displacement, mean, positions, profile, uncertain)
 
-    def _newton(self, moved, stress):
+    def _newton(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float] | None:
         """Displacements in equilibrium and what rounding leaves open of the load's, relative; None without any.
 
         Strains in the points of integration are unknowns of their own, which Newton's method meets with those of the
@@ -226,11 +227,11 @@ class _Sheet:
                 return moved, float(abs((self.load * step).sum() / (self.load * moved).sum()))
         return None
 
-    def _gradient(self, moved):
+    def _gradient(self, moved: np.ndarray) -> np.ndarray:
         """Derivatives of displacements (component, axis) in the points of integration, (elements, points, 2, 2)."""
         return np.swapaxes(self.gradients @ moved[self.nodes_of][:, None], 2, 3)
 
-    def _forces(self, gradient, stress):
+    def _forces(self, gradient: np.ndarray, stress: np.ndarray) -> np.ndarray:
         """Inner forces of second Piola-Kirchhoff stresses xx, yy, xy."""
         first = (gradient + np.eye(2)) @ _matrix(stress) * self.weights[..., None, None]
         count, points = self.weights.shape
@@ -240,7 +241,7 @@ class _Sheet:
         np.add.at(total, self.nodes_of, forces)
         return total
 
-    def _tangent(self, gradient, state):
+    def _tangent(self, gradient: np.ndarray, state: "Response") -> csr_array:
         """Derivative of the inner forces."""
         count, points, _, shapes = self.gradients.shape
         deformation, by_x, by_y = gradient + np.eye(2), self.gradients[:, :, 0], self.gradients[:, :, 1]
@@ -262,7 +263,7 @@ class _Sheet:
         return csr_array((blocks.ravel(), (self.rows, self.columns)), shape=(self.load.size, self.load.size))
 
 
-def _turning(side, shapes, along):
+def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
     """What a pressure changes with displacements: it acts along the cofactor of the deformation times the normal."""
     slopes = np.stack([one[0].grad[along] for one in side.basis])
     blocks = np.einsum("iep,jep->ije", shapes, slopes) * (1 if along == 0 else -1)
@@ -272,14 +273,14 @@ def _turning(side, shapes, along):
     return sum(csr_array(entry, shape=(2 * side.N, 2 * side.N)) for entry in entries)
 
 
-def _strain(gradient):
+def _strain(gradient: np.ndarray) -> np.ndarray:
     """Green's strains xx, yy and 2 xy."""
     x, y = gradient[..., 0], gradient[..., 1]  # derivatives by x and by y
     parts = [x[..., 0] + (x * x).sum(-1) / 2, y[..., 1] + (y * y).sum(-1) / 2, x[..., 1] + y[..., 0] + (x * y).sum(-1)]
     return np.stack(parts, axis=-1)
 
 
-def _strain_change(gradient, change):
+def _strain_change(gradient: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Derivative of `_strain` along a change of the gradient."""
     x, y, by_x, by_y = gradient[..., 0], gradient[..., 1], change[..., 0], change[..., 1]
     parts = [
@@ -290,12 +291,12 @@ def _strain_change(gradient, change):
     return np.stack(parts, axis=-1)
 
 
-def _matrix(stress):
+def _matrix(stress: np.ndarray) -> np.ndarray:
     """Symmetric matrices of xx, yy, xy."""
     return stress[..., [[0, 2], [2, 1]]]
 
 
-def _element_ends(length, count, kind):
+def _element_ends(length: float, count: int, kind: LoadKind) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the elements along x and along y: of half of a symmetric beam, see `LoadKind.cut`, else of the whole."""
     near = np.linspace(0, 1, count + 1) ** GRADING_POWER
     both = np.concatenate([near, 2 - near[-2::-1]])
@@ -306,25 +307,30 @@ def _element_ends(length, count, kind):
         half = _spread(near, length / 2, count)
         ends = np.concatenate([half, length - half[-2::-1]])
     else:
-        ends = _spread(near, length, count, np.inf if kind.symmetric else MOST_LONG)
+        ends = _spread(near, length, count, None if kind.symmetric else MOST_LONG)
     return ends, 1 - near[::-1] if kind.symmetric else both
 
 
-def _spread(near, length, count, most=np.inf):
+def _spread(near: np.ndarray, length: float, count: int, most: int | None = None) -> np.ndarray:
     """Coordinates from 0 to length, graded within 1 of 0 and even beyond, there of so many elements at most."""
     if length <= 1:
         return near * length
-    columns = min(max(1, round(count * (length - 1) / 2)), most * count)
+    columns = max(1, round(count * (length - 1) / 2))
+    columns = columns if most is None else min(columns, most * count)
     return np.concatenate([near, np.linspace(1, length, 1 + columns)[1:]])
 
 
-def _extrapolated(path, share):
+def _extrapolated(path: list[tuple[float, np.ndarray]], share: float) -> np.ndarray:
     """Displacements at a share of the load, by the polynomial through those before."""
-    total = 0.0
+    total = np.zeros(path[0][1].shape)
     for i, (at, moved) in enumerate(path):
         factors = [(share - other) / (at - other) for j, (other, _) in enumerate(path) if j != i]
         total = total + np.prod(factors) * moved
     return total
+
+
+_Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]
+"""First derivatives of an energy by t and d, and second ones by tt, td, dd."""
 
 
 class NeoHooke:
@@ -380,12 +386,12 @@ class NeoHooke:
         )
         return Response(stress, tangent)
 
-    def _incompressible(self, trace, d):
+    def _incompressible(self, trace: np.ndarray, d: np.ndarray) -> "_Derivatives":
         """First derivatives by t and d, and second ones by tt, td, dd, of W = mu/2 (t + 1/d - 3)."""
         none = np.zeros_like(trace)
         return (none + self.shear / 2, -self.shear / 2 / d**2), (none, none, self.shear / d**3)
 
-    def _compressible(self, trace, d):
+    def _compressible(self, trace: np.ndarray, d: np.ndarray) -> "_Derivatives":
         """The same of the module's docstring's energy, the stretch z across eliminated in plane stress."""
         z = np.ones_like(d)
         if self.plane == "stress":
@@ -403,7 +409,7 @@ class NeoHooke:
             second = [of - parts[one] * parts[other] / parts["zz"] for of, (one, other) in zip(second, pairs)]
         return (parts["t"], parts["d"]), second
 
-    def _parts(self, t, d, z):
+    def _parts(self, t: np.ndarray, d: np.ndarray, z: np.ndarray) -> dict[str, np.ndarray]:
         """Derivatives of mu/2 (p (t + z^2) - 3) + K/2 (J - 1)^2 with J = z sqrt(d), p = J^(-2/3)."""
         half, bulk = self.shear / 2, self.bulk
         volume = z * np.sqrt(d)

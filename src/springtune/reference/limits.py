@@ -5,6 +5,7 @@ A cantilever under a dead load at its end is the elastica :math:`\theta'' = -\al
 :math:`\alpha/2`, and by the closed form of `elastica` at any load.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def elastica(load: float) -> float:
     from scipy.optimize import brentq  # here: few beams turn as far
     from scipy.special import ellipeinc, ellipkinc
 
-    def parts(turn, integral):
+    def parts(turn: float, integral: Callable[[float, float], float]) -> float:
         parameter = (1 + np.sin(turn)) / 2
         return integral(np.pi / 2, parameter) - integral(np.arcsin(np.sqrt(0.5 / parameter)), parameter)
 

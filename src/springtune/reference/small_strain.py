@@ -25,7 +25,7 @@ from math import ceil, log
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.sparse import block_array, coo_array, csr_array, diags_array, kron
+from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_array, kron
 
 from ..linalg.factors import factorize
 from ..problem.geometry import Beam
@@ -348,7 +348,7 @@ class UnitLevel:
         x, y = self._grid.plot_points
         return x, y, self._sum(self._grid.plot_values)
 
-    def _sum(self, values):
+    def _sum(self, values: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
         signs, at_x, at_y = values
         return np.stack([sign * (at_x @ part @ at_y.T) for sign, part in zip(signs, self._coefficients)], axis=2)
 
@@ -380,7 +380,7 @@ class _Grid:
             loaded[kind.along] = numbers == (line.last if kind.cut.far else line.first)
             self.middle = self._along_force(np.kron(*loaded)).astype(float)
 
-    def _free(self):
+    def _free(self) -> list[list[np.ndarray]]:
         """Of u_x and of u_y the unknowns along x and along y: what clamps, rollers and symmetry leave."""
         ends = {LEFT: self._x.first, RIGHT: self._x.last, BOTTOM: self._y.first, TOP: self._y.last}
         lines = self._x, self._y
@@ -388,7 +388,7 @@ class _Grid:
                  for across in range(2)] for axis in range(2)]  # fmt: skip
         return [[line.all[~np.isin(line.all, there)] for line, there in zip(lines, sides)] for sides in held]
 
-    def _on_loaded_side(self):
+    def _on_loaded_side(self) -> list[np.ndarray]:
         """Along x and along y factors of the integrals over the loaded side of what moves along the force."""
         kind, lines = self._kind, (self._x, self._y)
         numbers, across = self._unknowns[kind.axis], lines[kind.normal]
@@ -396,18 +396,18 @@ class _Grid:
         factors[kind.normal] = numbers[kind.normal] == (across.last if kind.loaded.far else across.first)
         return factors
 
-    def _along_force(self, part):
+    def _along_force(self, part: np.ndarray) -> np.ndarray:
         """Values of all unknowns, of which those across the force are zero."""
         first = np.zeros(self._split, EXTENDED)
         second = np.zeros(len(self._unknowns[1][0]) * len(self._unknowns[1][1]), EXTENDED)
         (first, second)[self._kind.axis][:] = part
         return np.concatenate([first, second])
 
-    def _matrices(self):
+    def _matrices(self) -> tuple[csc_array, csc_array, csc_array]:
         """Of the stiffness matrix the parts by direct strains, by lateral contraction and by shear."""
         (first, second), x, y = self._unknowns, self._x, self._y
 
-        def product(of_x, of_y, rows, columns):
+        def product(of_x: np.ndarray, of_y: np.ndarray, rows: list[np.ndarray], columns: list[np.ndarray]) -> coo_array:
             # Slices of so small matrices are cheaper dense.
             return kron(*(coo_array(of[np.ix_(*ends)]) for of, *ends in zip((of_x, of_y), rows, columns)))
 
@@ -420,7 +420,7 @@ class _Grid:
             block_array([[shear[0], turning], [turning.T, shear[1]]], format="csc"),
         )
 
-    def solve(self, nu):
+    def solve(self, nu: float) -> tuple[np.ndarray, float, float | None, float]:
         """Unknowns for a Poisson's ratio, energy, displacement of a pressed side's middle if any, rounding."""
         one = EXTENDED(1)
         direct, shear = one / (1 - one * nu * nu), one / (2 * (1 + one * nu))
@@ -453,7 +453,14 @@ class _Grid:
         _, work = self._forces(solution, direct, nu, shear, factor.solve(self.middle).astype(EXTENDED))
         return refined, energy, measured, max(round_off, float(unit * work / measured))
 
-    def _forces(self, solution, direct, nu, shear, other=None):
+    def _forces(
+        self,
+        solution: np.ndarray,
+        direct: np.floating,
+        nu: float,
+        shear: np.floating,
+        other: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.floating]:
         """Inner forces in extended precision, and the work that stresses do on the terms of strains, without signs.
 
         Strains come first, then stresses, then forces, none by the matrix: what cancels are the displacements of a
@@ -473,14 +480,14 @@ class _Grid:
         work = sum((weights * size * term).sum() for size, term in zip(sizes, terms))
         return np.concatenate([part[np.ix_(*ends)].ravel() for part, ends in zip(forces, self._unknowns)]), work
 
-    def fields(self, solution):
+    def fields(self, solution: np.ndarray) -> np.ndarray:
         """Coefficients of all products of polynomials, shape (2, n along x, n along y)."""
         fields = np.zeros((2, len(self._x.all), len(self._y.all)), solution.dtype)
         for field, ends, part in zip(fields, self._unknowns, (solution[: self._split], solution[self._split :])):
             field[np.ix_(*ends)] = part.reshape(len(ends[0]), -1)
         return fields
 
-    def values(self, x, y):
+    def values(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Signs of the two displacements on a grid of coordinates, and what takes coefficients there along x and y."""
         signs = np.ones((2, len(x), len(y)))
         odd = 1 - self._kind.axis
@@ -493,14 +500,14 @@ class _Grid:
         return signs, self._x.values(x), self._y.values(y)
 
     @cached_property
-    def plot_points(self):
+    def plot_points(self) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates along x and y of the points of the field that is handed out."""
         spacing = (2 * self._length / FIELD_POINTS) ** 0.5
         x, half = _plot_points(self._length / 2, spacing), 1 - _plot_points(1.0, spacing)[::-1]
         return np.concatenate([x, self._length - x[-2::-1]]), np.concatenate([-half[:0:-1], half])
 
     @cached_property
-    def plot_values(self):
+    def plot_values(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.values(*self.plot_points)
 
 
@@ -544,7 +551,7 @@ class _Line:
         )
         self.integrals = value.T @ (self.weights * (np.arange(count * size) % size == 0))
 
-    def values(self, points):
+    def values(self, points: np.ndarray) -> np.ndarray:
         """Matrix that takes coefficients to values at points of the line."""
         element = np.clip(np.searchsorted(self.points, points, side="right") - 1, 0, len(self.points) - 2)
         start, end = self.points[element], self.points[element + 1]

@@ -1,9 +1,10 @@
 """Displacement over uniform stiffness: one equilibrium path serves all stiffnesses and forces of one sign."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..mechanics.series import LinearPath, StablePath
 from ..mesh import Mesh
@@ -15,13 +16,15 @@ from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .sheet import Sheet
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from .single import Scene
 
 RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 """Stiffnesses of a curve over E t [1], where none are given."""
 
 
-def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> Any:
+def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
     """Equilibrium path of springs of one stiffness, as far as loads need it.
 
     Parameters
@@ -42,8 +45,8 @@ def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> 
     return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
 
 
-def meeting(path: Any, force: float, stiffness: np.ndarray, displacement: np.ndarray, stable: np.ndarray,
-            reference: float, objection: str) -> Best:  # fmt: skip
+def meeting(path: LinearPath | StablePath, force: float, stiffness: np.ndarray, displacement: np.ndarray,
+            stable: np.ndarray, reference: float, objection: str) -> Best:  # fmt: skip
     """Stiffness at which a curve meets its reference.
 
     Parameters
@@ -67,7 +70,7 @@ def meeting(path: Any, force: float, stiffness: np.ndarray, displacement: np.nda
     return best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
 
 
-def ending(path: Any, force: float, stable: np.ndarray) -> str:
+def ending(path: LinearPath | StablePath, force: float, stable: np.ndarray) -> str:
     """Why a curve is not solved throughout; empty where it is."""
     if stable.all():
         return ""
@@ -104,9 +107,23 @@ class Curve:
     best_message : str
         Why there is none.
     predicted_stiffness : float
-        By closed form [N/m], of rows of equilateral triangles; NaN for loads that have none.
+        By closed form [N/m], of rows of equilateral triangles, see `springtune.springs.lattice.predicted_stiffness`;
+        NaN for loads that have none.
     title : str
         Of its plot.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "30 mm"), st.Material("210 GPa", 0.3)
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "300 kN")
+    >>> curve = st.sensitivity(scene, [0.5, 0.7, 0.9])
+    >>> curve.stiffness.tolist(), curve.stable.tolist()
+    ([105000000.0, 147000000.0, 189000000.0], [True, True, True])
+    >>> (100 * curve.error).round(1).tolist()
+    [51.8, 8.5, -15.6]
+    >>> print(f"no error at {curve.best_stiffness:.4g} N/m: {curve.best_status}")
+    no error at 1.595e+08 N/m: solved
     """
 
     stiffness: np.ndarray
@@ -120,7 +137,7 @@ class Curve:
     predicted_stiffness: float
     title: str
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the error over the stiffness.
 
         Parameters
@@ -131,6 +148,15 @@ class Curve:
         Returns
         -------
         matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "30 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "300 kN")
+        >>> axes = st.sensitivity(scene).plot()
+        >>> axes.get_title(), axes.get_ylabel()
+        ('200x30 mm, traction of 300000 N', 'deformation error [%]')
         """
         from .drawing import axes
 
@@ -151,7 +177,7 @@ class Curve:
         return ax
 
 
-def sensitivity(scene: "Scene", stiffness_ratios: Any = None) -> Curve:
+def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Curve:
     """Displacement of a scene over uniform stiffness, and where it meets the reference.
 
     Parameters
@@ -170,6 +196,11 @@ def sensitivity(scene: "Scene", stiffness_ratios: Any = None) -> Curve:
     ------
     ValueError
         If a stiffness is not above zero, or the force follows its side.
+
+    Notes
+    -----
+    A network of one stiffness k under a force F deforms by F / k alone, so that one equilibrium path serves them all;
+    see `springtune.mechanics.series`.
 
     Examples
     --------

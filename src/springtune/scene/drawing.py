@@ -1,11 +1,16 @@
 """Drawing a result: matplotlib is imported where something is drawn, and no backend is chosen."""
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-def axes(ax: Any = None) -> Any:
+    from ..mesh import Mesh
+
+
+def axes(ax: "Axes | None" = None) -> "Axes":
     """The axes that are given, or new ones.
 
     Parameters
@@ -23,7 +28,7 @@ def axes(ax: Any = None) -> Any:
     return pyplot.subplots(layout="constrained")[1]
 
 
-def draw_springs(ax: Any, mesh: Any, displacements: np.ndarray, forces: np.ndarray) -> Any:
+def draw_springs(ax: "Axes | None", mesh: "Mesh", displacements: np.ndarray, forces: np.ndarray) -> "Axes":
     """Draw springs where they have come to, coloured by their force, and the outline at rest.
 
     Parameters

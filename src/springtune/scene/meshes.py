@@ -26,17 +26,19 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
     Raises
     ------
     ValueError
-        If the mesh type is unknown, or the size not above zero or larger than the beam's smaller side.
+        If the mesh type is unknown, or the size not above zero, larger than the beam's smaller side, or absurdly small.
 
     Examples
     --------
-    >>> mesh = make_mesh(Beam("200 mm", "40 mm"), "structured", "5 mm")
+    >>> import springtune as st
+    >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
     >>> len(mesh.points), len(mesh.edges)
     (415, 1143)
     """
     make, edge = chosen(MESH_TYPES, mesh_type, "mesh type"), positive(size, "length", "mesh size")
-    if edge > min(beam.length, beam.height):
-        raise ValueError(f"mesh size: {size!r} is larger than beam {beam.name!r}; give at most its smaller side")
+    refusal = make.refusal(beam.length, beam.height, edge, f"beam {beam.name!r}")
+    if refusal:
+        raise ValueError(f"mesh size: {size!r} {refusal}")
     return make(beam.length, beam.height, edge)
 
 
@@ -62,13 +64,12 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
 
     Examples
     --------
-    >>> import tempfile
+    >>> import springtune as st
     >>> from springtune.mesh import write_mesh
-    >>> beam = Beam("100 mm", "20 mm")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_mesh(f"{folder}/own.vtu", make_mesh(beam, "free", "5 mm"))
-    ...     mesh = read_mesh(f"{folder}/own.vtu", beam)
-    >>> mesh.area
-    0.002
+    >>> beam = st.Beam("100 mm", "20 mm")
+    >>> write_mesh("own.vtu", st.make_mesh(beam, "free", "5 mm"))
+    >>> mesh = st.read_mesh("own.vtu", beam)
+    >>> print(f"{1e6 * mesh.area:.0f} mm2")
+    2000 mm2
     """
     return read_beam_mesh(path, beam.length, beam.height, positive(unit, "length", "unit"))

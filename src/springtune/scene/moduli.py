@@ -1,13 +1,12 @@
 """Effective moduli of a definition on a mesh, by patch tests."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from ..mechanics.moduli import PatchTest
 from ..mesh import Mesh
 from ..problem.materials import Material
-from ..springs import Springs
-from .sheet import Sheet
+from ..springs import DefinitionError, Springs
+from .sheet import AnyDefinition, Sheet, definition_of, named
 
 
 @dataclass(frozen=True)
@@ -23,8 +22,21 @@ class Moduli:
     shear_modulus_error : float
         Shear modulus under even shear of the outline over the material's, less one [1].
     springs : Springs
+        Of a sheet that is 1 m thick: moduli do not depend on the thickness.
     seconds : float
         That deriving the springs took.
+
+    Examples
+    --------
+    On squares with both diagonals, springs alone have the Young's modulus asked for, and nu = 1/3 whatever is asked:
+
+    >>> import springtune as st
+    >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "braced", "5 mm")
+    >>> found = st.moduli(mesh, st.Material("210 GPa", 0.3), "lattice")
+    >>> f"{abs(found.young_modulus_error):.4f} {found.poisson_ratio:.4f} {found.shear_modulus_error:+.4f}"
+    '0.0000 0.3333 -0.0250'
+    >>> f"{1.3 / (1 + 1 / 3) - 1:+.4f}"  # shear modulus E / (2 (1 + nu)) of the network over the material's, less one
+    '-0.0250'
     """
 
     young_modulus_error: float
@@ -45,9 +57,9 @@ class MeshModuli:
     def __init__(self, mesh: Mesh) -> None:
         self.sheet = Sheet(mesh, 1.0)
         self._test = PatchTest(mesh)
-        self._found: dict[tuple[Any, ...], tuple[float, float, float]] = {}
+        self._found: dict[tuple[object, ...], tuple[float, float, float]] = {}
 
-    def __call__(self, material: Material, definition: Any) -> Moduli:
+    def __call__(self, material: Material, definition: AnyDefinition) -> Moduli:
         """As `moduli`."""
         springs, seconds = self.sheet.derive(definition, material)
         name = springs.relative.tobytes(), springs.lateral, *(energy.key for energy in springs.energies)
@@ -64,7 +76,7 @@ class MeshModuli:
         )
 
 
-def moduli(mesh: Mesh, material: Material, definition: Any) -> Moduli:
+def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
     """Effective moduli of a definition on a mesh, by patch tests with an even strain.
 
     Parameters
@@ -88,15 +100,24 @@ def moduli(mesh: Mesh, material: Material, definition: Any) -> Moduli:
 
     Notes
     -----
-    They are those of the mesh that is given: rows of triangles that are fitted to a box are stretched, and not
-    isotropic.
+    Young's modulus is F L / (u H t) and Poisson's ratio that of the mean strains where the ends of the mesh are moved
+    apart by u and slide; the shear modulus is the work of the outline, sheared evenly by an angle, over that angle's
+    square and the volume; see `springtune.mechanics.moduli`. They are those of the mesh that is given: rows of
+    triangles that are fitted to a box are stretched, and not isotropic.
 
     Examples
     --------
     >>> import springtune as st
     >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "right", "5 mm")
-    >>> found = moduli(mesh, st.Material("1 MPa", 1 / 3), "delingette")
+    >>> found = st.moduli(mesh, st.Material("1 MPa", 1 / 3), "delingette")
     >>> f"{abs(found.young_modulus_error):.6f} {found.poisson_ratio:.4f} {abs(found.shear_modulus_error):.6f}"
     '0.000000 0.3333 0.000000'
     """
-    return MeshModuli(mesh)(material, definition)
+    definition = definition_of(definition)
+    if definition.needs == "stiffness":
+        raise DefinitionError(
+            f"definition {definition.name!r} is told its stiffness and derives none from a material; choose one that "
+            "does, such as 'uniform'"
+        )
+    with named(definition):
+        return MeshModuli(mesh)(material, definition)

@@ -2,11 +2,11 @@
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,8 +19,9 @@ from ..mesh import Mesh
 from ..problem.boundary import held, loaded_edges, measured, weights
 from ..problem.loads import LoadKind
 from ..problem.materials import Material
+from ..problem.quantities import nearest
 from ..problem.status import Status
-from ..springs import DEFINITIONS, DefinitionError, Springs
+from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
 NETWORKS = 6
@@ -47,7 +48,7 @@ class OwnDefinition:
         """What it is called in messages."""
         return getattr(self.function, "__name__", type(self.function).__name__)
 
-    def springs(self, mesh: Mesh, material: Material, thickness: float, given: Any = None) -> Springs:
+    def springs(self, mesh: Mesh, material: Material, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh, checked."""
         found = self.function(mesh, material, thickness)
         if not isinstance(found, Springs):
@@ -60,7 +61,13 @@ class OwnDefinition:
         return found
 
 
-def definition_of(definition: Any) -> Any:
+AnyDefinition = str | Definition | OwnDefinition | Callable[[Mesh, Material, float], Springs]
+"""Definition by its name, or a function of one's own."""
+
+Entry = TypeVar("Entry")
+
+
+def definition_of(definition: AnyDefinition) -> Definition | OwnDefinition:
     """Definition by its name, or of a function of one's own.
 
     Parameters
@@ -82,14 +89,14 @@ def definition_of(definition: Any) -> Any:
     >>> definition_of("lattice").name
     'lattice'
     """
-    if hasattr(definition, "springs"):
+    if isinstance(definition, Definition | OwnDefinition):
         return definition
     if callable(definition):
         return OwnDefinition(definition)
     return chosen(DEFINITIONS, definition, "definition")
 
 
-def chosen(known: Any, name: Any, what: str) -> Any:
+def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
     """Entry of a mapping, or an error that says what there is.
 
     Parameters
@@ -106,9 +113,26 @@ def chosen(known: Any, name: Any, what: str) -> Any:
     """
     if isinstance(name, str) and name in known:
         return known[name]
-    near = get_close_matches(str(name), list(known), n=1, cutoff=0.6)
-    meant = f"did you mean {near[0]!r}? " if near else ""
-    raise ValueError(f"{what}: {name!r} is unknown; {meant}Known: {', '.join(known)}")
+    raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
+
+
+@contextmanager
+def named(definition: Definition | OwnDefinition) -> Iterator[None]:
+    """Context in which a definition that refuses a mesh or material is named.
+
+    Parameters
+    ----------
+    definition : Definition or OwnDefinition
+
+    Raises
+    ------
+    DefinitionError
+        As raised within, with the name ahead of it.
+    """
+    try:
+        yield
+    except DefinitionError as error:
+        raise DefinitionError(f"definition {definition.name!r}: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -178,13 +202,13 @@ class Sheet:
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self._most = networks
-        self._derived: tuple[tuple[Any, ...], Springs, float] | None = None
+        self._derived: tuple[tuple[object, ...], Springs, float] | None = None
         self._patterns: dict[bytes, Network] = {}
         self._networks: dict[bytes, tuple[Network, dict[tuple[LoadKind, float, bool], StaticProblem]]] = {}
 
     def derive(
         self,
-        definition: Any,
+        definition: AnyDefinition,
         material: Material,
         stiffness: float | None = None,
         case: tuple[LoadKind, float, np.ndarray | None] | None = None,
@@ -214,8 +238,8 @@ class Sheet:
             If the definition cannot live on the mesh or with the material, or is not told what it needs.
         """
         definition = definition_of(definition)
-        key: tuple[Any, ...] = definition, material, stiffness
-        given: Any = stiffness
+        key: tuple[object, ...] = definition, material, stiffness
+        given: float | list[Case] | None = stiffness
         if definition.needs == "cases":
             given = patch_cases(self.mesh, material, self.thickness) if case is None else self._cases(*case)
             key += case[:2] if case else ()

@@ -14,19 +14,18 @@ from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..problem.compare import deformation_error
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS, LoadKind
+from ..problem.loads import KINEMATICS, LOADS, LoadKind
 from ..problem.materials import Material
 from ..problem.quantities import positive
 from ..problem.status import Status
 from ..springs import Springs
-from .sheet import Sheet, chosen, definition_of
+from .sheet import AnyDefinition, Sheet, chosen, definition_of, named
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from ..mechanics.dynamics import Motion
     from ..reference.small_strain import ReferenceSolution
-
-KINEMATICS = ("nonlinear", "linear")
-"""Kinematics of a network."""
 
 FILLED = 1e-6
 """What a mesh may miss of its beam, over the beam's extent."""
@@ -64,18 +63,39 @@ class Scene:
     ----------
     sheet : Sheet
         What scenes of the same mesh and thickness can share.
+    force : float
+        With the sign that its load gives it [N].
+    definition : Definition
+    uniform_stiffness : float or None
+        The stiffness that was given [N/m].
     kind : LoadKind
     follower : bool
         Whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
 
+    Notes
+    -----
+    A spring of stiffness k and rest length L whose ends are l apart pulls with k (l - L), or in linear kinematics with
+    k times the stretch along its direction at rest; see `springtune.mechanics.network`.
+
     Examples
     --------
     >>> import springtune as st
-    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, name="steel")
     >>> mesh = st.make_mesh(beam, "structured", "5 mm")
-    >>> result = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="patch").solve()
+    >>> scene = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="patch")
+    >>> scene
+    Scene(200x40 mm, 415 particles, steel, traction of 400000 N, patch, nonlinear)
+    >>> len(scene.springs.relative), scene.network.held.sum().item(), scene.objection
+    (1143, 20, '')
+    >>> result = scene.solve()
     >>> print(f"{result.status}: {1e3 * result.displacement:.2f} mm, error {100 * result.error:+.1f} %")
     solved: 9.51 mm, error +0.1 %
+
+    The network without units, as the mechanics have it: force and stiffness over the reference stiffness.
+
+    >>> moved = scene.problem.nonlinear(scene.force / scene.springs.reference)
+    >>> bool(abs(moved.displacements - result.displacements).max() < 1e-12)
+    True
     """
 
     def __init__(
@@ -86,7 +106,7 @@ class Scene:
         load: str,
         force: float | str,
         *,
-        definition: Any = "patch",
+        definition: AnyDefinition = "patch",
         kinematics: str = "nonlinear",
         stiffness: float | str | None = None,
         sheet: Sheet | None = None,
@@ -133,7 +153,8 @@ class Scene:
         case = None
         if self.definition.needs == "cases":
             case = self.kind, self.force, _reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
-        return self.sheet.derive(self.definition, self.material, self.uniform_stiffness, case)
+        with named(self.definition):
+            return self.sheet.derive(self.definition, self.material, self.uniform_stiffness, case)
 
     @property
     def springs(self) -> Springs:
@@ -162,6 +183,17 @@ class Scene:
         ------
         DefinitionError
             If the definition cannot live on the mesh or with the material.
+
+        Examples
+        --------
+        A cantilever; a slender one gives way by F L^3 / (3 E I) = 0.381 mm:
+
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "20 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "2 mm"), steel, "bending", "20 N")
+        >>> result = scene.solve()
+        >>> print(f"{result.status}: {1e3 * result.displacement:.4f} mm")
+        solved: 0.3780 mm
         """
         springs, derived = self._derived
         begin = time.perf_counter()
@@ -191,6 +223,20 @@ class Scene:
         ------
         ReferenceNotConvergedError
             If its error estimate stays above the tolerance.
+
+        Notes
+        -----
+        By the hp version of finite elements, whose error falls exponentially and is estimated; see
+        `springtune.reference.small_strain`.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
+        >>> reference = scene.reference()
+        >>> print(f"{1e3 * reference.displacement:.2f} mm; F L / (E A) = {1e3 * 400e3 * 0.2 / (210e9 * 4e-5):.2f} mm")
+        9.50 mm; F L / (E A) = 9.52 mm
         """
         return _reference(self.beam, self.material, self.kind, self.force)
 
@@ -221,6 +267,11 @@ class Scene:
         ValueError
             If the material has no density.
 
+        Notes
+        -----
+        Masses are lumped: each particle has its share of its cells'. The largest stable step of an undamped explicit
+        scheme is 2 over the highest frequency; see `springtune.mechanics.dynamics`.
+
         Examples
         --------
         >>> import springtune as st
@@ -245,14 +296,21 @@ class Scene:
         float
             [N]; NaN where there is none up to a hundred times the scene's force, or none that could be proved.
 
+        Notes
+        -----
+        By linear buckling analyses about equilibria shortly below it, proved by the sign of the tangent's pivots on
+        both sides; see `springtune.mechanics.arc_length.buckling_load`.
+
         Examples
         --------
+        >>> import math
         >>> import springtune as st
         >>> column, steel = st.Beam("100 mm", "4 mm"), st.Material("210 GPa", 0.3)
         >>> mesh = st.make_mesh(column, "structured", "0.5 mm")
         >>> scene = st.Scene(column, mesh, steel, "compression", "200 N", definition="delingette")
-        >>> print(f"{scene.buckling_load():.0f} N")
-        283 N
+        >>> euler = math.pi**2 * 210e9 * (1e-3 * 4e-3**3 / 12) / (2 * 0.1) ** 2
+        >>> print(f"{scene.buckling_load():.0f} N; a slender column, by Euler: {euler:.0f} N")
+        283 N; a slender column, by Euler: 276 N
         """
         from ..mechanics.arc_length import buckling_load
 
@@ -282,6 +340,25 @@ class Result:
         That the solve took, springs not included.
     definition_seconds : float
         That deriving the springs took.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> result = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="lattice").solve()
+    >>> result.status, result.message, result.negative_pivots
+    (<Status.SOLVED: 1>, '', 0)
+    >>> print(f"{1e3 * result.displacement:.2f} mm, by finite elements {1e3 * result.reference().displacement:.2f} mm")
+    9.83 mm, by finite elements 9.50 mm
+    >>> print(f"error {100 * result.error:+.2f} %")
+    error +3.52 %
+    >>> result.displacements.shape, result.stiffness.shape, result.spring_forces.shape
+    ((415, 2), (1143,), (1143,))
+    >>> print(f"{result.stiffness.max():.4g} N/m, at most {1e-3 * result.spring_forces.max():.1f} kN in a spring")
+    1.819e+08 N/m, at most 50.2 kN in a spring
+    >>> result.iterations, result.residual < 1e-10
+    (3, True)
     """
 
     scene: Scene = field(repr=False)
@@ -322,7 +399,17 @@ class Result:
         return self.scene.springs.reference * forces
 
     def reference(self) -> "ReferenceSolution":
-        """As `Scene.reference`."""
+        """Converged finite-element solution in small strain, under the same force; as `Scene.reference`.
+
+        Returns
+        -------
+        ReferenceSolution
+
+        Raises
+        ------
+        ReferenceNotConvergedError
+            If its error estimate stays above the tolerance.
+        """
         return self.scene.reference()
 
     @property
@@ -333,7 +420,7 @@ class Result:
         """
         return float(deformation_error(self.displacement, self.reference().displacement))
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the springs where they have come to, coloured by their force.
 
         Parameters
@@ -349,6 +436,15 @@ class Result:
         ------
         ValueError
             If there is no equilibrium.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+        >>> axes = st.Scene(beam, mesh, steel, "traction", "400 kN").solve().plot()
+        >>> axes.get_title()
+        'traction of 400000 N: 9.508 mm'
         """
         from .drawing import draw_springs
 
@@ -360,10 +456,10 @@ class Result:
 
 
 @lru_cache(maxsize=32)
-def _solve_unit(*problem: Any) -> "ReferenceSolution":
+def _solve_unit(aspect_ratio: float, nu: float, kind: LoadKind) -> "ReferenceSolution":
     from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
 
-    return solve_unit(*problem)
+    return solve_unit(aspect_ratio, nu, kind)
 
 
 def _reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
@@ -374,7 +470,7 @@ def _reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> 
     return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)
 
 
-def _is(value: Any, wanted: type, name: str, example: str) -> None:
+def _is(value: object, wanted: type, name: str, example: str) -> None:
     if not isinstance(value, wanted):
         raise ValueError(f"{name}: {value!r} is not a {wanted.__name__}; give one such as {example}")
 

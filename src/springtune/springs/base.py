@@ -13,7 +13,18 @@ from ..registry import Declared, Registry
 
 
 class DefinitionError(ValueError):
-    """A definition that cannot live on a mesh or with a material; the message says why and what to do."""
+    """A definition that cannot live on a mesh or with a material; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
+    >>> try:
+    ...     st.moduli(mesh, st.Material("210 GPa", 0.3), "baudet")
+    ... except st.DefinitionError as error:
+    ...     print(error)
+    definition 'baudet': needs rectangles with both diagonals and the mesh has triangles; use mesh type 'braced'
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +45,16 @@ class Springs:
         Solves that finding the parameters took.
     linear_springs : ndarray of float, shape (n_edges,), or None
         Stiffness over the reference stiffness at rest of springs whose law is part of an energy [1].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import springtune as st
+    >>> springs = st.Springs(2e8, np.array([1.0, 0.5, 0.25]))
+    >>> springs.reference * springs.relative
+    array([2.e+08, 1.e+08, 5.e+07])
+    >>> springs.spring_ratio
+    4.0
     """
 
     reference: float
@@ -70,6 +91,15 @@ class Definition(Declared):
         Whether it is for loads alone that stretch a beam along its length, see `LoadKind.uniaxial`.
     needs : str
         What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> lattice, paper = st.DEFINITIONS["lattice"], st.DEFINITIONS["paper"]
+    >>> lattice.cells, lattice.uniform, paper.uniform, paper.needs
+    ((3, 4), False, True, 'stiffness')
+    >>> lattice.summary
+    'Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3'
     """
 
     uniform: bool = False
@@ -77,7 +107,7 @@ class Definition(Declared):
     uniaxial: bool = False
     needs: str = ""
 
-    def springs(self, mesh: Mesh, material: Material, thickness: float, given: Any = None) -> Springs:
+    def springs(self, mesh: Mesh, material: Material, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh.
 
         Parameters
@@ -97,6 +127,16 @@ class Definition(Declared):
         ------
         DefinitionError
             If the definition cannot live on the mesh or with the material.
+
+        Examples
+        --------
+        An edge inside a lattice of equilateral triangles has sqrt(3)/2 E t:
+
+        >>> import springtune as st
+        >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
+        >>> found = st.DEFINITIONS["lattice"].springs(mesh, st.Material("210 GPa", 0.3), thickness=1e-3)
+        >>> print(f"{found.reference:.4g} N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = {3 ** 0.5 / 2 * 210e9 * 1e-3:.4g}")
+        1.819e+08 N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = 1.819e+08
         """
         arguments = (given,) if self.needs else ()
         return self.function(mesh, material, thickness, *arguments)
@@ -141,18 +181,16 @@ def definition(
     Examples
     --------
     >>> import numpy as np
-    >>> from springtune.mesh import MESH_TYPES
-    >>> from springtune.problem.materials import Material
-    >>> from springtune.springs import DEFINITIONS, Springs, definition
-    >>> @definition("half", uniform=True)
+    >>> import springtune as st
+    >>> @st.definition("half", uniform=True)
     ... def half(mesh, material, thickness):
     ...     "Half of E t for every spring."
-    ...     return Springs(0.5 * material.young_modulus * thickness, np.ones(len(mesh.edges)))
-    >>> mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
-    >>> steel = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
-    >>> DEFINITIONS["half"].springs(mesh, steel, thickness=1e-3).reference
+    ...     return st.Springs(0.5 * material.young_modulus * thickness, np.ones(len(mesh.edges)))
+    >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "free", "5 mm"), steel, "traction", "20 kN", definition="half")
+    >>> scene.springs.reference
     105000000.0
-    >>> DEFINITIONS.discard("half")
+    >>> st.DEFINITIONS.discard("half")
     """
 
     def declare(function: Function) -> Function:

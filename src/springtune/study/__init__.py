@@ -3,7 +3,9 @@
 `load` reads a YAML file; `springtune.study.config` says what the file may hold, study kinds add to it.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -11,16 +13,16 @@ from .checks import check_definitions, check_meshes, check_names
 from .config import StudyConfig, expected_value, json_schema, sections, study_model
 from .expand import Declared, build, expand, files_of_meshes
 from .fields import NAME, NAME_RULE
-from .messages import Problems, StudyError, show
-from .model import Curve, MeshSpec, Reference, Scene, Study
+from .messages import Key, Problems, StudyError, show
+from .model import CurveSpec, MeshSpec, Reference, SceneSpec, Study, StudyKind
 from .yaml_lines import read_yaml
 
 __all__ = [
-    "Curve",
+    "CurveSpec",
     "Declared",
     "MeshSpec",
     "Reference",
-    "Scene",
+    "SceneSpec",
     "Study",
     "StudyConfig",
     "StudyError",
@@ -32,7 +34,7 @@ __all__ = [
 ]
 
 
-def load(path, kinds):
+def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
     """Read, validate and expand a study.
 
     Parameters
@@ -77,7 +79,7 @@ def load(path, kinds):
     return build(config, grids, kinds, problems, about)
 
 
-def _validate(model, content, problems):
+def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> StudyConfig:
     """Config of what a file holds."""
     if content is None:
         problems.add((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
@@ -86,13 +88,15 @@ def _validate(model, content, problems):
         return model.model_validate(content)
     except ValidationError as error:
         for details in error.errors(include_url=False):
-            path, place = [], content
+            path: list[Key] = []
+            place = content
             # pydantic's path has steps that the file has not: branches of a union, the item of a single value.
             for step in details["loc"]:
-                if isinstance(place, dict) and step in place or isinstance(place, list) and isinstance(step, int):
+                if step in place if isinstance(place, dict) else isinstance(place, list) and isinstance(step, int):
                     path.append(step)
                     place = place[step]
             own = details["type"] == "study"
             path += [step for step in details["ctx"]["path"] if isinstance(place, list | dict)] if own else []
             problems.add(path, details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md")
         problems.stop()
+        raise

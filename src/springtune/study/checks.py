@@ -2,32 +2,36 @@
 
 import math
 from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
+from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
-from .config import PLAUSIBLE
-from .messages import nearest
+from .config import PLAUSIBLE, StatedStiffness, StudyConfig
+from .messages import Key, Problems
+from .model import Grid, MeshSpec, Reference, SceneSpec
 
 MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""
 
 
-def check_known(problems, path, what, name, names):
+def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str]) -> None:
     """A name that refers to what the study declares."""
     if name not in names:
         problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
 
 
-def check_names(config, problems):
+def check_names(config: StudyConfig, problems: Problems) -> None:
     """Names that refer to what the study declares, and pairs of numbers."""
     mesh_types = mesh_type_names(config)
-    for name in config.mesh_files or ():
+    for name, rows in (config.mesh_files or {}).items():
         if name in MESH_TYPES:
             problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
-        for number, row in enumerate(config.mesh_files[name]):
-            check_known(problems, ("mesh_files", name, number, "beam"), "beam", row.beam, config.beams)
+        for number, one in enumerate(rows):
+            check_known(problems, ("mesh_files", name, number, "beam"), "beam", one.beam, config.beams)
     for name, grid in config.grids.items():
         for mesh_type in grid.mesh_type:
             if mesh_type not in mesh_types:
@@ -63,7 +67,7 @@ def check_names(config, problems):
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
 
 
-def check_for_triangles(names, path, problems):
+def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:
     """Definitions that derive a stiffness on triangles from mesh and material alone."""
     able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
     for name in names:
@@ -72,18 +76,18 @@ def check_for_triangles(names, path, problems):
             problems.add(path, f"{message}; choose of {', '.join(able)}")
 
 
-def check_density(config, name, path, problems):
+def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
     """What moves has a density; materials that are not declared are another problem."""
     if name in config.materials and config.materials[name].density is None:
         problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
 
 
-def mesh_type_names(config):
+def mesh_type_names(config: StudyConfig) -> list[str]:
     """Names of all mesh types, made ones first."""
     return [*MESH_TYPES, *(config.mesh_files or ())]
 
 
-def check_meshes(config, content, problems):
+def check_meshes(config: StudyConfig, content: dict[str, Any], problems: Problems) -> None:
     """Mesh sizes against the beams they are for."""
     for name, grid in config.grids.items():
         if not any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type):
@@ -103,10 +107,10 @@ def check_meshes(config, content, problems):
                     problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
 
 
-def _check_kinds(grids, problems):
+def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
     """Definitions against the cells and loads of the grids that use them."""
     for grid in grids:
-        found = {}
+        found: dict[str, None] = {}
         for scene in grid.scenes:
             definition, mesh_type = DEFINITIONS[scene.definition], scene.mesh.mesh_type
             made = MESH_TYPES.get(mesh_type)
@@ -124,11 +128,11 @@ SEPARATE = "give them grids of their own"
 """Remedy where two values of a grid do not go together."""
 
 
-def check_definitions(config, content, grids, problems):
+def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Sequence[Grid], problems: Problems) -> None:
     """Parameters of the definitions against what the grids need of them."""
     _check_kinds(grids, problems)
     stated = {(row.mesh_type, row.material): row.value for row in stated_rows(config)}
-    thicknesses = {}
+    thicknesses: dict[tuple[str, str], dict[float, None]] = {}
     for grid in grids:
         lacking = set()
         for scene in grid.scenes:
@@ -137,11 +141,11 @@ def check_definitions(config, content, grids, problems):
                 thicknesses.setdefault(pair, {})[scene.mesh.beam.thickness] = None
                 if pair not in stated and pair not in lacking:
                     lacking.add(pair)
-                    row = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
+                    example = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
                     problems.add(
                         ("grids", grid.name, "definition"),
                         f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; "
-                        f"add {row} to definitions.paper.stiffness",
+                        f"add {example} to definitions.paper.stiffness",
                     )
         if not config.definitions.calibrated and any(scene.definition == "calibrated" for scene in grid.scenes):
             problems.add(
@@ -163,12 +167,14 @@ def check_definitions(config, content, grids, problems):
                 break
 
 
-def stated_rows(config):
+def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
     """Rows of stated stiffnesses; none where the study states none."""
     return config.definitions.paper.stiffness if config.definitions.paper else []
 
 
-def check_files(meshes, scenes, references, problems):
+def check_files(
+    meshes: Iterable[MeshSpec], scenes: Iterable[SceneSpec], references: Iterable[Reference], problems: Problems
+) -> None:
     """Different things must not share a name: names become files."""
     parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
     pairs = {(reference.beam.name, reference.material.name) for reference in references}

@@ -1,11 +1,14 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
-from typing import Annotated, get_args, get_origin
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic.fields import FieldInfo
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
+from ..problem.quantities import nearest
 from .fields import (
     BeamName,
     DefinitionName,
@@ -30,13 +33,14 @@ from .fields import (
     Text,
     one_of,
 )
-from .messages import nearest, refuse, show
+from .messages import refuse, show
+from .model import StudyKind, StudyOutput
 
 PLAUSIBLE = 20.0
 """A stated stiffness farther than this factor from sqrt(3)/2 E t is taken for an error of units."""
 
 
-def expected_value(field):
+def expected_value(field: FieldInfo) -> str:
     """Words for what a field of a section expects, e.g. ``a length such as '200 mm'``."""
     for note in field.metadata:
         if isinstance(note, OneOrMore):
@@ -56,7 +60,7 @@ class Section(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, value):
+    def _known_keys(cls, value: object) -> dict[str, object]:
         names = {field.alias or name: field for name, field in cls.model_fields.items()}
         if not isinstance(value, dict):
             raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
@@ -107,7 +111,7 @@ class PaperConfig(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _listed(cls, value):
+    def _listed(cls, value: object) -> object:
         rows = value.get("stiffness") if isinstance(value, dict) else None
         if rows is not None and (not isinstance(rows, list) or not rows):
             example = "- {mesh_type: structured, material: steel, value: 170e6 N/m}"
@@ -183,7 +187,7 @@ class GridConfig(Section):
     )
 
     @model_validator(mode="after")
-    def _one_force(self):
+    def _one_force(self) -> Self:
         if (self.force is None) == (self.pressure is None):
             both = "both 'force' and 'pressure'; remove one"
             missing = "'force' is missing; give a force such as '400 kN', or one for each beam"
@@ -224,7 +228,7 @@ class StudyConfig(Section):
     mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
         None, description="Mesh types of your own: for each a list of files, one for each beam and mesh size."
     )
-    outputs: list = Field([], validate_default=False)
+    outputs: list[str] = Field([], validate_default=False)
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
         description="References at finite strain besides the small-strain one, for every beam, material and load: in "
@@ -237,7 +241,7 @@ class StudyConfig(Section):
     grids: dict[str, GridConfig]
 
 
-def study_model(kinds):
+def study_model(kinds: Sequence[StudyKind]) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids.
 
     Parameters
@@ -249,7 +253,10 @@ def study_model(kinds):
     type
         Subclass of `StudyConfig`.
     """
-    grid_fields, study_fields, outputs = {}, {}, []
+    # Of each field its type and pydantic's description.
+    grid_fields: dict[str, Any] = {}
+    study_fields: dict[str, Any] = {}
+    outputs: list[StudyOutput] = []
     for kind in kinds:
         grid_fields |= kind.grid_fields
         study_fields |= kind.study_fields
@@ -257,9 +264,9 @@ def study_model(kinds):
     grid = create_model("GridConfig", __base__=GridConfig, **grid_fields)
     grid.__doc__ = GridConfig.__doc__
     meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in outputs)
-    output_names = Annotated[list[one_of("output", [output.name for output in outputs])], OneOrMore()]
+    output_name = Annotated[str, one_of("output", [output.name for output in outputs])]
     study_fields["outputs"] = (
-        output_names,
+        Annotated[list[output_name], OneOrMore()],
         Field(
             [output.name for output in outputs if output.usual],
             validate_default=False,
@@ -275,7 +282,7 @@ def study_model(kinds):
     return model
 
 
-def sections(model, place=""):
+def sections(model: type[Section], place: str = "") -> dict[str, type[Section]]:
     """Model of each section of a study, by its place.
 
     Parameters
@@ -295,15 +302,16 @@ def sections(model, place=""):
     return found
 
 
-def _models(annotation, ending=""):
+def _models(annotation: object, ending: str = "") -> Iterator[tuple[type[Section], str]]:
     """Sections inside an annotation, and what follows the key to lead to them."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         yield annotation, ending
-    ending += {dict: ".<name>", list: "[]"}.get(get_origin(annotation), "")
+    origin = get_origin(annotation)
+    ending += ".<name>" if origin is dict else "[]" if origin is list else ""
     for part in get_args(annotation):
         yield from _models(part, ending)
 
 
-def json_schema(model):
+def json_schema(model: type[StudyConfig]) -> dict[str, Any]:
     """JSON schema of a study, for editors."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | model.model_json_schema()

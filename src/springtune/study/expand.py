@@ -1,22 +1,33 @@
 """From the sections of a study to all that they ask for."""
 
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 from ..mesh import MESH_TYPES
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS
+from ..problem.loads import KINEMATICS, LOADS
 from ..problem.materials import Material
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
 from .checks import check_files, mesh_type_names, stated_rows
-from .model import FURTHER_REFERENCES, KINEMATICS, Curve, Grid, MeshSpec, Reference, Scene, Study
+from .config import StudyConfig
+from .messages import Problems
+from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, StudyKind
 from .printed import read_printed
 
+Ranks = dict[str, dict[str, int]]
+"""Place of each label in the order of its dimension."""
 
-def files_of_meshes(config, folder, problems):
+Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
+
+
+def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> MeshFiles:
     """Meshes from files by (mesh type, beam's name, mesh size)."""
-    found, beams = {}, declared(config).beams
+    found: MeshFiles = {}
+    beams = declared(config).beams
     for name, rows in (config.mesh_files or {}).items():
         for number, row in enumerate(rows):
             path, label = folder / row.file, (name, row.beam, row.mesh_size)
@@ -40,11 +51,11 @@ class Declared:
     materials : dict of str to Material
     """
 
-    beams: dict
-    materials: dict
+    beams: dict[str, Beam]
+    materials: dict[str, Material]
 
 
-def declared(config):
+def declared(config: StudyConfig) -> Declared:
     """What a study declares.
 
     Parameters
@@ -64,9 +75,9 @@ def declared(config):
     )
 
 
-def _ranks(config):
+def _ranks(config: StudyConfig) -> Ranks:
     """Place of each label in the order of its dimension."""
-    names = {
+    names: dict[str, Iterable[str]] = {
         "beam": config.beams,
         "mesh_type": mesh_type_names(config),
         "material": config.materials,
@@ -77,16 +88,16 @@ def _ranks(config):
     return {dimension: {name: rank for rank, name in enumerate(labels)} for dimension, labels in names.items()}
 
 
-def _order(ranks):
+def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Reference], list[float]]:
     """Sort key of meshes, scenes, curves and references."""
 
-    def key(item):
-        mesh = item if isinstance(item, MeshSpec) else getattr(item, "mesh", None)
-        beam = (mesh or item).beam
-        found = [ranks["beam"][beam.name]]
+    def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> list[float]:
+        mesh = item if isinstance(item, MeshSpec) else None if isinstance(item, Reference) else item.mesh
+        beam = item.beam if isinstance(item, MeshSpec | Reference) else item.mesh.beam
+        found: list[float] = [ranks["beam"][beam.name]]
         if mesh:
             found += [ranks["mesh_type"][mesh.mesh_type], mesh.mesh_size]
-        if mesh is not item:
+        if not isinstance(item, MeshSpec):
             found += [ranks["material"][item.material.name], ranks["load"][item.load]]
             for label in ("definition", "kinematics"):
                 if hasattr(item, label):
@@ -96,18 +107,22 @@ def _order(ranks):
     return key
 
 
-def expand(config, mesh_files, problems):
+def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Grids with their scenes and curves, in canonical order."""
     order = _order(_ranks(config))
     beams, materials = declared(config).beams, declared(config).materials
-    forces, grids = {}, []
+    forces: dict[tuple[str, str, str], tuple[float, str]] = {}
+    grids = []
     for name, grid in config.grids.items():
-        scenes, curves, absent = [], [], set()
+        scenes: list[SceneSpec] = []
+        curves: list[CurveSpec] = []
+        absent = set()
         for beam, material, load in product(grid.beam, grid.material, grid.load):
             if grid.pressure is not None:
                 magnitude = grid.pressure * beams[beam].length * beams[beam].thickness
             else:
-                magnitude = grid.force[beam if beam in grid.force else None]
+                given = cast("dict[str | None, float]", grid.force)  # see `PerBeam`
+                magnitude = given[beam if beam in given else None]
             other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
             if other != magnitude:
                 problems.add(
@@ -119,23 +134,23 @@ def expand(config, mesh_files, problems):
             for mesh_type, size, kinematics in product(grid.mesh_type, grid.mesh_size, grid.kinematics):
                 mesh = MeshSpec(beams[beam], mesh_type, size)
                 if mesh_type not in MESH_TYPES:
-                    mesh = mesh_files.get((mesh_type, beam, size))
-                    if mesh is None:
+                    if (mesh_type, beam, size) not in mesh_files:
                         absent.add((mesh_type, beam, f"{1e3 * size:g} mm"))
                         continue
+                    mesh = mesh_files[mesh_type, beam, size]
                 common = (mesh, materials[material], load, force)
-                scenes += [Scene(*common, definition, kinematics) for definition in grid.definition]
+                scenes += [SceneSpec(*common, definition, kinematics) for definition in grid.definition]
                 if grid.sensitivity and not LOADS[load].follower:  # k enters as F/k only where forces stay
-                    curves.append(Curve(*common, kinematics))
-        for mesh_type, beam, size in sorted(absent):
-            row = f"{{file: <path>, beam: {beam}, mesh_size: {size}}}"
-            problems.add(("grids", name, "mesh_size"), f"no file for {size}; add {row} to mesh_files.{mesh_type}")
+                    curves.append(CurveSpec(*common, kinematics))
+        for mesh_type, beam, length in sorted(absent):
+            row = f"{{file: <path>, beam: {beam}, mesh_size: {length}}}"
+            problems.add(("grids", name, "mesh_size"), f"no file for {length}; add {row} to mesh_files.{mesh_type}")
         grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order))))
     problems.stop()
     return tuple(grids)
 
 
-def _calibrating(config, scenes, problems):
+def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Problems) -> list[CurveSpec]:
     """Curves that calibrate the scenes of the definition ``calibrated``."""
     calibration = config.definitions.calibrated
     if not calibration:
@@ -150,9 +165,11 @@ def _calibrating(config, scenes, problems):
         for scene in scenes
         if scene.definition == "calibrated"
     }
-    curves = []
+    curves: list[CurveSpec] = []
     for mesh_type, material, kinematics in needed:
-        found = [Curve(*cell, kinematics) for cell in cells if (cell[0].mesh_type, cell[1]) == (mesh_type, material)]
+        found = [
+            CurveSpec(*cell, kinematics) for cell in cells if (cell[0].mesh_type, cell[1]) == (mesh_type, material)
+        ]
         if not found:
             problems.add(
                 ("definitions", "calibrated"),
@@ -163,12 +180,14 @@ def _calibrating(config, scenes, problems):
     return curves
 
 
-def build(config, grids, kinds, problems, about):
+def build(
+    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[StudyKind], problems: Problems, about: dict[str, Any]
+) -> Study:
     """Study of a config and its grids, with the parts of all study kinds."""
     ranks = _ranks(config)
     order = _order(ranks)
 
-    def in_order(items):
+    def in_order(items: Iterable[Item]) -> tuple[Item, ...]:
         return tuple(sorted(dict.fromkeys(items), key=order))
 
     scenes = in_order(scene for grid in grids for scene in grid.scenes)
@@ -207,7 +226,12 @@ def build(config, grids, kinds, problems, about):
     return study
 
 
-def _axes(ranks, meshes, scenes, further):
+def _axes(
+    ranks: Ranks,
+    meshes: Iterable[MeshSpec],
+    scenes: Sequence[SceneSpec],
+    further: Iterable[Mapping[str, Collection[str | float]]],
+) -> dict[str, tuple[str | float, ...]]:
     """Labels of each dimension; groups of a dataset share those that its root has."""
     used = {name: {getattr(scene, name) for scene in scenes} for name in ("load", "definition", "kinematics")}
     used["beam"] = {mesh.beam.name for mesh in meshes}

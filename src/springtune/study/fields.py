@@ -10,10 +10,11 @@ from pydantic_core import CoreSchema, core_schema
 
 from .. import units
 from ..mesh import MESH_TYPES
-from ..problem.loads import LOADS
+from ..problem.loads import KINEMATICS, LOADS
+from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
-from .messages import nearest, refuse, show
-from .model import FURTHER_REFERENCES, KINEMATICS
+from .messages import refuse, show
+from .model import FURTHER_REFERENCES
 
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
@@ -47,8 +48,8 @@ class Scalar:
         return self.read(value)
 
 
-def quantity(kind: str, negative: str = "give a size above zero") -> Any:
-    """Type of a quantity above zero, of a key of `springtune.units.QUANTITY_KINDS`."""
+def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
+    """Annotation of a quantity above zero, of a key of `springtune.units.QUANTITY_KINDS`."""
     example = units.QUANTITY_KINDS[kind].example
 
     def read(value: str) -> float:
@@ -61,11 +62,11 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Any:
         return number
 
     schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
-    return Annotated[float, Scalar(read, schema, f"a {kind} such as '{example}'")]
+    return Scalar(read, schema, f"a {kind} such as '{example}'")
 
 
-def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Any:
-    """Type of a number from `low`, or `above` it, to `high`."""
+def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:
+    """Annotation of a number from `low`, or `above` it, to `high`."""
 
     def read(value: str) -> float:
         try:
@@ -79,18 +80,18 @@ def number(words: str, low: float, high: float, *, above: bool = False, whole: b
     schema: dict[str, Any] = {"type": "integer" if whole else "number", "exclusiveMinimum" if above else "minimum": low}
     if math.isfinite(high):
         schema["maximum"] = high
-    return Annotated[int if whole else float, Scalar(read, schema, words)]
+    return Scalar(read, schema, words)
 
 
-def one_of(what: str, names: Collection[str]) -> Any:
-    """Type of a name out of some."""
+def one_of(what: str, names: Collection[str]) -> Scalar:
+    """Annotation of a name out of some."""
 
     def read(value: str) -> str:
         if value not in names:
             raise refuse(f"unknown {what} '{value}'; {nearest(value, names)}")
         return value
 
-    return Annotated[str, Scalar(read, {"enum": list(names)}, " or ".join(f"'{name}'" for name in names))]
+    return Scalar(read, {"enum": list(names)}, " or ".join(f"'{name}'" for name in names))
 
 
 def _read_flag(value: str) -> bool:
@@ -102,21 +103,21 @@ def _read_flag(value: str) -> bool:
 NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
 NAME_RULE = "use letters, digits, '.', '_' and '-', and no '.' in front: names become parts of file names"
 
-Length = quantity("length")
-Force = quantity("force", "the load's name carries the sign: give a magnitude")
-Stiffness = quantity("stiffness")
-Stress = quantity("stress")
-Density = quantity("density")
-PoissonRatio = number("a number from 0 to 0.5, such as 0.3", 0, 0.5)
-Ratio = number("a number above 0", 0, math.inf, above=True)
-Points = number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)
+Length = Annotated[float, quantity("length")]
+Force = Annotated[float, quantity("force", "the load's name carries the sign: give a magnitude")]
+Stiffness = Annotated[float, quantity("stiffness")]
+Stress = Annotated[float, quantity("stress")]
+Density = Annotated[float, quantity("density")]
+PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0, 0.5)]
+Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
+Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
 MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
 ]
-Load = one_of("load", LOADS)
-FurtherReference = one_of("reference", FURTHER_REFERENCES)
-Kinematics = one_of("kinematics", KINEMATICS)
-DefinitionName = one_of("definition", DEFINITIONS)
+Load = Annotated[str, one_of("load", LOADS)]
+FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
+Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
+DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]
 Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
 FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]

@@ -1,7 +1,6 @@
 """What is wrong with a file: messages that name file, line, key, value and remedy."""
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 
 from pydantic_core import PydanticCustomError
 
@@ -13,7 +12,17 @@ SHOWN_PROBLEMS = 5
 
 
 class StudyError(ValueError):
-    """A study that cannot be run; the message names file, line, key, value and remedy."""
+    """A study that cannot be run; the message names file, line, key, value and remedy.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> try:
+    ...     st.load_study("config/papers.yaml")
+    ... except st.StudyError as error:
+    ...     print(error)
+    config/papers.yaml: cannot be read: No such file or directory; give the path of a study such as config/paper.yaml
+    """
 
 
 class Problems:
@@ -117,26 +126,3 @@ def show(value: object) -> str:
         return "nothing"
     text = str(value)
     return f"'{text}'" if len(text) <= 60 else f"'{text[:57]}...'"
-
-
-def nearest(word: str, words: Iterable[str]) -> str:
-    """``did you mean ...? `` if one of the words is near, and all of them.
-
-    Parameters
-    ----------
-    word : str
-    words : iterable of str
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> nearest("latice", ["lattice", "uniform"])
-    "did you mean 'lattice'? known: lattice, uniform"
-    """
-    words = list(words)
-    near = get_close_matches(word, words, n=1, cutoff=0.6)
-    hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"{hint}known: {', '.join(words)}"

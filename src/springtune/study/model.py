@@ -1,13 +1,19 @@
 """A study: its meshes, scenes and curves, free of duplicates and in a canonical order."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..problem.geometry import Beam
 from ..problem.materials import Material
 
-KINEMATICS = ("nonlinear", "linear")
-"""Kinematics of a network: springs that keep their length law, or their tangent at rest."""
+if TYPE_CHECKING:
+    from .config import StudyConfig
+    from .expand import Declared
+    from .messages import Problems
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one."""
@@ -37,14 +43,18 @@ class MeshSpec:
     unit: float = 1.0
 
     @property
-    def name(self):
+    def name(self) -> str:
         """File stem, e.g. ``"200x40_structured_5mm"``."""
         return f"{self.beam.name}_{self.mesh_type}_{1e3 * self.mesh_size:g}mm"
 
 
+MeshFiles = dict[tuple[str, str, float], MeshSpec]
+"""Meshes from files by (mesh type, beam's name, mesh size)."""
+
+
 @dataclass(frozen=True)
-class Scene:
-    """One boundary-value problem on one mesh.
+class SceneSpec:
+    """A scene that a study asks for: one boundary-value problem on one mesh.
 
     Attributes
     ----------
@@ -57,7 +67,7 @@ class Scene:
     definition : str
         Key of `springtune.springs.DEFINITIONS`.
     kinematics : str
-        One of `KINEMATICS`.
+        One of `springtune.problem.loads.KINEMATICS`.
     """
 
     mesh: MeshSpec
@@ -68,14 +78,17 @@ class Scene:
     kinematics: str
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Readable name, unique in a study."""
         return f"{self.mesh.name}_{self.material.name}_{self.load}_{self.definition}_{self.kinematics}"
 
 
 @dataclass(frozen=True)
-class Curve:
-    """A sensitivity curve: attributes as a `Scene`'s, its stiffness running through `Study.stiffness_ratios`."""
+class CurveSpec:
+    """A sensitivity curve that a study asks for: attributes as a `SceneSpec`'s.
+
+    Its stiffness runs through `Study.stiffness_ratios`.
+    """
 
     mesh: MeshSpec
     material: Material
@@ -86,7 +99,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Reference:
-    """A finite-element answer: attributes as a `Scene`'s."""
+    """A finite-element answer: attributes as a `SceneSpec`'s."""
 
     beam: Beam
     material: Material
@@ -101,13 +114,13 @@ class Grid:
     Attributes
     ----------
     name : str
-    scenes : tuple of Scene
-    curves : tuple of Curve
+    scenes : tuple of SceneSpec
+    curves : tuple of CurveSpec
     """
 
     name: str
-    scenes: tuple
-    curves: tuple
+    scenes: tuple[SceneSpec, ...]
+    curves: tuple[CurveSpec, ...]
 
 
 @dataclass(frozen=True)
@@ -165,8 +178,8 @@ class Study:
         The file as read.
     title : str
     meshes : tuple of MeshSpec
-    scenes : tuple of Scene
-    curves : tuple of Curve
+    scenes : tuple of SceneSpec
+    curves : tuple of CurveSpec
     references : tuple of Reference
     mesh_files : dict
         `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
@@ -195,18 +208,70 @@ class Study:
     path: Path
     text: str
     title: str
-    meshes: tuple
-    scenes: tuple
-    curves: tuple
-    references: tuple
-    mesh_files: dict
-    outputs: tuple
-    further_references: tuple
-    parts: dict
-    grids: tuple
-    stiffness_ratios: tuple
-    stiffness_table: dict
-    calibration: tuple | None
-    printed: tuple
+    meshes: tuple[MeshSpec, ...]
+    scenes: tuple[SceneSpec, ...]
+    curves: tuple[CurveSpec, ...]
+    references: tuple[Reference, ...]
+    mesh_files: MeshFiles
+    outputs: tuple[str, ...]
+    further_references: tuple[str, ...]
+    parts: dict[str, Any]
+    grids: tuple[Grid, ...]
+    stiffness_ratios: tuple[float, ...]
+    stiffness_table: dict[tuple[str, str], float]
+    calibration: tuple[str, str] | None
+    printed: tuple[PrintedCell, ...]
     printed_path: Path | None
-    axes: dict
+    axes: dict[str, tuple[str | float, ...]]
+
+
+class StudyOutput(Protocol):
+    """What a study needs to know of an output, see `springtune.kinds.base.Output`."""
+
+    @property
+    def name(self) -> str:
+        """As a study writes it."""
+
+    @property
+    def meaning(self) -> str:
+        """What it is, for the manual."""
+
+    @property
+    def usual(self) -> bool:
+        """Whether it is made where a study does not say what."""
+
+    @property
+    def lack(self) -> Callable[[Study], str]:
+        """What a study would need for it and has not."""
+
+
+class StudyKind(Protocol):
+    """What a study needs to know of its kinds, see `springtune.kinds.base.Kind`."""
+
+    @property
+    def name(self) -> str:
+        """Name of its part of a study."""
+
+    @property
+    def study_fields(self) -> Mapping[str, tuple[Any, Any]]:
+        """Keys that it adds to a study."""
+
+    @property
+    def grid_fields(self) -> Mapping[str, tuple[Any, Any]]:
+        """Keys that it adds to its grids."""
+
+    @property
+    def check(self) -> Callable[[StudyConfig, Problems], None]:
+        """Adds what is wrong with a config's values."""
+
+    @property
+    def expand(self) -> Callable[[StudyConfig, Declared], Any]:
+        """Its part of a study."""
+
+    @property
+    def axes(self) -> Callable[[Any], Mapping[str, Collection[str | float]]]:
+        """Labels of the dimensions of its groups."""
+
+    @property
+    def outputs(self) -> Sequence[StudyOutput]:
+        """What is made of it."""

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..problem.loads import LOADS
-from .messages import Problems, nearest
+from ..problem.quantities import nearest
+from .messages import Problems
 from .model import PrintedCell
 
 _PRINTED_COLUMNS = {

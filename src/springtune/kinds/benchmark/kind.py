@@ -10,6 +10,7 @@ from ...mesh import MESH_TYPES
 from ...problem.geometry import Beam
 from ...problem.loads import LOADS
 from ...problem.materials import Material
+from ...problem.quantities import nearest
 from ...springs import DEFINITIONS
 from ...study.checks import check_density, check_known
 from ...study.config import Section
@@ -27,14 +28,13 @@ from ...study.fields import (
     number,
     one_of,
 )
-from ...study.messages import nearest
 from ..base import Kind
 from .names import CURVE_COUNTS, OTHER_APPROACHES, approach_names
 from .outputs import OUTPUTS
 from .plan import STAGES
 
-OtherApproach = one_of("approach", OTHER_APPROACHES)
-Seconds = number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)
+OtherApproach = Annotated[str, one_of("approach", OTHER_APPROACHES)]
+Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)]
 
 
 class BenchmarkSceneConfig(Section):
@@ -106,15 +106,15 @@ class Case:
     material: Material
     load: str
     force: float
-    approaches: tuple
-    mesh_sizes: tuple
+    approaches: tuple[str, ...]
+    mesh_sizes: tuple[float, ...]
     most_seconds: float
     most_thorough: float
-    thorough: tuple
+    thorough: tuple[str, ...]
     second_beam: Beam | None
 
 
-def in_benchmark(load):
+def in_benchmark(load: str) -> bool:
     """Whether all approaches of the benchmark can hold and pull a beam like that."""
     kind = LOADS[load].kind
     return kind.clamped and kind.loaded.far and not LOADS[load].follower

@@ -31,10 +31,7 @@ from ...scene.sheet import Sheet
 from ...springs import DefinitionError, Springs
 from ...springs.lattice import COEFFICIENT, half_weight, uniform
 from .approaches import APPROACHES, network
-from .names import CURVE_COUNTS
-
-PARTS = ("meshing", "assembling", "factorizing", "solving")
-"""Parts of the seconds."""
+from .names import CURVE_COUNTS, PARTS
 
 REPETITIONS = 3
 BRIEF = 0.05
@@ -100,7 +97,7 @@ def run(scene, approaches, sizes, most_seconds, thorough=(), most_thorough=0.0, 
     Returns
     -------
     dict of str to ndarray
-        Variables of `springtune.output.dataset.BENCHMARK_VARIABLES` over approach and mesh size.
+        Variables of `springtune.kinds.benchmark.variables.BENCHMARK` over approach and mesh size.
     """
     begin = time.perf_counter()
     reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)

@@ -1,5 +1,7 @@
 """Names of the approaches of the benchmark."""
 
+from collections.abc import Iterable, Sequence
+
 from ...mesh import MESH_TYPES
 from ...springs import DEFINITIONS
 
@@ -18,11 +20,14 @@ OTHER_APPROACHES = (
 )
 """Approaches of the benchmark besides definitions, see `springtune.kinds.benchmark.approaches`."""
 
+PARTS = ("meshing", "assembling", "factorizing", "solving")
+"""Parts of the seconds of a case."""
+
 CURVE_COUNTS = (1, 11, 61, 201)
 """Numbers of stiffnesses of the benchmark's sensitivity curves."""
 
 
-def approach_names(definitions, mesh_types, others):
+def approach_names(definitions: Iterable[str], mesh_types: Sequence[str], others: Iterable[str]) -> tuple[str, ...]:
     """Names of the approaches: ``definition/mesh type``, those that go together, and others."""
     names = []
     for name in definitions:

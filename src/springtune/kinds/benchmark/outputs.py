@@ -1,13 +1,19 @@
 """What is made of the benchmark."""
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from ..base import Output
+
+if TYPE_CHECKING:
+    from ...study.model import Study
 
 PAGE = "speed.md"
 
 
-def figures(scenes):
+def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
     """Figures of the benchmark, by stem."""
-    found = {f"benchmark_{scene}": {"scene": scene} for scene in scenes}
+    found: dict[str, dict[str, object]] = {f"benchmark_{scene}": {"scene": scene} for scene in scenes}
     return found | {
         "benchmark_rates": {},
         "benchmark_costs": {"scene": next(iter(scenes), None)},
@@ -15,7 +21,7 @@ def figures(scenes):
     }
 
 
-def _lack(study):
+def _lack(study: "Study") -> str:
     return "" if study.parts["benchmark"] else "shows a benchmark and the study has none; add a section 'benchmark'"
 
 

@@ -3,9 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from ...jobs.atomic import write_text
 from ...output.tables import markdown_table
+from .names import PARTS
 from .outputs import PAGE
 
 TARGETS = (0.01, 0.001, 0.0001)
@@ -30,7 +32,7 @@ def write(tree, folder):
     return [PAGE]
 
 
-def page(tree):
+def page(tree: xr.DataTree) -> str:
     """Markdown: the quickest ways to an error, costs of one mesh size, orders and exponents, curves."""
     data = tree["benchmark"].to_dataset()
     loads = ", ".join(f"{float(value):.1f}" for value in data.machine_load.values)
@@ -100,11 +102,11 @@ def _one_size(cells):
             continue
         rows.append([
             f"`{cell.approach.item()}`", _percent(cell.error), _time(cell.seconds), _time(cell.cold_seconds),
-            *(_time(cell[f"{part}_seconds"]) for part in ("meshing", "assembling", "factorizing", "solving")),
+            *(_time(cell[f"{part}_seconds"]) for part in PARTS),
             f"{float(cell.peak_memory) / 1e6:.0f}", _plain(cell.error_rate, 1), _plain(cell.cost_exponent, 2),
         ])  # fmt: skip
-    heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", "meshing", "assembling", "factorizing",
-             "solving", "memory [MB]", "order", "exponent of cost"]  # fmt: skip
+    heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", *PARTS, "memory [MB]", "order",
+             "exponent of cost"]  # fmt: skip
     return markdown_table(heads, rows)
 
 
@@ -141,7 +143,7 @@ NOISE = 1.3
 """Ratio of seconds that runs of one program on one machine show among themselves."""
 
 
-def comparison(old, new):
+def comparison(old: xr.Dataset, new: xr.Dataset) -> tuple[list[str], int]:
     """Ratios of the seconds of two benchmarks, approach by approach.
 
     A machine that is slower on the whole is no regression: ratios are over their median. Flagged is what lies outside

@@ -34,17 +34,25 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
     loading : str, optional
         One loading in place of all.
     friction : float, optional
-        One coefficient of friction in place of all.
+        One coefficient of friction [1] in place of all.
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_panels,)
         One a panel.
 
     Raises
     ------
     ValueError
-        If nothing has the loading or friction, or ``ax`` is not as many Axes as panels.
+        If the dataset has no laid strips, or nothing has the loading or friction, or ``ax`` is not as many Axes as
+        panels.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_laying(tree, friction=0.0)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['gravity', 'pressure']
     """
     laid = group(data, "laying")
     for name, label in {"loading": loading, "friction": friction}.items():

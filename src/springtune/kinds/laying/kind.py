@@ -22,8 +22,8 @@ LOADINGS = ("pressure", "gravity", "ends")
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes on which a laid strip's reference is solved, over the one that is given; the first is the answer."""
 
-Friction = number("a coefficient from 0 to 2, such as 0.3", 0, 2)
-Loading = one_of("loading", LOADINGS)
+Friction = Annotated[float, number("a coefficient from 0 to 2, such as 0.3", 0, 2)]
+Loading = Annotated[str, one_of("loading", LOADINGS)]
 
 
 class TrapezoidConfig(Section):
@@ -65,7 +65,7 @@ class LayingConfig(Section):
 
 
 @dataclass(frozen=True)
-class Laid:
+class LayingScene:
     """A strip to lay on a trapezoid, see `springtune.kinds.laying.lay`.
 
     Attributes
@@ -103,13 +103,13 @@ class Laying:
 
     Attributes
     ----------
-    strips : tuple of Laid
-    references : tuple of Laid
+    strips : tuple of LayingScene
+    references : tuple of LayingScene
         Strips of finite elements that the others are compared with, on several meshes a loading and friction.
     """
 
-    strips: tuple
-    references: tuple
+    strips: tuple[LayingScene, ...]
+    references: tuple[LayingScene, ...]
 
 
 def _check(config, problems):
@@ -138,14 +138,14 @@ def _expand(config, declared):
     }
     labels = list(product(section.loading, section.friction))
     strips = [
-        Laid(**parts, definition=definition, mesh_size=size, loading=loading, friction=friction)
+        LayingScene(**parts, definition=definition, mesh_size=size, loading=loading, friction=friction)
         for definition in DEFINITIONS
         if definition in section.definition
         for size in sorted(section.mesh_size)
         for loading, friction in labels
     ]
     references = [
-        Laid(**parts, definition="delingette", mesh_size=size, loading=loading, friction=friction)
+        LayingScene(**parts, definition="delingette", mesh_size=size, loading=loading, friction=friction)
         for loading, friction in labels
         for size in (ratio * section.reference_size for ratio in REFERENCE_SIZES)
     ]

@@ -83,7 +83,7 @@ def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="str
     mesh_type : str
         Of the strip and the trapezoid, with an even number of cells along the strip.
     loading : str
-        One of `springtune.problem.loads.LOADINGS`.
+        One of `springtune.kinds.laying.kind.LOADINGS`.
     pressure : float
         Pressure on the upper face, or weight over it [Pa].
     friction : float

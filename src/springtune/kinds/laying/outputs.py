@@ -1,9 +1,14 @@
 """What is made of laid strips."""
 
+from typing import TYPE_CHECKING
+
 from ..base import Output
 
+if TYPE_CHECKING:
+    from ...study.model import Study
 
-def _lack(study):
+
+def _lack(study: "Study") -> str:
     return "" if study.parts["laying"] else "shows laid strips and the study has none; add a section 'laying'"
 
 

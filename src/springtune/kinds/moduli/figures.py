@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...output import style
-from ...output.dataset import most_asked
+from ...output.dataset import most_requested
 from ...output.selection import choose, group, labels_of
 from .outputs import figures
 
@@ -42,12 +42,12 @@ def definitions(tree):
 
 def _main(root, names, selection):
     """Labels that most scenes of a study have; where a selection has none of these, those that most of its own have."""
-    chosen = selection | {name: most_asked(root, name) for name in names}
+    chosen = selection | {name: most_requested(root, name) for name in names}
     if (root.status.sel(chosen) != 0).any():
         return chosen
     root = root[["status"]].sel({name: [label] for name, label in selection.items()})
     for name in names:
-        chosen[name] = most_asked(root, name)
+        chosen[name] = most_requested(root, name)
         root = root.sel({name: [chosen[name]]})
     return chosen
 
@@ -113,13 +113,22 @@ def plot_moduli(data, ax=None):
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
         One a mesh type.
 
     Raises
     ------
     ValueError
-        If ``ax`` is not as many Axes as mesh types.
+        If the dataset has no moduli, or ``ax`` is not as many Axes as mesh types.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_moduli(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['structured', 'free']
+    >>> axes[0].get_xlabel(), axes[0].get_ylabel()
+    ('asked for', 'effective')
     """
     moduli = group(data, "moduli")
     types = labels_of(moduli.status == 1, "mesh_type") or labels_of(moduli.status != 0, "mesh_type")
@@ -161,13 +170,22 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
         One a mesh type.
 
     Raises
     ------
     ValueError
         If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as mesh types.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_definitions_size(tree, beam="200x40", material="steel", load="traction", kinematics="linear")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['structured', 'free']
+    >>> axes[0].figure.get_suptitle()
+    '200x40, steel, traction: error of the displacement field in L2, fitted rate in brackets'
     """
     root = group(data, "/")
     chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
@@ -213,13 +231,22 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_materials,)
         One a material.
 
     Raises
     ------
     ValueError
         If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as materials.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_definitions_loads(tree, beam="200x40", mesh_type="free", kinematics="linear")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['steel', 'rubber']
+    >>> [tick.get_text() for tick in axes[0].get_xticklabels()]
+    ['traction', 'compression', 'pressure']
     """
     root = group(data, "/")
     chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)

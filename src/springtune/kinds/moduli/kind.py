@@ -46,7 +46,7 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class Moduli:
+class Measurements:
     """What a study measures.
 
     Attributes
@@ -57,7 +57,7 @@ class Moduli:
     """
 
     patch: Beam
-    measurements: tuple
+    measurements: tuple[Measurement, ...]
 
 
 def _expand(config, declared):
@@ -71,7 +71,7 @@ def _expand(config, declared):
     if not found:
         return None
     box = Beam(config.patch.length, config.patch.height, 1.0, "patch")
-    return Moduli(box, tuple(Measurement(*labels) for labels in found))
+    return Measurements(box, tuple(Measurement(*labels) for labels in found))
 
 
 def _axes(moduli):

@@ -1,19 +1,25 @@
 """What is made of moduli, beside the errors of scenes."""
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from ..base import Output
+
+if TYPE_CHECKING:
+    from ...study.model import Study
 
 TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""
 
 
-def figures(loads, mesh_types):
+def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, dict[str, object]]:
     """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type."""
-    found = {"definitions_moduli": {}}
+    found: dict[str, dict[str, object]] = {"definitions_moduli": {}}
     found |= {f"definitions_size_{load}": {"load": load} for load in loads}
     return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
 
 
-def _lack(study):
+def _lack(study: "Study") -> str:
     return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
 
 

@@ -28,29 +28,29 @@ def run(tasks, done):
     for patch in tasks["patches"]:
         path = Path(tasks["folder"]) / f"{patch['name']}.h5"
         present = store.stored(path)
-        missing = [asked for asked in patch["measurements"] if asked["key"] not in present]
+        missing = [one for one in patch["measurements"] if one["key"] not in present]
         if not missing:
             continue
         mesh = make(patch["mesh"])
         moduli = MeshModuli(mesh)
         results = {}
-        for asked in missing:
+        for measurement in missing:
             begin = time.perf_counter()
-            results[asked["key"]] = result = _measured(moduli, asked)
+            results[measurement["key"]] = result = _measured(moduli, measurement)
             seconds = time.perf_counter() - begin
             of_definition = result.get("definition_seconds", 0.0)
             spent.add("moduli", len(mesh.points), seconds - of_definition)
-            spent.add(asked["definition"], len(mesh.points), of_definition)
+            spent.add(measurement["definition"], len(mesh.points), of_definition)
         store.add(path, results)
     atomic.write_json(done, spent.summary())
 
 
-def _measured(moduli, asked):
+def _measured(moduli, measurement):
     """Errors of E and G [1], effective Poisson's ratio, and what the definition cost; or why there are none."""
     try:
-        found = moduli(Material(1.0, asked["poisson_ratio"]), asked["definition"])
+        found = moduli(Material(1.0, measurement["poisson_ratio"]), measurement["definition"])
     except (DefinitionError, ArithmeticError) as error:
-        return {"status": Status.FAILED, "message": f"{asked['definition']}: {error}"}
+        return {"status": Status.FAILED, "message": f"{measurement['definition']}: {error}"}
     return {
         "status": Status.SOLVED,
         "message": "",

@@ -5,9 +5,10 @@ import io
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from ...jobs.atomic import write_text
-from ...output.dataset import STATUS, most_asked
+from ...output.dataset import STATUS, most_requested
 from ..scenes.variables import SCENE
 from .outputs import TABLES
 from .variables import PATCH
@@ -78,8 +79,8 @@ COARSENESS = (0.05, 0.1, np.inf)
 
 def _advice(root):
     """What to use, with the range of its errors over all beams and mesh sizes, by mesh size over height."""
-    kinematics = most_asked(root, "kinematics")
-    materials = _materials(root, most_asked(root, "beam"))
+    kinematics = most_requested(root, "kinematics")
+    materials = _materials(root, most_requested(root, "beam"))
     loads = [load for load in TABLE_LOADS if load in root["load"].values]
     here = root[["deformation_error", "status"]].sel(kinematics=kinematics)
     ratios = root.mesh_size.values / root.beam_height.values[:, None]
@@ -120,13 +121,13 @@ def _range(errors, flags):
     there = errors[flags == 1]
     ends = list(dict.fromkeys(_signed(value) for value in (there.min(), there.max()))) if len(there) else []
     text = " to ".join([*(end.removesuffix(" %") for end in ends[:-1]), *ends[-1:]])
-    missing, asked = int((flags > 1).sum()), int((flags != 0).sum())
+    missing, requested = int((flags > 1).sum()), int((flags != 0).sum())
     notes = [f"{missing} not solved"] if missing else []
-    notes += [f"{asked} of {len(flags)}"] if 0 < asked < len(flags) else []
+    notes += [f"{requested} of {len(flags)}"] if 0 < requested < len(flags) else []
     return f"{text} ({', '.join(notes)})".strip() if notes else text
 
 
-def decision(tree):
+def decision(tree: xr.DataTree) -> str:
     """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells.
 
     Every figure is a cell of the dataset, or the range, median or largest one of cells that the table names.
@@ -144,11 +145,11 @@ def decision(tree):
 
 def _materials(root, beam):
     """Name by Poisson's ratio: the material nearest to 0.3 and the one with the largest, of those with most scenes."""
-    asked = (
+    requested = (
         (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"]).sum("load").values
     )
     ratios = root.material_poisson_ratio.values
-    found = np.flatnonzero(asked == asked.max())
+    found = np.flatnonzero(requested == requested.max())
     chosen = sorted(
         {found[np.argmin(np.abs(ratios[found] - 0.3))], found[np.argmax(ratios[found])]}, key=lambda i: ratios[i]
     )
@@ -157,11 +158,11 @@ def _materials(root, beam):
 
 def _attained(root, moduli, mesh_type):
     """Moduli and deformation errors of one and the same mesh size, the finest, of the beam that most scenes are of."""
-    beam = most_asked(root, "beam")
+    beam = most_requested(root, "beam")
     materials = _materials(root, beam)
     loads = [load for load in TABLE_LOADS if load in root["load"].values]
     fine, height = min(root.mesh_size.values), float(root.beam_height.sel(beam=beam))
-    here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_asked(root, "kinematics"))
+    here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_requested(root, "kinematics"))
     ratios = [ratio for ratio in materials if ratio in moduli.poisson_ratio.values]
     heads = [f"E at {nu:g}" for nu in ratios] + [f"ν at {nu:g}" for nu in ratios]
     heads += [f"{load}, {nu:g}" for load in loads for nu in materials]
@@ -205,7 +206,7 @@ def _paper_cells(root):
     ):
         return []
     errors = [
-        root.deformation_error.sel(material=material, load=load, kinematics=most_asked(root, "kinematics"))
+        root.deformation_error.sel(material=material, load=load, kinematics=most_requested(root, "kinematics"))
         for material, load in pairs
     ]
     lines = ["| definition | mesh type | steel, median | largest | rubber, median | largest |"]

@@ -117,32 +117,32 @@ def _meshes(study, folder, root):
 def _references(study, folder, root):
     """Displacement of each reference by (beam, material, load), and by these and kinematics objections to it."""
     displacements, objections = {}, {}
-    for asked in study.references:
-        result = _reference(folder, asked)
-        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+    for one in study.references:
+        result = _reference(folder, one)
+        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
         place = tuple(labels.values())
         for kinematics in study.axes["kinematics"]:
-            objections[*place, kinematics] = found = objection(result, asked.force, kinematics)
+            objections[*place, kinematics] = found = objection(result, one.force, kinematics)
             root.put({"reference_applies": not found}, kinematics=kinematics, **labels)
         values = {
-            "force": asked.force,
+            "force": one.force,
             "reference_seconds": result["seconds"],
-            "reference_message": objection(result, asked.force, "nonlinear"),
+            "reference_message": objection(result, one.force, "nonlinear"),
         }
         if "displacement" in result:
-            displacements[place] = asked.force * result["displacement"]
+            displacements[place] = one.force * result["displacement"]
             values |= {
                 "reference_displacement": displacements[place],
                 "reference_error_estimate": result["error_estimate"],
-                "reference_rotation": abs(asked.force) * result["rotation"],
-                "reference_strain": abs(asked.force) * result["strain"],
+                "reference_rotation": abs(one.force) * result["rotation"],
+                "reference_strain": abs(one.force) * result["strain"],
             }
         root.put(values, **labels)
     return displacements, objections
 
 
-def _reference(folder, asked, fields=()):
-    reference = plan.reference_of(asked.beam, asked.material, asked.load)
+def _reference(folder, one, fields=()):
+    reference = plan.reference_of(one.beam, one.material, one.load)
     return stored_reference.read(folder / "references", reference, fields)
 
 
@@ -225,22 +225,22 @@ def _block(study, folder, axes):
     """Group of pressed faces with the references of all kinds; scenes are still to come."""
     kinds = (SMALL_STRAIN, *study.further_references)
     block = Filler(BLOCK.empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
-    for asked in study.references:
-        if not LOADS[asked.load].kind.pressed:
+    for one in study.references:
+        if not LOADS[one.load].kind.pressed:
             continue
-        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
         for kind in kinds:
-            block.put(_face_reference(folder, asked, kind), reference=kind, **labels)
+            block.put(_face_reference(folder, one, kind), reference=kind, **labels)
     return block
 
 
 def _finite_strain(study, folder, axes, displacement):
     """Group of references at finite strain, and the networks' errors against them."""
     finite = Filler(FINITE_STRAIN.empty(axes | {"reference": study.further_references}))
-    for asked in study.references:
-        labels = {"beam": asked.beam.name, "material": asked.material.name, "load": asked.load}
+    for one in study.references:
+        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
         for kind in study.further_references:
-            result = _finite_reference(folder, asked, kind)
+            result = _finite_reference(folder, one, kind)
             values = {"reference_message": result["message"]}
             if "displacement" in result:
                 values["reference_displacement"] = result["displacement"]
@@ -252,8 +252,8 @@ def _finite_strain(study, folder, axes, displacement):
     return finite.data
 
 
-def _finite_reference(folder, asked, kind, fields=()):
-    name = plan.finite_key(asked, kind)
+def _finite_reference(folder, one, kind, fields=()):
+    name = plan.finite_key(one, kind)
     return store.read(folder / "references" / f"{name}.h5", [name], fields)[name]
 
 
@@ -263,16 +263,16 @@ def _with_face_error(data):
     return data
 
 
-def _face_reference(folder, asked, kind):
+def _face_reference(folder, one, kind):
     """Middle, mean and profile of a pressed face of a reference."""
     from scipy.interpolate import CubicSpline  # here: only pressed faces need it
 
     if kind == SMALL_STRAIN:
-        result, scale = _reference(folder, asked, ["x", "displacements"]), asked.force
+        result, scale = _reference(folder, one, ["x", "displacements"]), one.force
         if "x" in result:
-            result |= {"positions": result["x"] / asked.beam.length, "profile": result["displacements"][:, -1, 1]}
+            result |= {"positions": result["x"] / one.beam.length, "profile": result["displacements"][:, -1, 1]}
     else:
-        result, scale = _finite_reference(folder, asked, kind, ["positions", "profile"]), 1.0
+        result, scale = _finite_reference(folder, one, kind, ["positions", "profile"]), 1.0
     values = {"reference_message": result["message"]}
     if "displacement" in result:
         values |= {
@@ -288,7 +288,7 @@ def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
     shown = plan.shown_meshes(study)
     meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
-    outlines = {asked: _outline(folder, asked) for asked in study.references}
+    outlines = {one: _outline(folder, one) for one in study.references}
     lengths = {
         "particle": max(len(mesh.points) for mesh in meshes.values()),
         "spring": max(len(mesh.edges) for mesh in meshes.values()),
@@ -300,10 +300,10 @@ def _fields(study, folder, axes):
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
-    for asked in study.references:
-        points, displacements = outlines[asked]
-        moved = asked.force * displacements
-        beam, load = {"beam": asked.beam.name}, {"material": asked.material.name, "load": asked.load}
+    for one in study.references:
+        points, displacements = outlines[one]
+        moved = one.force * displacements
+        beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
         fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
         fields.put_rows(
             {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
@@ -311,9 +311,9 @@ def _fields(study, folder, axes):
     return fields
 
 
-def _outline(folder, asked):
+def _outline(folder, one):
     """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
-    result = _reference(folder, asked, ["x", "y", "displacements"])
+    result = _reference(folder, one, ["x", "y", "displacements"])
     if "x" not in result:
         return np.zeros((0, 2)), np.zeros((0, 2))
     return outline(result["x"], result["y"], result["displacements"])

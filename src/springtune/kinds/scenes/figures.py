@@ -55,7 +55,16 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     Raises
     ------
     ValueError
-        If the selection leaves a choice, or nothing.
+        If the dataset has no curves, or the selection leaves a choice, or nothing.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_sensitivity(tree, beam="200x40", mesh_type="structured", material="steel", load="traction")
+    >>> axes.get_title(loc="left").splitlines()[0]
+    '200x40 mm, structured, steel, traction'
+    >>> axes.get_ylabel()
+    '|Deformation error| [%]'
     """
     curves = group(data, "sensitivity")
     selection = choose(
@@ -153,13 +162,22 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_beams,)
         One a beam.
 
     Raises
     ------
     ValueError
         If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_size(tree, mesh_type="structured", material="steel", load="traction")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['100x20 mm', '200x40 mm']
+    >>> axes[0].get_xlabel(), axes[0].get_ylabel()
+    ('Mesh size [mm]', 'Deformation error [%]')
     """
     root = group(data, "/")
     root, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
@@ -238,13 +256,20 @@ def plot_deformed(
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_beams,)
         One a beam.
 
     Raises
     ------
     ValueError
-        If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
+        If the dataset has no fields, the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_deformed(tree, mesh_type="structured", material="steel", load="traction", definition="paper")
+    >>> axes[0].figure.get_suptitle()
+    'structured, steel, traction: network (paper) over reference (grey)'
     """
     fields, root = group(data, "fields", alone=False), group(data, "/")
     kept = fields.definition.values.tolist()
@@ -337,13 +362,21 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
-        Two.
+    ndarray of matplotlib.axes.Axes, shape (2,)
 
     Raises
     ------
     ValueError
-        If the selection leaves a choice, or nothing, or ``ax`` is not two Axes.
+        If the dataset has no block, the selection leaves a choice, or nothing, or ``ax`` is not two Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_block(tree, beam="200x40", mesh_type="structured", mesh_size=1e-3, material="rubber")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['One stiffness for three loads? (small strain)', 'The pressed face']
+    >>> axes[0].figure.get_suptitle()
+    '200x40 mm, structured 1 mm, rubber'
     """
     faces, root = group(data, "block", alone=False), group(data, "/")
     pressed = (root.status != 0).sel(load=["pressure"])

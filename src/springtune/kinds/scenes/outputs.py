@@ -1,7 +1,13 @@
 """What is made of scenes."""
 
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
 from ...problem.loads import LOADS
 from ..base import Output, distinct
+
+if TYPE_CHECKING:
+    from ...study.model import CurveSpec, SceneSpec, Study
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 """Dimensions of which a figure of sensitivity curves shows one label."""
@@ -15,12 +21,12 @@ TABLE = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""
 
 
-def stem(selection, number=None):
+def stem(selection: Mapping[str, str], number: int | None = None) -> str:
     """Stem of a table's file: the paper's number where it has one, else the labels."""
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
 
 
-def stems(study):
+def stems(study: "Study") -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
     chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
@@ -30,16 +36,16 @@ def stems(study):
     return found
 
 
-def pressed(study):
+def pressed(study: "Study") -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)
 
 
-def _lack_of_pressure(study):
+def _lack_of_pressure(study: "Study") -> str:
     return "" if pressed(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
 
 
-def _cells(items):
+def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]:
     for item in items:
         if item.kinematics == "nonlinear":
             labels = {"beam": item.mesh.beam.name, "mesh_type": item.mesh.mesh_type}
@@ -76,6 +82,7 @@ OUTPUTS = (
         "the figure of a pressed face",
         figures=lambda study: {"block": {}},
         plot=f"{PLOTS}:block",
+        job="scenes",
         lack=_lack_of_pressure,
     ),
 )

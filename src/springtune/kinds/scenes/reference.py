@@ -25,8 +25,8 @@ def run(tasks, done):
         JSON file to write: what was spent.
     """
     tasks, spent = atomic.read_json(tasks), Spent()
-    for kind, asked, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
-        for task in tasks[asked]:
+    for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
+        for task in tasks[section]:
             path = Path(tasks["folder"]) / f"{task['key']}.h5"
             if task["key"] in store.stored(path):
                 continue

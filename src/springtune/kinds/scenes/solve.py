@@ -29,10 +29,10 @@ def run(tasks, done):
     ----------
     tasks : str or Path
         JSON file: ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
-        or nothing) and ``families``, each with ``name``,
-        ``thickness``, ``keep_fields`` and ``scenes``, and each of these with ``key, material, kind, force, definition,
-        kinematics``, ``reference`` (see `springtune.kinds.scenes.stored_reference.read`) and either ``stiffness``, or
-        ``calibration``, the name of a group, and ``thickness_ratio``.
+        or nothing) and ``families``, each with ``name, thickness, keep_fields`` and ``scenes``, and each of these with
+        ``key, material, kind`` (the load's, by name), ``follower, force, definition, kinematics``, ``reference`` (see
+        `springtune.kinds.scenes.stored_reference.read`), ``stiffness`` where it is told, and ``thickness_ratio`` and
+        ``calibration``, the name of a group, where it is calibrated.
     done : str or Path
         JSON file to write: what was spent.
     """
@@ -61,7 +61,7 @@ def run(tasks, done):
 
 
 def _stored_key(scene, calibration):
-    """Key of a scene's result; as `springtune.campaign.plan.solved_key`, from the task."""
+    """Key of a scene's result; as `springtune.kinds.scenes.plan.solved_key`, from the task."""
     group = scene.get("calibration")
     return hash_of(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 

@@ -1,11 +1,14 @@
 """What a study asks for, before anything runs."""
 
+from collections.abc import Collection, Iterable
+
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem
 from ...springs import DEFINITIONS
+from ...study.model import SceneSpec, Study
 
 
-def summary(study, further):
+def summary(study: Study, further: list[list[object]]) -> str:
     """What a study asks for and what of it is shared, as text.
 
     Parameters
@@ -20,10 +23,11 @@ def summary(study, further):
     """
     units = {unit_problem(one.beam, one.material, LOADS[one.load].kind) for one in study.references}
     networks = _networks(study)
-    asked = sum(len(grid.scenes) for grid in study.grids)
+    requested = sum(len(grid.scenes) for grid in study.grids)
     users = len(study.scenes) + len(study.curves)
-    again = f"{asked} asked, {asked - len(study.scenes)} of them more than once" if asked > len(study.scenes) else ""
-    rows = [
+    repeated = requested - len(study.scenes)
+    again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
+    rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", len(study.meshes), f"each serves {users / len(study.meshes):.3g} scenes and curves on average"],
         [
@@ -41,13 +45,13 @@ def summary(study, further):
     return "\n".join([*lines, aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))])
 
 
-def _count(number, noun):
+def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}{'e' if noun.endswith('ch') else ''}s"
 
 
-def _networks(study):
+def _networks(study: Study) -> int:
     """Number of distinct tangents at rest, at most: uniform networks of a mesh differ by a factor only."""
-    found = {(curve.mesh, LOADS[curve.load].kind.held, "uniform") for curve in study.curves}
+    found: set[tuple[object, ...]] = {(curve.mesh, LOADS[curve.load].kind.held, "uniform") for curve in study.curves}
     for scene in study.scenes:
         uniform = DEFINITIONS[scene.definition].uniform
         held = LOADS[scene.load].kind.held
@@ -55,7 +59,7 @@ def _networks(study):
     return len(found)
 
 
-def _within(study):
+def _within(study: Study) -> int:
     """Number of printed cells that the study has scenes for."""
     cells = {
         (scene.mesh.beam.name, scene.mesh.mesh_type, scene.mesh.mesh_size, scene.material.name, scene.load)
@@ -64,10 +68,10 @@ def _within(study):
     return sum((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load) in cells for cell in study.printed)
 
 
-def _contributions(study):
+def _contributions(study: Study) -> list[list[object]]:
     """Rows of what each grid asks for; new scenes are those that no grid above asks for."""
-    rows = [["grid", "scenes", "new", "meshes", "references", "curves"]]
-    seen = set()
+    rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
+    seen: set[SceneSpec] = set()
     for grid in study.grids:
         meshes = {scene.mesh for scene in grid.scenes}
         references = {(scene.mesh.beam, scene.material, scene.load) for scene in grid.scenes}
@@ -80,7 +84,7 @@ def _contributions(study):
     return rows
 
 
-def aligned(rows, left, right=()):
+def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
     """Rows in columns, those in `right` flush right."""
     texts = [[str(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*texts)]

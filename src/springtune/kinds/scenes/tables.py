@@ -29,9 +29,9 @@ def tables(tree):
 
 
 def _selections(root):
-    asked = (root.status != 0).any([dimension for dimension in root.status.dims if dimension not in TABLE])
-    asked = asked.stack(cell=TABLE)
-    return [dict(zip(TABLE, map(str, cell))) for cell in asked.cell.values[asked.values]]
+    requested = (root.status != 0).any([dimension for dimension in root.status.dims if dimension not in TABLE])
+    requested = requested.stack(cell=TABLE)
+    return [dict(zip(TABLE, map(str, cell))) for cell in requested.cell.values[requested.values]]
 
 
 def _table(cells, selection):
@@ -42,10 +42,10 @@ def _table(cells, selection):
     arrays = {name: array.transpose(..., *(one for one in order if one in array.dims)) for name, array in cells.items()}
     values = {name: (array.dims, array.values) for name, array in arrays.items()}
     labels = {name: cells[name].values.tolist() for name in order}
-    asked = values["status"][1] != 0
-    places = np.argwhere(asked.any(axis=(2, 3)))
+    requested = values["status"][1] != 0
+    places = np.argwhere(requested.any(axis=(2, 3)))
     rows = [_row(values, labels, dict(zip(ROW, place))) for place in places.tolist()]
-    definitions = [name for name, there in zip(labels["definition"], asked.any(axis=(0, 1, 2))) if there]
+    definitions = [name for name, there in zip(labels["definition"], requested.any(axis=(0, 1, 2))) if there]
     return {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions, **selection}
 
 

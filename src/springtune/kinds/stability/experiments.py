@@ -1,7 +1,7 @@
 """Stress tests of numerical stability: experiments whose results are the group ``/stability`` of a dataset.
 
-Each experiment takes a `Setup` and returns arrays by the names of `springtune.output.dataset.STABILITY_VARIABLES`, over
-the dimensions there that are not ``definition``; their values are in `springtune.kinds.stability.names.AXES`.
+Each experiment takes a `Setup` and returns arrays by the names of `springtune.kinds.stability.variables.STABILITY`,
+over the dimensions there that are not ``definition``; their values are in `springtune.kinds.stability.names.AXES`.
 """
 
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ class Setup:
     force: float
     definition: str
     mesh_type: str
-    mesh_sizes: tuple
+    mesh_sizes: tuple[float, ...]
 
     @cached_property
     def coarse(self):

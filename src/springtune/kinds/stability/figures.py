@@ -51,7 +51,7 @@ def _plain(panel, *axes):
         chosen.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else ""))
 
 
-def _asked(data, name):
+def _shown_definitions(data, name):
     """Definitions that have values of a variable."""
     values = data[name]
     there = values.notnull().any([dimension for dimension in values.dims if dimension != "definition"])
@@ -71,18 +71,26 @@ def plot_stability_limits(data, ax=None):
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
-        Two.
+    ndarray of matplotlib.axes.Axes, shape (2,)
 
     Raises
     ------
     ValueError
         If the dataset has not the experiment, or ``ax`` has another number of Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_limits(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['Every explicit scheme, with and without damping', 'Undamped; dotted: bound from each particle']
+    >>> [panel.get_xlabel() for panel in axes]
+    ['predicted limit [ns]', 'mesh size [mm]']
     """
     data = _experiment(data, "limits")
     _, ((left, right),) = style.panels(ax, ncols=2, figsize=(8.0, 3.4), layout="constrained")
     predicted, measured = data.dt_limit_predicted, data.dt_limit_measured
-    for number, name in enumerate(_asked(data, "dt_limit_predicted")):
+    for number, name in enumerate(_shown_definitions(data, "dt_limit_predicted")):
         look = style.line(number) | {"linestyle": ""}
         ratio = (measured / predicted).sel(definition=name)
         left.plot(1e9 * predicted.sel(definition=name).values.ravel(), 100 * (ratio.values.ravel() - 1), **look,
@@ -123,6 +131,15 @@ def plot_stability_maps(data, ax=None):
     ------
     ValueError
         If the dataset has not the experiment, or ``ax`` has another number of Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_maps(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['Central difference', 'Backward Euler']
+    >>> axes[0].get_xscale(), axes[0].get_yscale()
+    ('log', 'log')
     """
     data = _experiment(data, "maps")
     names = data.integrator.values
@@ -173,6 +190,15 @@ def plot_stability_energy(data, ax=None):
     ------
     ValueError
         If the dataset has not the experiment.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_energy(tree)
+    >>> axes.get_title(loc="left")
+    'A beam let go from its stretch, half of the limit, no damping'
+    >>> axes.get_ylabel()
+    'energy over its start'
     """
     data = _experiment(data, "drift")
     _, ((panel,),) = style.panels(ax, figsize=(6.4, 3.4), layout="constrained")
@@ -202,13 +228,21 @@ def plot_stability_rest(data, ax=None):
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
-        Two.
+    ndarray of matplotlib.axes.Axes, shape (2,)
 
     Raises
     ------
     ValueError
         If the dataset has not the experiment, or ``ax`` has another number of Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_rest(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['Central difference, .9 of the limit', 'Truncated conjugate gradients, 1 mm']
+    >>> [panel.get_ylabel() for panel in axes]
+    ['steps to rest within 0.1 %', 'distance from the static solution']
     """
     data = _experiment(data, "rest")
     _, ((left, right),) = style.panels(ax, ncols=2, figsize=(8.0, 3.3), layout="constrained")
@@ -241,13 +275,22 @@ def plot_stability_meshes(data, ax=None):
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (2,) or (1,)
         Two, or one where no particles were moved.
 
     Raises
     ------
     ValueError
         If the dataset has not the experiment, or ``ax`` has another number of Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_meshes(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['A sliver', 'Particles moved at random']
+    >>> axes[0].get_xlabel()
+    'smallest angle of one triangle [degree]'
     """
     data = _experiment(data, "slivers")
     perturbed = "perturbed_error" in data
@@ -255,7 +298,7 @@ def plot_stability_meshes(data, ax=None):
     panels = {"sliver": axes[0]} | ({"perturbed": axes[1]} if perturbed else {})
     for kind, panel in panels.items():
         dimension = {"sliver": "sliver_angle", "perturbed": "perturbation"}[kind]
-        for number, name in enumerate(_asked(data, f"{kind}_step_limit")):
+        for number, name in enumerate(_shown_definitions(data, f"{kind}_step_limit")):
             limit = data[f"{kind}_step_limit"].sel(definition=name)
             panel.plot(data[dimension], limit / limit.isel({dimension: 0}), **style.line(number), label=name)
         panel.set(ylabel="stable step over that of the whole mesh", ylim=(0, 1.1))
@@ -280,16 +323,25 @@ def plot_stability_strains(data, ax=None):
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
+    ndarray of matplotlib.axes.Axes, shape (n_loads,)
         One a load.
 
     Raises
     ------
     ValueError
         If the dataset has not the experiment, or ``ax`` has another number of Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_strains(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['Force on the end', 'Pressure that follows a long face']
+    >>> axes[-1].get_xlabel()
+    'strain of a linear sheet under the load [%]'
     """
     data = _experiment(data, "strains")
-    names = _asked(data, "strain_load_share")
+    names = _shown_definitions(data, "strain_load_share")
     loads = data.strain_load.values
     figure, axes = style.panels(
         ax, nrows=len(loads), sharex=True, layout="constrained",
@@ -337,17 +389,25 @@ def plot_stability_buckling(data, ax=None):
 
     Returns
     -------
-    ndarray of matplotlib.axes.Axes
-        Two.
+    ndarray of matplotlib.axes.Axes, shape (2,)
 
     Raises
     ------
     ValueError
         If the dataset has not the experiment, or ``ax`` has another number of Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_stability_buckling(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['A column twenty times as long as high', 'A shallow arch by arc length; wide: unstable']
+    >>> [panel.get_ylabel() for panel in axes]
+    ["buckling load over Euler's, less 1 [%]", 'force [N]']
     """
     data = _experiment(data, "buckling")
     _, ((left, right),) = style.panels(ax, ncols=2, figsize=(8.0, 3.3), layout="constrained")
-    names = _asked(data, "buckling_load")
+    names = _shown_definitions(data, "buckling_load")
     places = np.arange(len(names))
     for number, rows in enumerate(data.rows.values):
         ratio = (data.buckling_load.sel(rows=rows) / data.euler_load).sel(definition=names)

@@ -16,7 +16,7 @@ from .names import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
 from .plan import STAGES
 
-ExperimentName = one_of("experiment", EXPERIMENTS)
+ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
 
 
 class StabilityConfig(Section):
@@ -66,7 +66,7 @@ class Experiment:
     force: float
     definition: str
     mesh_type: str
-    mesh_sizes: tuple
+    mesh_sizes: tuple[float, ...]
 
 
 def _check(config, problems):

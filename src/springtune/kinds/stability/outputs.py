@@ -1,6 +1,12 @@
 """What is made of the experiments on stability."""
 
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
 from ..base import Output
+
+if TYPE_CHECKING:
+    from ...study.model import Study
 
 PAGE = "stability.md"
 
@@ -17,12 +23,12 @@ NEEDED = {
 """The experiment that each figure needs."""
 
 
-def figures(experiments):
+def figures(experiments: Collection[str]) -> dict[str, dict[str, object]]:
     """Figures of experiments, by stem."""
     return {f"stability_{name}": {} for name, needed in NEEDED.items() if needed in experiments}
 
 
-def _lack(study):
+def _lack(study: "Study") -> str:
     return "" if study.parts["stability"] else "shows experiments and the study has none; add a section 'stability'"
 
 

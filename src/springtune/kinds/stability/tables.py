@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from ...jobs.atomic import write_text
 from ...output.dataset import STATUS
@@ -28,7 +29,7 @@ def write(tree, folder):
     return [PAGE]
 
 
-def page(tree):
+def page(tree: xr.DataTree) -> str:
     """Markdown of the experiments that a dataset has."""
     data = tree["stability"].to_dataset()
     sections = {

@@ -14,7 +14,9 @@ PERTURBED = ("definition", "perturbation")
 ARCH = ("definition", "arch_point")
 
 
-def _judged(name, dimensions, long_name):
+def _judged(
+    name: str, dimensions: tuple[str, ...], long_name: str
+) -> dict[str, tuple[tuple[str, ...], str, str, float | str]]:
     """Variables that say what became of solves."""
     return {
         f"{name}_status": (dimensions, "1", f"what became of {long_name}", 0),
