@@ -93,6 +93,16 @@ def test_no_rooms_import_each_other_in_a_circle():
         pytest.fail(" -> ".join(error.args[1]))
 
 
+def test_no_modules_import_each_other_in_a_circle():
+    """Types count, too: what two modules need to know of each other stands in one of them, or as a protocol."""
+    modules = {place(path) for path in PARSED if path.name != "__init__.py"}
+    graph = {place(path): {target for target, _ in imported(path)} & modules - {place(path)} for path in PARSED}
+    try:
+        TopologicalSorter({one: found for one, found in graph.items() if one in modules}).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(".".join(one) for one in error.args[1]))
+
+
 def test_a_kind_imports_no_other_kind_but_scenes():
     found = [
         f"{path.relative_to(REPOSITORY)}:{line}: {'.'.join(target)}"

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from ..problem.geometry import Beam
 from ..problem.materials import Material
-
-if TYPE_CHECKING:
-    from .config import StudyConfig
-    from .expand import Declared
-    from .messages import Problems
+from .messages import Problems
 
 FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one."""
@@ -261,11 +257,11 @@ class StudyKind(Protocol):
         """Keys that it adds to its grids."""
 
     @property
-    def check(self) -> Callable[[StudyConfig, Problems], None]:
+    def check(self) -> Callable[[Any, Problems], None]:
         """Adds what is wrong with a config's values."""
 
     @property
-    def expand(self) -> Callable[[StudyConfig, Declared], Any]:
+    def expand(self) -> Callable[[Any, Any], Any]:
         """Its part of a study."""
 
     @property
