@@ -46,9 +46,10 @@ from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
 
 @pytest.fixture(autouse=True)
 def closed():
-    """No figure opens a window, and those that a test has made are closed after it."""
+    """No figure opens a window, none that another test left is there, and those of this one are closed after it."""
     with matplotlib.rc_context():
         plt.switch_backend("agg")
+        plt.close("all")
         yield
     plt.close("all")
 
