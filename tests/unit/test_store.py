@@ -87,3 +87,15 @@ def test_physics_imports_no_workflow_dataset_or_plots():
     program = f"import sys, {', '.join(stages)}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert not {"snakemake", "xarray", "matplotlib", "pandas", "pydantic", "pint"} & set(loaded)
+
+
+def test_tasks_are_missing_until_their_result_is_stored(tmp_path):
+    tasks = [{"key": "one"}, {"key": "two"}]
+    store.add(tmp_path / "one.h5", {"one": {"displacement": 1.0, "field": np.arange(2.0)}})
+    (tmp_path / "two.h5").write_text("no results")
+    ((path, task),) = store.missing(tmp_path, tasks)
+    assert (path, task) == (tmp_path / "two.h5", tasks[1])
+    store.add(path, {"two": {"displacement": 2.0}})
+    assert not list(store.missing(tmp_path, tasks))
+    assert store.read_one(tmp_path, "one") == {"displacement": 1.0}
+    assert store.read_one(tmp_path, "one", ["field"])["field"].tolist() == [0.0, 1.0]

@@ -10,7 +10,7 @@ for one in outputs().values():
 
 def files(one):
     """Figures and tables of an output."""
-    figures = [RESULTS / "figures" / f"{stem}.{ending}" for stem in one.stems(STUDY) for ending in FORMATS]
+    figures = [RESULTS / "figures" / f"{stem}.{ending}" for stem in one.figures(STUDY) for ending in FORMATS]
     return figures + [RESULTS / "tables" / name for name in plan.table_files(one, STUDY)]
 
 

@@ -74,9 +74,9 @@ def write_tasks(study: "Study", folder: Path, cores: int) -> dict[str, list[str]
         contents = {
             label: stage.content(study, folder, values) for label, values in shared[stage.like or stage.name].items()
         }
-        asked = {label: content for label, content in contents.items() if content}
-        labels[stage.name] = list(asked)
-        for label, content in asked.items():
+        wanted = {label: content for label, content in contents.items() if content}
+        labels[stage.name] = list(wanted)
+        for label, content in wanted.items():
             _write(folder, f"{stage.name}_{label}", content, stage.products(content))
     return labels
 

@@ -7,7 +7,7 @@ stays, so going back to it computes nothing. Nothing but the dataset is meant fo
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,45 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
             if name in file:
                 result |= {label: file[name][label][()] for label in fields if label in file[name]}
     return results
+
+
+def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[str, Any]:
+    """Read a result that has a file to itself, named by its key.
+
+    Parameters
+    ----------
+    folder : str or Path
+    key : str
+    fields : sequence of str, optional
+        Arrays to read besides scalars.
+
+    Returns
+    -------
+    dict
+        Scalars, texts and the arrays asked for.
+    """
+    return read(Path(folder) / f"{key}.h5", [key], fields)[key]
+
+
+def missing(folder: str | Path, tasks: Iterable[Mapping[str, Any]]) -> Iterator[tuple[Path, Mapping[str, Any]]]:
+    """Tasks whose result, a file each, named by the task's key, is not stored yet.
+
+    Parameters
+    ----------
+    folder : str or Path
+    tasks : iterable of dict
+        Each with its ``key``.
+
+    Yields
+    ------
+    path : Path
+        Where the result belongs.
+    task : dict
+    """
+    for task in tasks:
+        path = Path(folder) / f"{task['key']}.h5"
+        if task["key"] not in stored(path):
+            yield path, task
 
 
 def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..study import Study
     from .base import Kind, Output
+
 KINDS = ("scenes", "moduli", "laying", "stability", "benchmark")
 """Packages of the study kinds, in the order of the dataset's groups."""
 

@@ -73,10 +73,6 @@ class Output:
         """Module that draws the figures, from the package on."""
         return self.plot.partition(":")[0]
 
-    def stems(self, study: Study) -> list[str]:
-        """Stems of the figures of a study, none where it does not ask for the output."""
-        return list(self.figures(study)) if self.name in study.outputs else []
-
 
 @dataclass(frozen=True)
 class Stage:

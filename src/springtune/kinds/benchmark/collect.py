@@ -10,8 +10,7 @@ def groups(study, folder):
     data = BENCHMARK.empty(study.axes)
     for case in study.parts["benchmark"]:
         data.attrs["second_beam"] = case.second_beam.name if case.second_beam else ""
-        key = plan.case_key(case)
-        result = store.read(folder / "benchmark" / f"{key}.h5", [key], BENCHMARK.variables)[key]
+        result = store.read_one(folder / "benchmark", plan.case_key(case), BENCHMARK.variables)
         place = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
         for name, values in result.items():
             array = data[name]

@@ -1,7 +1,6 @@
 """Stage `benchmark`: run time against error."""
 
 import sys
-from pathlib import Path
 
 from ...jobs import atomic, store
 from ...problem.geometry import Beam
@@ -25,11 +24,9 @@ def run(tasks, done):
     """
     tasks = atomic.read_json(tasks)
     count = 0
-    for task in tasks["cases"]:
-        path = Path(tasks["folder"]) / f"{task['key']}.h5"
-        if task["key"] not in store.stored(path):
-            store.add(path, {task["key"]: _case(task)})
-            count += 1
+    for path, task in store.missing(tasks["folder"], tasks["cases"]):
+        store.add(path, {task["key"]: _case(task)})
+        count += 1
     atomic.write_json(done, {"cases": count})
 
 

@@ -16,8 +16,7 @@ def groups(study, folder):
     """Groups of a dataset, see `springtune.kinds.scenes.collect.groups`."""
     part, results = study.parts["laying"], {}
     for one in (*part.strips, *part.references):
-        key = plan.laying_key(one)
-        results[one] = store.read(folder / "laying" / f"{key}.h5", [key], ["outline"])[key]
+        results[one] = store.read_one(folder / "laying", plan.laying_key(one), ["outline"])
     points = max(len(result.get("outline", ())) for result in results.values())
     axes = study.axes | {"outline_point": tuple(range(points)), "corner": tuple(range(4))}
     laid = Filler(LAYING.empty(axes))

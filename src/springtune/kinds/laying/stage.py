@@ -3,7 +3,6 @@
 import sys
 import time
 from dataclasses import asdict
-from pathlib import Path
 
 from ...jobs import atomic, store
 from ...jobs.spent import Spent
@@ -28,12 +27,10 @@ def run(tasks, done):
         JSON file to write: what was spent.
     """
     tasks, spent = atomic.read_json(tasks), Spent()
-    for task in tasks["strips"]:
-        path = Path(tasks["folder"]) / f"{task['key']}.h5"
-        if task["key"] not in store.stored(path):
-            begin = time.perf_counter()
-            store.add(path, {task["key"]: _lay(task)})
-            spent.add("laying", cost_units(task["mesh_size"]), time.perf_counter() - begin)
+    for path, task in store.missing(tasks["folder"], tasks["strips"]):
+        begin = time.perf_counter()
+        store.add(path, {task["key"]: _lay(task)})
+        spent.add("laying", cost_units(task["mesh_size"]), time.perf_counter() - begin)
     atomic.write_json(done, spent.summary())
 
 

@@ -253,8 +253,7 @@ def _finite_strain(study, folder, axes, displacement):
 
 
 def _finite_reference(folder, one, kind, fields=()):
-    name = plan.finite_key(one, kind)
-    return store.read(folder / "references" / f"{name}.h5", [name], fields)[name]
+    return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
 
 
 def _with_face_error(data):

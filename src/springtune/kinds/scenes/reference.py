@@ -2,7 +2,6 @@
 
 import sys
 import time
-from pathlib import Path
 
 from ...jobs import atomic, store
 from ...jobs.spent import Spent
@@ -26,10 +25,7 @@ def run(tasks, done):
     """
     tasks, spent = atomic.read_json(tasks), Spent()
     for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
-        for task in tasks[section]:
-            path = Path(tasks["folder"]) / f"{task['key']}.h5"
-            if task["key"] in store.stored(path):
-                continue
+        for path, task in store.missing(tasks["folder"], tasks[section]):
             begin = time.perf_counter()
             result = solve(task)
             result["seconds"] = time.perf_counter() - begin

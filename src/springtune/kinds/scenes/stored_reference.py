@@ -1,7 +1,5 @@
 """Stored references: solutions of unit problems, read at the size of a beam and for a force of 1 N."""
 
-from pathlib import Path
-
 from ...jobs import store
 
 SCALED = ("displacement", "mean_displacement", "displacements")
@@ -26,8 +24,7 @@ def read(folder, reference, fields=()):
         What the stage `reference` stored [m, rad, 1], for 1 N; of a reference that did not converge ``message`` and
         ``seconds`` alone.
     """
-    key = reference["key"]
-    found = store.read(Path(folder) / f"{key}.h5", [key], fields)[key]
+    found = store.read_one(folder, reference["key"], fields)
     scales = dict.fromkeys(SCALED, reference["displacement"]) | dict.fromkeys("xy", reference["length"])
     scales |= dict.fromkeys(("rotation", "strain"), reference["displacement"] / reference["length"])
     return {name: value * scales[name] if name in scales else value for name, value in found.items()}

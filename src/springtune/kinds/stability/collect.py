@@ -11,8 +11,7 @@ def groups(study, folder):
     """Groups of a dataset, see `springtune.kinds.scenes.collect.groups`."""
     results = {}
     for one in study.parts["stability"]:
-        key = plan.experiment_key(one)
-        results[one] = store.read(folder / "stability" / f"{key}.h5", [key], STABILITY.variables)[key]
+        results[one] = store.read_one(folder / "stability", plan.experiment_key(one), STABILITY.variables)
     there = {name for result in results.values() for name in result} | {"experiment_seconds", "experiment_message"}
     data = STABILITY.empty(study.axes, there)
     for one, result in results.items():

@@ -2,7 +2,6 @@
 
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 
@@ -27,12 +26,10 @@ def run(tasks, done):
         JSON file to write: what was spent.
     """
     tasks, spent = atomic.read_json(tasks), Spent()
-    for task in tasks["experiments"]:
-        path = Path(tasks["folder"]) / f"{task['key']}.h5"
-        if task["key"] not in store.stored(path):
-            result = _experiment(task)
-            store.add(path, {task["key"]: result})
-            spent.add(task["name"], 0, result.get("seconds", 0.0))
+    for path, task in store.missing(tasks["folder"], tasks["experiments"]):
+        result = _experiment(task)
+        store.add(path, {task["key"]: result})
+        spent.add(task["name"], 0, result.get("seconds", 0.0))
     atomic.write_json(done, spent.summary())
 
 
