@@ -2,7 +2,7 @@
 
 import os
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # Two modules of one name cannot both be searched for examples, and these have none.
 collect_ignore_glob = ["conftest.py", "*/conftest.py"]
@@ -10,7 +10,10 @@ collect_ignore_glob = ["conftest.py", "*/conftest.py"]
 # Tests run in several processes; threads of theirs would only fight for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# No test is to fail because the machine is busy: nothing of these settings looks at the clock.
+unhurried = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
 # `make test` draws the same examples every time, so that it says the same of the same commit; `make slow` draws anew.
-settings.register_profile("same", derandomize=True)
-settings.register_profile("anew", max_examples=400)
+settings.register_profile("same", unhurried, derandomize=True)
+settings.register_profile("anew", unhurried, max_examples=400)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))

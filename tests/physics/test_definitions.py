@@ -82,7 +82,7 @@ def test_area_is_exact_on_squares_with_both_diagonals(nu):
     assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(nu=st.floats(0, 0.5), shape=st.floats(0.75, 1.33))
 def test_rectangles(nu, shape):
     columns = 12
@@ -178,7 +178,7 @@ def test_free_meshes_are_a_few_percent_off(name):
 
 
 @given(gradient=st.tuples(*[st.floats(-1, 1)] * 4))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_mean_gradient_of_an_affine_field(gradient):
     gradient = np.reshape(gradient, (2, 2))
     for mesh_type in ("free", "braced"):

@@ -39,7 +39,7 @@ def assembled(mesh, corners, forces):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 8e-4))
 def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
     mesh, energy = energy_of(kind, seed)
@@ -54,7 +54,7 @@ def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 8e-4))
 def test_tangent_is_the_derivative_of_the_forces(kind, seed, amplitude):
     mesh, energy = energy_of(kind, seed)
@@ -78,7 +78,7 @@ def test_tangent_is_symmetric_and_that_at_rest_is_the_limit(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(angle=st.floats(-3.1, 3.1), shift=st.floats(-1, 1))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_rigid_motion_costs_nothing(kind, angle, shift):
     mesh, energy = energy_of(kind, 5)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -97,7 +97,7 @@ def test_small_strain_keeps_its_digits(kind):
     assert np.abs(forces - linear).max() <= 1e-10 * np.abs(linear).max()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**31), nu=st.floats(0, 0.5), amplitude=st.floats(1e-5, 1.5e-3))
 def test_delingette_is_saint_venant_kirchhoff_at_any_strain(seed, nu, amplitude):
     mesh = MESH_TYPES["free"](0.02, 0.01, 5e-3)

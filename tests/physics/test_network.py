@@ -49,7 +49,7 @@ def bent(problem, seed, amplitude):
     return np.where(problem.network.held, 0.0, displacements)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 5e-4), mesh_type=st.sampled_from(["structured", "free"]))
 def test_tangent_is_the_derivative_of_the_resistance(seed, amplitude, mesh_type):
     problem, _ = beam_problem(mesh_type)
@@ -64,7 +64,7 @@ def test_tangent_is_the_derivative_of_the_resistance(seed, amplitude, mesh_type)
     assert np.linalg.norm(difference - exact) <= 1e-7 * np.linalg.norm(exact)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-5, 5e-4))
 def test_resistance_is_the_derivative_of_the_energy(seed, amplitude):
     problem, _ = beam_problem("free")
@@ -78,7 +78,7 @@ def test_resistance_is_the_derivative_of_the_energy(seed, amplitude):
 
 
 @given(angle=st.floats(-3.1, 3.1), shift=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_rigid_motion_meets_no_resistance(angle, shift):
     problem, _ = beam_problem()
     points = problem.network.mesh.points

@@ -200,7 +200,7 @@ def test_series_error_falls_with_the_order():
         assert rate == pytest.approx(order + 1, abs=0.1)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(share=st.floats(0.05, 1.0))
 def test_series_about_a_loaded_point_meets_that_about_rest(share):
     problem, weights = beam_problem("free", 0.1, 0.02, 5e-3)

@@ -68,7 +68,7 @@ def test_softer_network_snaps_at_its_corners_and_keeps_the_last_good_step():
     assert not problem.network.inverted(found.last)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), axis=st.integers(0, 1))
 def test_follower_pressure_has_its_derivative(seed, axis):
     mesh = MESH_TYPES["free"](0.02, 0.01, 2.5e-3)

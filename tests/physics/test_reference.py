@@ -193,7 +193,7 @@ def test_rounding_out_of_reach_is_an_error_that_says_so():
 # -- convergence ----------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(aspect_ratio=st.floats(0.2, 30), nu=st.floats(0, 0.5), kind=st.sampled_from(list(LOAD_KINDS.values())))
 def test_error_estimate_is_honest(aspect_ratio, nu, kind):
     body, material = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any"), Material(3e9, nu, name="any")

@@ -15,7 +15,9 @@ import yaml
 from click.testing import CliRunner
 
 from springtune import prediction
-from springtune.cli import BEGIN, END, MANUAL, SCHEMA, main, manual_text, prediction_text, schema_text
+from springtune.cli import main
+from springtune.cli.predict import prediction_text
+from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.problem.geometry import Beam

@@ -20,6 +20,7 @@ LAYERS = (
     ("scene",),
     ("prediction", "study", "jobs", "output"),
     ("kinds",),
+    ("browse", "publication"),
     ("campaign",),
     ("cli",),
     ("__init__", "__main__"),

@@ -226,7 +226,7 @@ def study_of(path, asked):
     return load_study(path)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(grids(), min_size=1, max_size=3), st.randoms(use_true_random=False))
 def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, asked, random):
     study = study_of(tmp_path / "study.yaml", asked)
@@ -712,7 +712,7 @@ ANYTHING = st.recursive(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_value_anywhere_is_read_or_refused(load, data):
     """No other error than a StudyError, whatever stands in place of one value of a study."""

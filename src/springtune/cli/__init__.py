@@ -1,0 +1,60 @@
+"""Command line: `springtune COMMAND`."""
+
+from importlib import import_module
+from itertools import groupby
+from typing import NamedTuple
+
+import click
+
+from .. import __version__
+
+
+class Row(NamedTuple):
+    """A command: where its function is, and under which heading of the help it stands."""
+
+    heading: str
+    module: str
+    function: str
+    meaning: str
+
+
+STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
+
+COMMANDS = {
+    "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
+    "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
+    "predict": Row(STUDIES, "predict", "predict", "Recommend a definition and its stiffness for one mesh."),
+    "schema": Row(HOUSE, "schema", "schema", "Print the JSON schema of studies, or renew it and the manual."),
+    "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),
+    "stability": Row(HOUSE, "pages", "stability", "Tables of docs/stability.md from a dataset."),
+    "bench": Row(HOUSE, "pages", "bench", "Tables of docs/speed.md from a dataset, or ratios of two benchmarks."),
+}
+"""Commands by name, in the order of the help; none is imported before it is called."""
+
+
+class Commands(click.Group):
+    """Group whose commands are imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name; None where there is none."""
+        if cmd_name not in COMMANDS:
+            return None
+        row = COMMANDS[cmd_name]
+        found: click.Command = getattr(import_module(f"{__name__}.{row.module}"), row.function)
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands under their headings."""
+        for heading, rows in groupby(COMMANDS.items(), key=lambda item: item[1].heading):
+            with formatter.section(heading):
+                formatter.write_dl([(name, row.meaning) for name, row in rows])
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__)
+def main() -> None:
+    """Tune the stiffness of 2-D mass-spring models against finite elements."""

@@ -1,0 +1,31 @@
+"""What a study asks for, and what it may ask for."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+def scenes(config: Path) -> None:
+    """Say what a study asks for, before anything runs."""
+    from ..kinds import kinds, load_study  # here, so that --help does not wait for it
+    from ..kinds.scenes.summary import summary
+    from ..study import StudyError
+
+    try:
+        study = load_study(config)
+    except StudyError as error:
+        click.echo(str(error), err=True)
+        raise SystemExit(1) from None
+    parts = [(kind, study.parts[kind.name]) for kind in kinds()]
+    click.echo(summary(study, [row for kind, part in parts if part for row in kind.summary(part)]))
+
+
+@click.command()
+def definitions() -> None:
+    """List the definitions of spring stiffness."""
+    from ..kinds.scenes.summary import aligned
+    from ..springs import DEFINITIONS
+
+    click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
