@@ -2,6 +2,7 @@
 # make study STUDY=config/quick.yaml     another one
 # make test                              the tests; `make slow` runs the slow ones, and draws
 #                                        new examples for the others
+# make clean                             removes all results, when you say yes; YES=1 does
 STUDY ?= config/paper.yaml
 VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
@@ -44,5 +45,11 @@ lock: $(VENV)/.run
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
+# Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.
 clean:
+	@if [ -e results ] && [ "$(YES)" != 1 ]; then \
+	    printf 'Remove all results (%s) and .snakemake? What was solved is solved again. [y/N] ' "$$(du -sh results/ | cut -f1)"; \
+	    read -r answer || answer=; \
+	    case "$$answer" in y|Y|yes) ;; *) echo 'Nothing is removed; without the question: make clean YES=1'; exit 1 ;; esac; \
+	fi
 	rm -rf results .snakemake

@@ -1,10 +1,29 @@
-"""The dataset's form: dimensions, units, holes, and what a reader finds."""
+"""The dataset's form: dimensions, units, holes, what CF checkers say, and that a file is there whole or not at all."""
 
+import hashlib
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+
+import h5py
 import numpy as np
+import pytest
 import xarray as xr
 
+import springtune as st
+from cf import complaints
+from springtune.campaign import provenance
+from springtune.kinds import KINDS, load_study
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output import dataset
+from springtune.output.dataset import CHUNK, Group
 
 AXES = {
     "beam": ("a", "b"),
@@ -15,6 +34,13 @@ AXES = {
     "definition": ("paper",),
     "kinematics": ("linear",),
     "stiffness_ratio": (0.5, 1.0),
+}
+
+GROUPS = {
+    f"{kind}{group.name}": group
+    for kind in KINDS
+    for group in vars(import_module(f"springtune.kinds.{kind}.variables")).values()
+    if isinstance(group, Group)
 }
 
 
@@ -34,11 +60,178 @@ def test_written_dataset_opens_as_a_tree(tmp_path):
     root["displacement"].loc[{"beam": "b", "mesh_size": 2e-3}] = 1.5e-3
     root["message"].loc[{"beam": "a"}] = "why"
     curves = SENSITIVITY.empty(AXES)
-    dataset.write(path, {"/": root, "/sensitivity": curves}, {"title": "t", "Conventions": "CF-1.11"})
-    with xr.open_datatree(path, engine="h5netcdf") as tree:
-        assert tree.attrs["title"] == "t"
-        assert float(tree.displacement.sel(beam="b", mesh_size=2e-3).max()) == 1.5e-3
-        assert np.isnan(tree.displacement.sel(beam="a")).all()
-        assert tree.message.sel(beam="a").values.ravel()[0] == "why"
-        assert "best_stiffness" in tree["sensitivity"]
+    attributes = {"title": "t", "Conventions": "CF-1.11", "springtune_version": "0", "config": "x" * 200_000}
+    dataset.write(path, {"/": root, "/sensitivity": curves}, attributes)
+    for opened in (xr.open_datatree(path, engine="h5netcdf"), st.open(path)):
+        with opened as tree:
+            assert tree.attrs["title"] == "t" and len(tree.attrs["config"]) == 200_000
+            assert float(tree.displacement.sel(beam="b", mesh_size=2e-3).max()) == 1.5e-3
+            assert np.isnan(tree.displacement.sel(beam="a")).all()
+            assert tree.message.sel(beam="a").values.ravel()[0] == "why"
+            assert "best_stiffness" in tree["sensitivity"]
     assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
+
+
+def test_arrays_are_read_when_needed_and_by_chunks(tmp_path):
+    sizes = AXES | {"beam": tuple("abcdefgh"), "stiffness_ratio": tuple(np.linspace(0.4, 1.6, 5000))}
+    curves = SENSITIVITY.empty(sizes)
+    curves["displacement"].values[:] = np.random.default_rng(1).random(curves.displacement.shape)
+    dataset.write(tmp_path / "dataset.nc", {"/": curves}, {"springtune_version": "0"})
+    with h5py.File(tmp_path / "dataset.nc") as file:
+        chunk = file["displacement"].chunks
+        assert chunk[-1] == 5000 and CHUNK / 4 <= 8 * np.prod(chunk) <= CHUNK
+        assert file["best_stiffness"].chunks is None  # small
+    with st.open(tmp_path) as tree:
+        assert "..." in repr(tree.displacement.variable) or "values with dtype" in repr(tree.displacement.variable)
+        assert tree.displacement.sel(beam="c").equals(curves.displacement.sel(beam="c"))
+
+
+class TestConventions:
+    """CF 1.11, as the checker of IOOS reads it; it looks at root groups alone, so each group is made one."""
+
+    @pytest.mark.parametrize(
+        "name", [name if name == "scenes/" else pytest.param(name, marks=pytest.mark.slow) for name in GROUPS]
+    )
+    def test_every_group_of_every_kind_passes(self, tmp_path, name):
+        group = GROUPS[name]
+        dimensions = {dimension for row in group.variables.values() for dimension in row[0]}
+        numbers = {"mesh_size", "stiffness_ratio", "face_position", "poisson_ratio", "friction", "strain"}
+        axes = {one: (1.0, 2.0) if one in numbers else ("one", "two") for one in dimensions}
+        study = load_study(self.study(tmp_path))
+        attributes = provenance.attributes(study, study.path)
+        dataset.write(tmp_path / "dataset.nc", {"/": group.empty(axes)}, attributes)
+        assert complaints(tmp_path / "dataset.nc") == []
+
+    def test_what_is_wrong_is_found(self, tmp_path):
+        wrong = xr.Dataset({"a": ("x", [1.0], {"units": "fathom per banana"})}, {"x": ("x", [0.5])})
+        wrong.to_netcdf(tmp_path / "dataset.nc", engine="netcdf4")  # with _FillValue on a coordinate
+        said = " ".join(complaints(tmp_path / "dataset.nc"))
+        assert "_FillValue" in said and "fathom" in said and "history" in said
+
+    def study(self, folder):
+        path = folder / "small.yaml"
+        path.write_text(
+            "title: Small\nbeams: {b: {length: 20 mm, height: 10 mm}}\n"
+            "materials: {m: {young_modulus: 1 GPa, poisson_ratio: 0.3}}\n"
+            "grids: {g: {beam: b, mesh_type: right, mesh_size: 5 mm, material: m, load: traction, force: 1 N,"
+            " definition: lattice}}\n"
+        )
+        return path
+
+
+class TestProvenance:
+    def test_inputs_are_named_without_the_machine(self, tmp_path):
+        repository = tmp_path / "somewhere"
+        (repository / "config").mkdir(parents=True)
+        (repository / "requirements").mkdir()
+        (repository / "requirements/run.txt").write_text("numpy==2\n")
+        path = TestConventions().study(repository / "config")
+        found = provenance.attributes(load_study(path), path)
+        inputs = json.loads(found["inputs"])
+        assert set(inputs) == {"config/small.yaml", "requirements/run.txt"}
+        assert inputs["config/small.yaml"] == found["config_sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+        assert str(tmp_path) not in json.dumps(found)
+        assert "references" not in found  # nothing printed
+
+    def test_changes_are_kept_where_there_are_some(self, tmp_path):
+        path = TestConventions().study(tmp_path)
+        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
+        for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
+            subprocess.run([*git, *command], check=True)
+        clean = provenance.attributes(load_study(path), path)
+        assert len(clean["git_commit"]) == 40 and clean["git_diff"] == ""
+        path.write_text(path.read_text().replace("Small", "Smaller"))
+        dirty = provenance.attributes(load_study(path), path)
+        assert dirty["git_commit"] == clean["git_commit"] + "+changes"
+        assert "-title: Small\n+title: Smaller\n" in dirty["git_diff"]
+
+    def test_long_changes_are_cut_and_hashed(self, tmp_path):
+        path = TestConventions().study(tmp_path)
+        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
+        for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
+            subprocess.run([*git, *command], check=True)
+        path.write_text(path.read_text() + "".join(f"# {number:050}\n" for number in range(2000)))
+        whole = subprocess.run([*git, "diff", "HEAD"], check=True, capture_output=True).stdout
+        kept = provenance.git_diff(tmp_path)
+        assert len(kept) < 41_000 and whole.decode().startswith(kept.rpartition("...")[0])
+        assert hashlib.sha256(whole).hexdigest() in kept
+
+
+def write_curves(path, value):
+    """Write a dataset of some MB: a value, and numbers that cannot be compressed."""
+    axes = AXES | {"beam": tuple("abcdefgh"), "stiffness_ratio": tuple(range(20000))}
+    data = SENSITIVITY.empty(axes)
+    data["displacement"].values[:] = value
+    data["stiffness"].values[:] = np.random.default_rng(0).random(data.stiffness.shape)
+    dataset.write(path, {"/": data}, {"springtune_version": "0"})
+
+
+WRITER = """
+import sys
+from test_dataset import write_curves
+value = 2.0
+while True:
+    print("writing", flush=True)
+    write_curves(sys.argv[1], value)
+    value += 1.0
+"""
+
+
+class TestInterruptedWrite:
+    @pytest.fixture
+    def writer(self, tmp_path):
+        """Starts a process that writes datasets, one after the other, and says so; and takes what limits it."""
+        started = []
+
+        def start(**options):
+            command = [sys.executable, "-c", WRITER, str(tmp_path / "dataset.nc")]
+            paths = os.pathsep.join(map(str, [Path(__file__).parent, *sys.path]))
+            options |= {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+            started.append(subprocess.Popen(command, env=os.environ | {"PYTHONPATH": paths}, **options))
+            assert started[-1].stdout.readline() == "writing\n"
+            return started[-1]
+
+        yield start
+        for one in started:
+            one.kill()
+            one.wait()
+            one.stdout.close()
+            one.stderr.close()
+
+    @pytest.mark.parametrize("delay", [0.05, 0.15])
+    def test_a_killed_one_leaves_the_dataset_of_before_or_the_new_one(self, tmp_path, writer, delay):
+        write_curves(tmp_path / "dataset.nc", 1.0)
+        process = writer()
+        time.sleep(delay)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        with st.open(tmp_path) as tree:
+            assert len(np.unique(tree.displacement.values)) == 1 and tree.stiffness.notnull().all()
+        assert {file.name for file in tmp_path.iterdir()} <= {"dataset.nc", "dataset.nc.unfinished"}
+
+    def test_an_unfinished_file_is_no_dataset_and_goes_with_the_next_write(self, tmp_path):
+        write_curves(tmp_path / "dataset.nc", 1.0)
+        whole = (tmp_path / "dataset.nc").read_bytes()
+        os.remove(tmp_path / "dataset.nc")
+        unfinished = tmp_path / "dataset.nc.unfinished"
+        for share in (0.0, 0.1, 0.5, 0.999):
+            unfinished.write_bytes(whole[: int(share * len(whole))])
+            with pytest.raises(FileNotFoundError, match="there is no such dataset"):
+                st.open(tmp_path)
+            shutil.copy(unfinished, tmp_path / "cut.nc")
+            with pytest.raises(ValueError, match="cannot be read"):
+                st.open(tmp_path / "cut.nc")
+        os.remove(tmp_path / "cut.nc")
+        write_curves(tmp_path / "dataset.nc", 1.0)
+        assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
+
+    def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(self, tmp_path, writer):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+        write_curves(tmp_path / "dataset.nc", 1.0)
+        _, said = writer(preexec_fn=limit).communicate()
+        assert "cannot be written" in said and "MB are free there); make room" in said.splitlines()[-1]
+        assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
+        with st.open(tmp_path) as tree:
+            assert (tree.displacement == 1.0).all()

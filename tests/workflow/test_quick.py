@@ -1,6 +1,7 @@
 """The quick study, end to end: the dataset's contract, and what the pages and an example say of it."""
 
 import csv
+import hashlib
 import json
 import re
 import runpy
@@ -11,6 +12,12 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+
+import springtune as st
+from cf import complaints
+from springtune.campaign.orphans import orphans
+from springtune.kinds import load_study
+from springtune.output import dataset
 
 SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
 
@@ -32,7 +39,8 @@ def test_root_has_the_names_of_the_contract(tree):
     for name in ("reference_displacement", "force"):
         assert root[name].dims == ("beam", "material", "load"), name
     for name in ("reference_error_estimate", "particles", "springs", "paper_displacement", "paper_deformation_error",
-                 "paper_reference_displacement", "minimum_angle", "edge_length_spread"):  # fmt: skip
+                 "paper_reference_displacement", "minimum_angle", "edge_length_spread",
+                 "beam_length", "beam_height", "beam_thickness"):  # fmt: skip
         assert name in root
     assert root.mesh_size.values.tolist() == [2e-3, 5e-3]
     assert root.status.attrs["flag_meanings"] == "not_requested solved linear_only not_converged unstable failed"
@@ -104,10 +112,60 @@ def test_every_variable_has_units_and_a_long_name(tree):
             assert variable.attrs.get("units") and variable.attrs.get("long_name"), f"{group.path}/{name}"
 
 
+def test_checkers_of_conventions_have_nothing_against_it(run, tree):
+    assert complaints(run.folder / "results/quick/dataset.nc") == []
+
+
+@pytest.mark.slow
+def test_checkers_of_conventions_have_nothing_against_its_groups(tree, tmp_path):
+    """They look at the root alone, so groups are made roots."""
+    for name, group in tree.children.items():
+        dataset.write(tmp_path / f"{name}.nc", {"/": group.to_dataset()}, tree.attrs)
+        assert complaints(tmp_path / f"{name}.nc") == [], name
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "braced"])
+def test_fields_are_meshes_in_equilibrium(tree, mesh_type):
+    """By UGRID: cells fill the beam, and the springs' forces balance at each particle that nothing else acts on."""
+    load = {"structured": "traction", "braced": "bending"}[mesh_type]
+    place = {"material": "steel", "load": load, "definition": "lattice", "kinematics": "linear"}
+    network = st.field(tree, beam="100x20", mesh_type=mesh_type, **place)
+    assert network.mesh.attrs["cf_role"] == "mesh_topology" and network.mesh.attrs["topology_dimension"] == 2
+    points = np.stack([network[name].values for name in network.mesh.attrs["node_coordinates"].split()], axis=1)
+    ends = network[network.mesh.attrs["edge_node_connectivity"]].values
+    cells = network[network.mesh.attrs["face_node_connectivity"]].values
+    counted = tree.sel(beam="100x20", mesh_type=mesh_type, mesh_size=5e-3)
+    assert len(points) == counted.particles and len(ends) == counted.springs
+    x, y = points[cells].transpose(2, 0, 1)
+    areas = 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
+    assert (areas > 0).all() and areas.sum() == pytest.approx(0.1 * 0.02)
+    along = points[ends[:, 1]] - points[ends[:, 0]]
+    pulls = network.force.values[:, None] * along / np.linalg.norm(along, axis=1)[:, None]
+    total = np.zeros_like(points)
+    np.add.at(total, ends[:, 0], pulls)
+    np.add.at(total, ends[:, 1], -pulls)
+    inside = (points[:, 0] > 1e-9) & (points[:, 0] < 0.1 - 1e-9)
+    # Forces are stored with seven digits, and at most eight springs meet.
+    assert np.abs(total[inside]).max() <= 1e-6 * np.abs(network.force.values).max()
+    axis, size = {"traction": (0, 20e3), "bending": (1, 200.0)}[load]
+    right = points[:, 0] >= 0.1 - 1e-9
+    assert abs(total[right, axis].sum()) == pytest.approx(size, rel=1e-5)
+
+
+def test_nothing_lies_there_that_the_study_does_not_ask_for(run, tree):
+    assert orphans(load_study(run.folder / "quick.yaml"), run.folder / "results/quick") == []
+
+
 def test_root_attributes_tell_where_the_data_come_from(tree, run):
     for name in ("title", "Conventions", "study", "config", "springtune_version", "git_commit", "created", "software",
-                 "host"):  # fmt: skip
+                 "host", "history", "source", "references", "git_diff"):  # fmt: skip
         assert name in tree.attrs
+    text = (run.folder / "quick.yaml").read_bytes()
+    assert json.loads(tree.attrs["inputs"]) == {
+        "quick.yaml": hashlib.sha256(text).hexdigest(),
+        "paper_tables.csv": hashlib.sha256((run.folder / "paper_tables.csv").read_bytes()).hexdigest(),
+    }
+    assert tree.attrs["config_sha256"] == hashlib.sha256(text).hexdigest()
     assert tree.attrs["study"] == "quick"
     assert tree.attrs["config"] == (run.folder / "quick.yaml").read_text()
     assert "scipy" in json.loads(tree.attrs["software"])
@@ -185,10 +243,10 @@ def test_tables_and_figures_are_there(run, tree):
             assert (results / f"figures/{stem}.{ending}").stat().st_size > 5000
 
 
-def test_snippet_of_the_docs_runs(run, tree, repository, monkeypatch):
-    snippet = re.search(r"```python\n(.*?)```", (repository / "docs/dataset.md").read_text(), re.DOTALL).group(1)
+def test_snippets_of_the_docs_run(run, tree, repository, monkeypatch):
+    snippets = re.findall(r"```python\n(.*?)```", (repository / "docs/dataset.md").read_text(), re.DOTALL)
     monkeypatch.chdir(run.folder)
-    exec(snippet.replace("results/paper", "results/quick").replace('"200x30"', '"100x20"'), {})
+    exec("".join(snippets).replace("results/paper", "results/quick").replace('"200x30"', '"100x20"'), {})
 
 
 def test_example_reads_the_dataset(run, tree, repository, monkeypatch, tmp_path):

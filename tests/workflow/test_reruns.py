@@ -4,7 +4,9 @@ import meshio
 import numpy as np
 import pytest
 import xarray as xr
+from click.testing import CliRunner
 
+from springtune.cli import main
 from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.study import StudyError
@@ -65,6 +67,25 @@ def test_only_what_is_new_is_computed(grown):
     assert code == 0, output
     assert run.times(stored) == after
     assert dataset(run, "grow").mesh_size.values.tolist() == [5e-3, 10e-3]
+
+
+def test_what_a_removed_value_left_is_removed_on_request(grown, monkeypatch):
+    """The size of the test before, and files of jobs if it had a bundle of its own; nothing has to be made again."""
+    monkeypatch.chdir(grown.folder)
+    every = "results/grow/**/*.*"
+    before = grown.times(every)
+    listed = CliRunner().invoke(main, ["clean", "grow.yaml"])
+    assert listed.exit_code == 0 and grown.times(every) == before, listed.output
+    assert CliRunner().invoke(main, ["clean", "grow.yaml", "--remove"]).exit_code == 0
+    after = grown.times(every)
+    removed = {name.removeprefix("results/grow/") for name in set(before) - set(after)}
+    size = {name for name in removed if "4mm" in name}
+    assert size == {name.removeprefix("results/grow/") for name in before if "4mm" in name} and len(size) == 4
+    assert {name.partition("/")[0] for name in removed - size} <= {"tasks", "done", "logs", "benchmarks"}
+    code, output = grown.snakemake("grow.yaml", "--until", "collect")
+    assert code == 0 and "mesh" not in output and "solve" not in output, output
+    changed = {name for name, time in grown.times(every).items() if after.get(name) != time}
+    assert not {name for name in changed if name.endswith((".h5", ".vtu"))}, changed
 
 
 def test_a_deleted_result_is_made_again(grown):

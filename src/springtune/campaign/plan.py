@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 COSTS_FILE = "costs.json"
 """File beside the studies' folders: what tasks cost on this machine."""
 
+BUNDLES_FILE = "tasks/bundles.json"
+"""File in a study's folder: what each bundle holds."""
+
 
 def stages() -> "tuple[Stage, ...]":
     """Stages of all study kinds.
@@ -68,17 +71,30 @@ def write_tasks(study: "Study", folder: Path, cores: int) -> dict[str, list[str]
     dict of str to list of str
         Labels of the bundles by stage.
     """
-    shared = _bundles(study, folder, cores)
-    labels = {}
+    known, found, wanted = _planned(study, folder, cores)
+    if found != known:
+        atomic.write_json(folder / BUNDLES_FILE, found)
     for stage in stages():
-        contents = {
-            label: stage.content(study, folder, values) for label, values in shared[stage.like or stage.name].items()
-        }
-        wanted = {label: content for label, content in contents.items() if content}
-        labels[stage.name] = list(wanted)
-        for label, content in wanted.items():
+        for label, content in wanted[stage.name].items():
             _write(folder, f"{stage.name}_{label}", content, stage.products(content))
-    return labels
+    return {name: list(contents) for name, contents in wanted.items()}
+
+
+def task_contents(study: "Study", folder: Path) -> dict[str, dict[str, dict[str, Any]]]:
+    """Contents of the task files of a study as its next run has them; nothing is written.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where the study's results are.
+
+    Returns
+    -------
+    dict of str to dict
+        By stage and label of the bundle.
+    """
+    return _planned(study, folder, 1)[2]
 
 
 def _write(folder: Path, name: str, content: dict[str, Any], products: Iterable[Path]) -> None:
@@ -91,15 +107,17 @@ def _write(folder: Path, name: str, content: dict[str, Any], products: Iterable[
         done.unlink()
 
 
-def _bundles(study: "Study", folder: Path, cores: int) -> dict[str, dict[str, list[Any]]]:
-    """Values of the members of each bundle, by stage and label."""
-    notes = folder / "tasks/bundles.json"
+def _planned(
+    study: "Study", folder: Path, cores: int
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, dict[str, Any]]]]:
+    """Bundles as they are noted and as they shall be, and contents of the tasks by stage and label."""
+    notes = folder / BUNDLES_FILE
     known: dict[str, Any] = atomic.read_json(notes) if notes.exists() else {"cores": 0}
     # More cores want more bundles; what is solved stays solved, whichever bundle it is in.
     before: dict[str, Any] = known if known["cores"] >= cores else {"cores": cores}
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
-    found: dict[str, dict[str, list[str]]] = {}
-    shared = {}
+    found: dict[str, Any] = {}
+    shared: dict[str, dict[str, list[Any]]] = {}
     for stage in stages():
         if stage.members is None:  # it works on another one's bundles
             continue
@@ -111,6 +129,8 @@ def _bundles(study: "Study", folder: Path, cores: int) -> dict[str, dict[str, li
             kept = before.get(stage.name, {})
             found[stage.name] = bundles.share_out(seconds, cores, costs.start_up, kept) if members else {}
         shared[stage.name] = {label: [members[name][1] for name in names] for label, names in found[stage.name].items()}
-    if found | {"cores": before["cores"]} != known:
-        atomic.write_json(notes, found | {"cores": before["cores"]})
-    return shared
+    wanted: dict[str, dict[str, dict[str, Any]]] = {}
+    for stage in stages():
+        each = {label: stage.content(study, folder, one) for label, one in shared[stage.like or stage.name].items()}
+        wanted[stage.name] = {label: content for label, content in each.items() if content}
+    return known, found | {"cores": before["cores"]}, wanted

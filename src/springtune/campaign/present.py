@@ -31,7 +31,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[str]:
     list of str
         Stems of the figures and names of the tables written.
     """
-    with xr.open_datatree(dataset, engine="h5netcdf") as tree:
+    with xr.open_datatree(dataset, engine="netcdf4") as tree:
         tree.load()
     made: list[str] = []
     for output in (outputs()[name] for name in names):

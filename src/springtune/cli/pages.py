@@ -62,11 +62,11 @@ def _loaded(path: Path, group: str) -> "xr.DataTree":
     if not path.is_file():
         raise click.ClickException(f"{path}: there is no such dataset; {remedy}")
     try:
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
+        with xr.open_datatree(path, engine="netcdf4") as tree:
             if group not in tree:
                 raise click.ClickException(f"{path}: has no group /{group}; {remedy}")
             return tree.load()
-    except (OSError, ValueError) as error:
+    except (OSError, RuntimeError, ValueError) as error:
         raise click.ClickException(f"{path}: cannot be read ({error}); {remedy}") from None
 
 

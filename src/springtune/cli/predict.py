@@ -179,7 +179,7 @@ def prediction_text(
     -------
     str
     """
-    from ..kinds.scenes.summary import aligned
+    from ..output.text import aligned
     from ..prediction import CASES
 
     young = material.young_modulus

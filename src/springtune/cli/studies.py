@@ -25,7 +25,7 @@ def scenes(config: Path) -> None:
 @click.command()
 def definitions() -> None:
     """List the definitions of spring stiffness."""
-    from ..kinds.scenes.summary import aligned
+    from ..output.text import aligned
     from ..springs import DEFINITIONS
 
     click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))

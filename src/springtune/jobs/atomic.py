@@ -2,8 +2,46 @@
 
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+UNFINISHED = ".unfinished"
+"""Ending of the name of a file that is being written, after its own."""
+
+
+@contextmanager
+def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
+    """Context in which a file is written under another name; it gets its own when all is written.
+
+    Nothing is left of it after an error, and a file of before stays.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folders are made where they are missing.
+    synced : bool, optional
+        Whether the content shall be on the disk, not in its cache, before the file has its name: a machine that loses
+        its power leaves the file of before, or the new one.
+
+    Yields
+    ------
+    Path
+        Where to write.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(path.name + UNFINISHED)
+    try:
+        yield unfinished
+        if synced:
+            with open(unfinished, "rb+") as file:
+                os.fsync(file.fileno())
+        os.replace(unfinished, path)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
@@ -14,11 +52,8 @@ def write_bytes(path: str | Path, content: bytes) -> None:
     path : str or Path
     content : bytes
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".unfinished")
-    unfinished.write_bytes(content)
-    os.replace(unfinished, path)
+    with replacing(path) as unfinished:
+        unfinished.write_bytes(content)
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -1,13 +1,16 @@
 """The dataset of a study: dense labelled arrays, their units, and what is missing and why."""
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+import shutil
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from ..jobs.atomic import replacing
 from ..problem.status import Status
 
 STATUS = tuple(map(str, Status))
@@ -42,12 +45,15 @@ class Group:
         Of dimensions that other groups do not have: what they are, and their unit if they have one.
     flags : dict of str to tuple
         Meanings of flags by the last word of a variable's name, besides those of ``status``.
+    further : dict of str to dict
+        Attributes of variables besides units and long name, by name.
     """
 
     name: str
-    variables: dict[str, tuple[tuple[str, ...], str, str, float | str]]
+    variables: dict[str, tuple[tuple[str, ...], str, str, float | str | np.number[Any]]]
     dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
     flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    further: dict[str, dict[str, object]] = field(default_factory=dict)
 
     def empty(self, axes: Mapping[str, Sequence[Label]], names: Collection[str] | None = None) -> xr.Dataset:
         """Dataset whose cells hold nothing yet.
@@ -74,7 +80,7 @@ class Group:
                 values = values.astype("int8")
                 flags = np.arange(len(meanings), dtype="int8")
                 attributes |= {"flag_values": flags, "flag_meanings": " ".join(meanings)}
-            data[name] = (dimensions, values, attributes)
+            data[name] = (dimensions, values, attributes | self.further.get(name, {}))
             used |= set(dimensions)
         described = DIMENSIONS | self.dimensions
         coordinates = {}
@@ -110,11 +116,11 @@ class Filler:
             array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
 
     def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
-        """Write rows that may be shorter than the last dimension."""
+        """Write rows, or tables, that may be shorter than the dimensions after those of the labels."""
         for name, row in values.items():
             dimensions, array = self._arrays[name]
-            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions[:-1])
-            array[place][: len(row)] = row
+            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
+            array[place][tuple(map(slice, np.shape(row)))] = row
 
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:
@@ -122,6 +128,16 @@ def most_requested(root: xr.Dataset, dimension: str) -> str:
     requested = root.status != 0
     counts = requested.sum([name for name in requested.dims if name != dimension])
     return str(counts[dimension].values[int(counts.values.argmax())])
+
+
+NO_NODE = np.int32(-1)
+"""Of UGRID's connectivities, where a mesh has fewer springs or cells than another one, or a cell fewer corners."""
+
+CHUNK = 2**18
+"""Bytes of a chunk of a compressed array [B], at most: what reading one cell of it reads."""
+
+SMALL = 2**13
+"""Bytes up to which an array is stored as it is [B]: compression would save less than it costs to look up."""
 
 
 def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
@@ -134,17 +150,46 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
         Dataset of each group, ``"/"`` for the root.
     attributes : dict of str to str
         Attributes of the root.
+
+    Raises
+    ------
+    OSError
+        If there is no room for it, or no permission; nothing is left of it then, and a file of before stays.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".unfinished")
     tree = xr.DataTree.from_dict(groups)
-    tree.attrs = attributes
-    encoding = {
-        group: {
-            name: {"zlib": True, "complevel": 4} for name, array in data.items() if array.ndim and array.dtype != object
-        }
-        for group, data in groups.items()
-    }
-    tree.to_netcdf(unfinished, engine="h5netcdf", encoding=encoding)
-    os.replace(unfinished, path)
+    tree.attrs = dict(attributes)
+    # What groups share with the root is written there alone.
+    own = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    encoding = {path: {name: _encoding(data, name) for name in data.variables} for path, data in own.items()}
+    path = Path(path)
+    try:
+        with replacing(path, synced=True) as unfinished:
+            tree.to_netcdf(unfinished, engine="netcdf4", encoding=encoding)
+    except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
+        free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
+        reason = getattr(error, "strerror", None) or error
+        raise OSError(
+            f"{path}: cannot be written ({reason}; {free:.0f} MB are free there); make room, or see to permissions and "
+            "limits, and run the study again: what is solved is stored, and only this file is made anew"
+        ) from None
+
+
+def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
+    """How a variable is stored."""
+    array = data[name]
+    # CF: coordinates have no holes, and so no value that stands for one.
+    found: dict[str, object] = {"_FillValue": None} if name in data.coords else {}
+    if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
+        found = {"_FillValue": NO_NODE}
+    if array.dtype == object or array.nbytes <= SMALL:
+        return found
+    return found | {"zlib": True, "complevel": 4, "chunksizes": _chunk(array.shape, array.dtype.itemsize)}
+
+
+def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
+    """Shape of a chunk: whole last dimensions, and of those before as much as there is room for."""
+    chunk, room = [], CHUNK // itemsize
+    for length in reversed(shape):
+        chunk.append(max(1, min(length, room)))
+        room //= chunk[-1]
+    return tuple(reversed(chunk))

@@ -7,6 +7,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import xarray
 
+    from .dataset import Label
+
+SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
+"""Connectivities of `/fields`."""
+
 
 def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     """Open the dataset of a study.
@@ -49,10 +54,82 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         )
     remedy = "give the dataset.nc of a study, or run the study again"
     try:
-        tree = xarray.open_datatree(file, engine="h5netcdf")
-    except (OSError, ValueError, KeyError) as error:
+        tree = xarray.open_datatree(file, engine="netcdf4")
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
         raise ValueError(f"{file}: cannot be read ({error}); {remedy}") from None
     if "springtune_version" not in tree.attrs:
         tree.close()
         raise ValueError(f"{file}: is not a dataset of springtune; {remedy}")
     return tree
+
+
+def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
+    """Network of one beam and mesh type with its whole fields: an unstructured mesh by the conventions UGRID-1.0.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset with the group ``/fields``.
+    **labels : str or float
+        Label by dimension: ``beam``, ``mesh_type`` and ``mesh_size`` [m] where there are several; and of ``material``,
+        ``load``, ``definition`` and ``kinematics`` those that shall not stay dimensions.
+
+    Returns
+    -------
+    xarray.Dataset
+        In memory, dimensions ``particle``, ``spring`` and ``cell`` as long as the mesh has of each: positions ``x``,
+        ``y`` [m], ``spring_nodes`` and ``cell_nodes`` (particles from 0, -1 where a cell has fewer corners than
+        others), the network's displacements [m], each spring's ``stiffness`` [N/m] and axial ``force`` [N], and the
+        reference's outline.
+
+    Raises
+    ------
+    ValueError
+        If there are no fields, the labels leave a choice of meshes, or a label is not there.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> network = st.field(tree, beam="200x40", mesh_type="free", mesh_size=5e-3, load="traction")
+    >>> network.spring_nodes.values.tolist(), network.mesh.attrs["edge_node_connectivity"]
+    ([[0, 1], [1, 2], [2, 3]], 'spring_nodes')
+    >>> network.displacement_x.dims
+    ('definition', 'material', 'particle')
+
+    It may be written, and opened by what knows such meshes:
+
+    >>> network.to_netcdf("network.nc")
+    """
+    import numpy as np
+
+    from .selection import choose, group
+
+    if "fields" not in data.children:
+        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
+    fields = group(data, "fields")
+    if SPRING_NODES not in fields:
+        raise ValueError(
+            f"group '/fields' has no '{SPRING_NODES}': it was made by an older springtune; run the study again"
+        )
+    meshes = ("beam", "mesh_type", "mesh_size")
+    for name, label in labels.items():
+        if name not in fields.dims or name not in fields.coords:
+            known = ", ".join(str(one) for one in fields.dims if one in fields.coords)
+            raise ValueError(f"there is no dimension '{name}' to choose of; known: {known}")
+        if name not in meshes and label not in fields[name].values.tolist():
+            raise ValueError(
+                f"nothing has {name} {label!r}; there is {', '.join(map(repr, fields[name].values.tolist()))}"
+            )
+    chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
+    found = fields.sel(labels | chosen).load()
+    for name, dimension in (("x", "particle"), (SPRING_NODES, "spring"), (CELL_NODES, "cell")):
+        there = found[name].notnull().values.reshape(found.sizes[dimension], -1).any(axis=1)
+        found = found.isel({dimension: np.flatnonzero(there)})
+    corners = found[CELL_NODES].notnull().any("cell").values
+    found = found.isel(cell_corner=np.flatnonzero(corners))
+    for name in (SPRING_NODES, CELL_NODES):
+        connectivity = found[name].fillna(-1).astype("int32")
+        connectivity.encoding = {"_FillValue": np.int32(-1), "dtype": "int32"}
+        found[name] = connectivity.assign_attrs(fields[name].attrs)
+    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    return found

@@ -5,7 +5,7 @@ import xarray as xr
 
 from ...jobs import atomic, store
 from ...mesh import read_mesh
-from ...output.dataset import Filler
+from ...output.dataset import NO_NODE, Filler
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
 from ...problem.loads import LOADS
@@ -94,7 +94,8 @@ def _bodies(study, root):
         }
         root.put(values, material=material.name)
     for beam in {scene.mesh.beam for scene in study.scenes}:
-        root.put({"beam_length": beam.length, "beam_height": beam.height}, beam=beam.name)
+        body = {"beam_length": beam.length, "beam_height": beam.height, "beam_thickness": beam.thickness}
+        root.put(body, beam=beam.name)
 
 
 def _mesh_labels(mesh):
@@ -149,7 +150,8 @@ def _reference(folder, one, fields=()):
 def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
     calibration = _calibration(folder)
-    arrays = ["face_profile"] * (block is not None) + ["displacements"] * (fields is not None)
+    arrays = ["face_profile"] * (block is not None)
+    arrays += ["displacements", "spring_stiffnesses", "spring_forces"] * (fields is not None)
     for mesh, scenes in plan.by_mesh(study.scenes).items():
         names = [plan.solved_key(study, scene, calibration) for scene in scenes]
         results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), arrays)
@@ -167,7 +169,8 @@ def _scenes(study, folder, root, block, fields, objections):
                 block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **labels)
             if "displacements" in result:
                 x, y = result["displacements"].T
-                fields.put_rows({"displacement_x": x, "displacement_y": y}, **labels)
+                of_springs = {"stiffness": result["spring_stiffnesses"], "force": result["spring_forces"]}
+                fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **labels)
 
 
 def _printed(study, root):
@@ -288,17 +291,23 @@ def _fields(study, folder, axes):
     shown = plan.shown_meshes(study)
     meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
     outlines = {one: _outline(folder, one) for one in study.references}
+    cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {
         "particle": max(len(mesh.points) for mesh in meshes.values()),
         "spring": max(len(mesh.edges) for mesh in meshes.values()),
+        "spring_end": 2,
+        "cell": max(len(corners) for corners in cells.values()),
+        "cell_corner": max(corners.shape[1] for corners in cells.values()),
         "outline_point": max(len(points) for points, _ in outlines.values()),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
     fields = Filler(FIELDS.empty(axes | numbers))
+    fields.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
     for spec, mesh in meshes.items():
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
+        fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
     for one in study.references:
         points, displacements = outlines[one]
         moved = one.force * displacements
@@ -308,6 +317,16 @@ def _fields(study, folder, axes):
             {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
         )
     return fields
+
+
+def _cells(mesh):
+    """Corners of the cells of a mesh, -1 where a cell has fewer than another one, shape (n_cells, n_corners)."""
+    cells = np.full((sum(map(len, mesh.cells.values())), max(mesh.cells)), NO_NODE)
+    start = 0
+    for count, corners in mesh.cells.items():
+        cells[start : start + len(corners), :count] = corners
+        start += len(corners)
+    return cells
 
 
 def _outline(folder, one):

@@ -110,7 +110,7 @@ def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
     calibration : dict, optional
         Calibrated stiffnesses by group.
     keep_fields : bool, optional
-        Whether displacements of all particles are part of the result.
+        Whether displacements of all particles and forces of all springs are part of the result.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
         ``status`` (a `springtune.problem.status.Status`), ``message``, ``displacement`` [m], ``stiffness`` [N/m],
         ``field_error``, ``iterations``, ``residual``, ``negative_pivots``, ``seconds``, those of the definition:
         ``definition_seconds``, ``definition_evaluations``, ``spring_ratio``, and ``displacements`` [m] of the
-        particles where they are kept.
+        particles, ``spring_stiffnesses`` [N/m] and ``spring_forces`` [N] where they are kept.
     """
     begin, derived = time.perf_counter(), sheet.deriving
     try:
@@ -164,7 +164,18 @@ def _solved(sheet, scene, reference, calibration, keep_fields):
         result |= _face(sheet, kind, found.displacements)
     if field is not None:
         result["field_error"] = field_error(sheet.mesh, found.displacements, force * field)
-    return result | ({"displacements": found.displacements} if keep_fields else {})
+    return result | (_fields(springs, solution, kinematics) if keep_fields else {})
+
+
+def _fields(springs, solution, kinematics):
+    """Displacements of the particles [m], stiffness [N/m] and axial force [N] of the springs, these to be looked at."""
+    network, moved = solution.problem.network, solution.equilibrium.displacements
+    forces = springs.reference * network.spring_forces(moved, kinematics == "linear")
+    return {
+        "displacements": moved,
+        "spring_stiffnesses": (springs.reference * springs.relative).astype("float32"),
+        "spring_forces": forces.astype("float32"),
+    }
 
 
 def _face(sheet, kind, displacements):

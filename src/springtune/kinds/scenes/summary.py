@@ -1,7 +1,6 @@
 """What a study asks for, before anything runs."""
 
-from collections.abc import Collection, Iterable
-
+from ...output.text import aligned
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem
 from ...springs import DEFINITIONS
@@ -82,16 +81,3 @@ def _contributions(study: Study) -> list[list[object]]:
     if extra:
         rows.append(["(calibration)", "", "", "", "", len(extra)])
     return rows
-
-
-def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
-    """Rows in columns, those in `right` flush right."""
-    texts = [[str(cell) for cell in row] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*texts)]
-    lines = []
-    for row in texts:
-        cells = [
-            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
-        ]
-        lines.append((" " * left + "  ".join(cells)).rstrip())
-    return "\n".join(lines)

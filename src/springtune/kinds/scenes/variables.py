@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...output.dataset import Group
+from ...output.dataset import NO_NODE, Group
 
 SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
 MESH = ("beam", "mesh_type", "mesh_size")
@@ -43,6 +43,7 @@ ROOT = Group(
         "material_poisson_ratio": (("material",), "1", "Poisson's ratio", np.nan),
         "beam_length": (("beam",), "m", "length of the beam", np.nan),
         "beam_height": (("beam",), "m", "height of the beam", np.nan),
+        "beam_thickness": (("beam",), "m", "thickness of the beam", np.nan),
         "material_density": (("material",), "kg/m3", "density", np.nan),
         "force": (REFERENCE, "N", "force on the loaded side, tension positive", np.nan),
         "reference_displacement": (
@@ -174,19 +175,51 @@ BLOCK = Group(
 FIELD = (*SCENE, "particle")
 OUTLINE = ("beam", "material", "load", "outline_point")
 
+SPRING = (*SCENE, "spring")
+
 FIELDS = Group(
     "/fields",
     {
+        "mesh": ((), "1", "topology of a network, of one beam, mesh type and mesh size", np.int32(0)),
         "x": ((*MESH, "particle"), "m", "position at rest along x", np.nan),
         "y": ((*MESH, "particle"), "m", "position at rest along y", np.nan),
+        "spring_nodes": ((*MESH, "spring", "spring_end"), "1", "particles at the ends of a spring", NO_NODE),
+        "cell_nodes": ((*MESH, "cell", "cell_corner"), "1", "particles at the corners of a cell", NO_NODE),
         "spring_first": ((*MESH, "spring"), "1", "particle at the first end", np.nan),
         "spring_second": ((*MESH, "spring"), "1", "particle at the second end", np.nan),
         "displacement_x": (FIELD, "m", "displacement along x, network", np.nan),
         "displacement_y": (FIELD, "m", "displacement along y, network", np.nan),
+        "stiffness": (SPRING, "N/m", "stiffness of each spring", np.float32(np.nan)),
+        "force": (
+            SPRING,
+            "N",
+            "axial force of each spring, tension positive, energies' part left out",
+            np.float32(np.nan),
+        ),
         "outline_x": (("beam", "outline_point"), "m", "position at rest along x, reference", np.nan),
         "outline_y": (("beam", "outline_point"), "m", "position at rest along y, reference", np.nan),
         "reference_displacement_x": (OUTLINE, "m", "displacement along x, reference", np.nan),
         "reference_displacement_y": (OUTLINE, "m", "displacement along y, reference", np.nan),
     },
+    further={
+        "mesh": {
+            "cf_role": "mesh_topology",
+            "topology_dimension": np.int32(2),
+            "node_coordinates": "x y",
+            "edge_node_connectivity": "spring_nodes",
+            "face_node_connectivity": "cell_nodes",
+            "node_dimension": "particle",
+            "edge_dimension": "spring",
+            "face_dimension": "cell",
+        },
+        "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
+        "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+        **{name: {"mesh": "mesh", "location": "node"} for name in ("displacement_x", "displacement_y")},
+        **{name: {"mesh": "mesh", "location": "edge"} for name in ("stiffness", "force")},
+    },
 )
-"""Whole fields, of each beam's and mesh type's coarsest mesh: they are there to be looked at."""
+"""Whole fields, of each beam's and mesh type's coarsest mesh: they are there to be looked at.
+
+Each mesh is one by the conventions UGRID-1.0, once it is selected and what its arrays have too much is left out, as
+`springtune.output.reading.field` does. Forces and stiffnesses have seven digits.
+"""

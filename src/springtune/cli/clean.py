@@ -1,0 +1,104 @@
+"""What studies no longer ask for: listed, and removed on request."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
+LISTED = 12
+"""Files of a folder that are listed by name."""
+
+
+@click.command()
+@click.argument("study", required=False, type=click.Path(path_type=Path))
+@click.option("--remove", is_flag=True, help="Remove what is listed.")
+def clean(study: Path | None, remove: bool) -> None:
+    """List what lies in results/<study> and the study no longer asks for; nothing else is touched.
+
+    STUDY is its YAML file, or results/<study>; without it, all folders in results. Figures and tables of values that
+    were taken out, their meshes and stored results, files of jobs that are no more, and what a run that was stopped
+    left unfinished. Results that an edit of the code made stale are among them.
+    """
+    from ..campaign.orphans import orphans
+    from ..study import StudyError
+
+    try:
+        chosen = list(_studies(study))
+        found = {folder: orphans(one, folder) for one, folder in chosen}
+    except StudyError as error:
+        raise click.ClickException(f"{error}; nothing is listed or removed") from None
+    for folder in found if remove else ():
+        _idle(folder)
+    total, count = 0, 0
+    for folder, paths in found.items():
+        size = sum(path.stat().st_size for path in paths)
+        total, count = total + size, count + len(paths)
+        click.echo(f"{folder}: {len(paths)} files, {_size(size)}" if paths else f"{folder}: nothing to remove")
+        by_folder = defaultdict(list)
+        for path in paths:
+            by_folder[path.parent].append(path)
+        for parent, members in by_folder.items():
+            for path in members[:LISTED]:
+                click.echo(f"  {path.relative_to(folder)}  {_size(path.stat().st_size)}")
+            if len(members) > LISTED:
+                click.echo(f"  {parent.relative_to(folder)}: and {len(members) - LISTED} more")
+    if not remove:
+        if count:
+            again = " ".join(["springtune clean", *([str(study)] if study else []), "--remove"])
+            click.echo(f"{count} files, {_size(total)}; `{again}` removes them")
+        return
+    for folder, paths in found.items():
+        for path in paths:
+            path.unlink(missing_ok=True)
+        for parent in {path.parent for path in paths} - {folder}:
+            if not any(parent.iterdir()):
+                parent.rmdir()
+    click.echo(f"removed {count} files, {_size(total)}")
+
+
+def _studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
+    """Studies with the folders of their results."""
+    from ..kinds import load_study
+
+    if given is not None and not given.is_dir():
+        study = load_study(given)
+        folder = RESULTS_FOLDER / study.name
+        if not folder.is_dir():
+            raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
+        yield study, folder
+        return
+    if given is None and not RESULTS_FOLDER.is_dir():
+        raise click.ClickException(f"{RESULTS_FOLDER}: there is no such folder; go to where studies were run")
+    folders = [given] if given else sorted(path for path in RESULTS_FOLDER.iterdir() if path.is_dir())
+    for folder in folders:
+        config = folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
+        if config.is_file():
+            yield load_study(config), folder
+        elif given:
+            raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
+        else:
+            click.echo(f"{folder}: left alone, there is no {config}; give the study's YAML file, or remove it by hand")
+
+
+def _idle(folder: Path) -> None:
+    """Refuse to remove anything under a run; those of a folder's study leave their locks beside `results`."""
+    locks = folder.parent.parent / ".snakemake/locks"
+    if locks.is_dir() and any(locks.iterdir()):
+        raise click.ClickException(
+            f"{locks}: a run is under way, nothing is removed; wait for its end, or, if it was stopped, call "
+            "`snakemake --unlock`"
+        )
+
+
+def _size(number: float) -> str:
+    for unit in ("B", "kB", "MB"):
+        if number < 1000:
+            return f"{number:.3g} {unit}"
+        number /= 1000
+    return f"{number:.3g} GB"

@@ -1,0 +1,31 @@
+"""A dataset in other forms."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path))
+@click.option(
+    "--to", "target", required=True, type=click.Path(path_type=Path), help="File: .csv, .parquet, .zarr or .nc."
+)
+@click.option("--group", default="/", show_default=True, help="Group of the table, such as sensitivity.")
+@click.option("--variables", default="", help="Names of variables, with commas between; all without.")
+@click.option("--select", "pairs", multiple=True, help="Labels to keep, such as beam=200x40,mesh_size='5 mm'.")
+@click.option("--force", is_flag=True, help="Replace the file if it is there.")
+def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[str, ...], force: bool) -> None:
+    """Write a dataset as a long table, one row a cell (CSV, Parquet), whole (Zarr), or one mesh with its fields (.nc).
+
+    PATH is results/<study>, or its dataset.nc.
+    """
+    from ..output import reading
+    from ..output.export import export as write
+    from ..output.export import selected
+
+    names = [name.strip() for name in variables.split(",") if name.strip()]
+    try:
+        with reading.open(path) as tree:
+            click.echo(write(tree, target, group, names, selected(pairs), force))
+    except (OSError, ValueError) as error:
+        raise click.ClickException(str(error)) from None

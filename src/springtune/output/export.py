@@ -1,0 +1,396 @@
+"""A dataset in other forms: a long table of one group, or the whole tree for a store of chunks."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import shutil
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from ..jobs.atomic import UNFINISHED, replacing, write_bytes, write_text
+from ..problem.quantities import nearest
+from ..units import QUANTITY_KINDS, UnitError, parse
+from . import reading
+
+EXTRA = "install what is missing with `pip install springtune[export]`"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a long table.
+
+    Attributes
+    ----------
+    name : str
+        Of the variable or dimension.
+    units : str
+        ``"1"`` where it has none.
+    long_name : str
+    values : ndarray, shape (n_rows,)
+    """
+
+    name: str
+    units: str
+    long_name: str
+    values: np.ndarray
+
+    @property
+    def title(self) -> str:
+        """Name with its unit, where it has one."""
+        return self.name if self.units in ("", "1") else f"{self.name} [{self.units}]"
+
+
+def table(
+    tree: xr.DataTree,
+    group: str = "/",
+    variables: Sequence[str] = (),
+    selection: Mapping[str, Sequence[str]] | None = None,
+) -> list[Column]:
+    """Long table of a group: one row a cell that was asked for, one column a dimension or variable.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+    group : str, optional
+        Its name; the root without.
+    variables : sequence of str, optional
+        Names of variables; without, all whose dimensions the cells have.
+    selection : mapping of str to sequence of str, optional
+        Labels to keep by dimension, numbers in SI units or with a unit.
+
+    Returns
+    -------
+    list of Column
+        Flags as words. Cells are those of `status`, where there is one, and rows those that are requested; elsewhere
+        the cells of the variables chosen, and rows those that have a value.
+
+    Raises
+    ------
+    ValueError
+        If there is no such group, variable, dimension or label; the message says what there is.
+
+    Examples
+    --------
+    >>> columns = table(tree, "/", ["deformation_error"], {"beam": ["200x40"], "mesh_size": ["0.005"]})
+    >>> [column.title for column in columns][:4]
+    ['beam', 'mesh_type', 'mesh_size', 'material']
+    >>> len(columns[0].values)
+    48
+    >>> table(tree, "curves")
+    Traceback (most recent call last):
+    ValueError: group 'curves': there is none; known: /, benchmark, block, ...
+    """
+    data = _selected(_group(tree, group), selection or {})
+    for name in variables:
+        if name not in data.data_vars:
+            known = nearest(name, sorted(map(str, data.data_vars)))
+            raise ValueError(f"variable '{name}': group '{group}' has none of that name; {known}")
+    status = data.get("status")
+    if variables:
+        chosen = [data[name] for name in variables]
+        dimensions = _ordered(data, {str(name) for array in chosen for name in array.dims})
+    else:
+        widest = status if status is not None else max(data.data_vars.values(), key=lambda array: array.ndim)
+        dimensions = _ordered(data, set(map(str, widest.dims)))
+        chosen = [array for array in data.data_vars.values() if set(array.dims) <= set(dimensions)]
+    places = np.nonzero(_asked(data, status, chosen, dimensions))
+    columns = []
+    for name, place in zip(dimensions, places):
+        labels = data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[name]))
+        columns.append(_column(name, labels, labels.values[place]))
+    rows = dict(zip(dimensions, places))
+    for array in chosen:
+        values = array.values[tuple(rows[str(name)] for name in array.dims)]
+        columns.append(_column(str(array.name), array, np.broadcast_to(values, len(places[0]) if places else 1)))
+    return columns
+
+
+def _group(tree: xr.DataTree, name: str) -> xr.Dataset:
+    names = {"/": tree} | {node.path[1:]: node for node in tree.subtree if node.path != "/"}
+    wanted = name.strip("/") or "/"
+    if wanted not in names:
+        raise ValueError(f"group '{name}': there is none; {nearest(wanted, ['/', *sorted(set(names) - {'/'})])}")
+    return names[wanted].to_dataset()
+
+
+def _selected(data: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> xr.Dataset:
+    for name, labels in selection.items():
+        if name not in data.dims:
+            raise ValueError(f"--select {name}: no dimension of that name; {nearest(name, map(str, data.dims))}")
+        coordinate = data[name]
+        data = data.isel({name: [_place(name, coordinate, label) for label in labels]})
+    return data
+
+
+def _place(name: str, coordinate: xr.DataArray, label: str) -> int:
+    """Place of a label along its dimension."""
+    known = coordinate.values
+    if known.dtype.kind in "OU":
+        found = np.flatnonzero(known.astype(str) == label)
+        listed = nearest(label, map(str, known))
+    else:
+        found = np.flatnonzero(np.isclose(known, _number(name, coordinate, label), rtol=1e-9, atol=0.0))
+        unit = coordinate.attrs.get("units", "1")
+        listed = f"known: {', '.join(f'{value:g}' for value in known)}" + ("" if unit == "1" else f" {unit}")
+    if not len(found):
+        raise ValueError(f"--select {name}={label}: no such label; {listed}")
+    return int(found[0])
+
+
+def _number(name: str, coordinate: xr.DataArray, label: str) -> float:
+    """Number of a label that may carry a unit."""
+    try:
+        return float(label)
+    except ValueError:
+        pass
+    kinds = [kind.name for kind in QUANTITY_KINDS.values() if kind.unit == coordinate.attrs.get("units")]
+    try:
+        return parse(label, kinds[0]) if kinds else float("nan")
+    except UnitError as error:
+        raise ValueError(f"--select {name}: {error}") from None
+
+
+def _ordered(data: xr.Dataset, names: set[str]) -> list[str]:
+    """Dimensions in the order of the array that has most of them."""
+    arrays = sorted(data.data_vars.values(), key=lambda array: -len(names & set(array.dims)))
+    found = dict.fromkeys(str(name) for array in arrays for name in array.dims if name in names)
+    return list(found)
+
+
+def _asked(
+    data: xr.Dataset, status: xr.DataArray | None, chosen: Sequence[xr.DataArray], dimensions: Sequence[str]
+) -> np.ndarray:
+    """Whether each cell has a row, shape of the dimensions."""
+    shape = [data.sizes[name] for name in dimensions]
+
+    def spread(array: xr.DataArray) -> np.ndarray:
+        kept = array.transpose(*(name for name in dimensions if name in array.dims))
+        places = tuple(slice(None) if name in array.dims else np.newaxis for name in dimensions)
+        return np.broadcast_to(kept.values[places], shape)
+
+    if status is not None and set(status.dims) == set(dimensions):
+        return spread(status) != 0
+    # A number of all cells of a mesh, say, is no reason for a row: those with most dimensions are.
+    most = max((array.ndim for array in chosen), default=0)
+    asked = np.zeros(shape, dtype=bool)
+    for array in (one for one in chosen if one.ndim == most):
+        values = spread(array)
+        asked |= values.astype(str) != "" if values.dtype == object else ~np.isnan(values)
+    if status is not None and set(status.dims) <= set(dimensions):
+        asked &= spread(status) != 0
+    return asked
+
+
+def _column(name: str, array: xr.DataArray, values: np.ndarray) -> Column:
+    meanings = array.attrs.get("flag_meanings")
+    if meanings:
+        words = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), meanings.split()))
+        values = np.array([words.get(value, "") for value in values.tolist()], dtype=object)
+    return Column(name, str(array.attrs.get("units", "1")), str(array.attrs.get("long_name", "")), values)
+
+
+# -- files -------------------------------------------------------------------------------------------------------------
+
+
+def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
+    """Write a long table as CSV, units in the names of the columns, numbers with all their digits.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : sequence of Column
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([column.title for column in columns])
+    # NaN is the one number that is not itself.
+    lists = [["" if value != value else value for value in column.values.tolist()] for column in columns]
+    writer.writerows(zip(*lists))
+    write_text(Path(path), text.getvalue())
+
+
+def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[str, object]) -> None:
+    """Write a long table as Parquet, units and long names with its columns and the dataset's attributes with the table.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : sequence of Column
+    attributes : mapping of str to object
+
+    Raises
+    ------
+    ValueError
+        If what writes it is not installed.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet
+    except ImportError:
+        raise ValueError(f"{path}: Parquet needs pyarrow; {EXTRA}") from None
+    arrays = [pa.array(column.values.tolist(), from_pandas=True) for column in columns]
+    fields = [
+        pa.field(column.name, array.type, metadata={"units": column.units, "long_name": column.long_name})
+        for column, array in zip(columns, arrays)
+    ]
+    schema = pa.schema(fields, metadata={str(name): str(value) for name, value in attributes.items()})
+    sink = pa.BufferOutputStream()
+    pyarrow.parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), sink)
+    write_bytes(Path(path), sink.getvalue().to_pybytes())
+
+
+def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
+    """Write a whole dataset as a Zarr store, a folder; it appears whole or not at all, in the place of one of before.
+
+    Parameters
+    ----------
+    path : str or Path
+    tree : xarray.DataTree
+
+    Raises
+    ------
+    ValueError
+        If what writes it is not installed.
+    """
+    try:
+        import zarr  # noqa: F401
+    except ImportError:
+        raise ValueError(f"{path}: Zarr needs zarr; {EXTRA}") from None
+    path = Path(path)
+    unfinished = path.with_name(path.name + UNFINISHED)
+    shutil.rmtree(unfinished, ignore_errors=True)
+    tree = tree.load()
+    for node in tree.subtree:
+        for variable in node.variables.values():
+            variable.encoding = {}  # HDF5's
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what of Zarr may still change
+            tree.to_zarr(unfinished, zarr_format=2, consolidated=True, mode="w")
+        if path.exists():
+            shutil.rmtree(path)
+        os.replace(unfinished, path)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+EXPORTS = (".csv", ".parquet", ".zarr", ".nc")
+"""Endings of the names of files to export to."""
+
+
+def export(
+    tree: xr.DataTree,
+    path: str | os.PathLike[str],
+    group: str = "/",
+    variables: Sequence[str] = (),
+    selection: Mapping[str, Sequence[str]] | None = None,
+    force: bool = False,
+) -> str:
+    """Write a dataset in the format that the ending of a file says.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+    path : str or Path
+        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh.
+    group, variables, selection
+        As of `table`; a Zarr store has the whole tree.
+    force : bool, optional
+        Whether what is there may be replaced.
+
+    Returns
+    -------
+    str
+        What was written.
+
+    Raises
+    ------
+    ValueError
+        As of `table`, and if the format is unknown, the file is there or what writes it is not installed.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in EXPORTS:
+        raise ValueError(f"{path}: '{ending}' is no format to export to; give a file ending in {', '.join(EXPORTS)}")
+    if path.exists() and not force:
+        raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
+    if ending == ".nc":
+        return _mesh(tree, path, group, variables, selection or {})
+    if ending == ".zarr":
+        if group.strip("/") or variables or selection:
+            raise ValueError(
+                f"{path}: Zarr takes the whole dataset; leave --group, --variables and --select out, or export a table"
+            )
+        if path.exists() and not any((path / name).exists() for name in (".zgroup", "zarr.json")):
+            raise ValueError(f"{path}: is there and no Zarr store; give another name")
+        write_zarr(path, tree)
+        return f"{path}: the whole dataset, {len(list(tree.subtree))} groups"
+    columns = table(tree, group, variables, selection)
+    if ending == ".csv":
+        write_csv(path, columns)
+    else:
+        attributes: dict[str, object] = {
+            str(name): value for name, value in tree.attrs.items() if isinstance(value, str)
+        }
+        write_parquet(path, columns, attributes | {"springtune_group": "/" + group.strip("/")})
+    return f"{path}: {len(columns[0].values) if columns else 0} rows, {len(columns)} columns of group '{group}'"
+
+
+def _mesh(
+    tree: xr.DataTree, path: Path, group: str, variables: Sequence[str], selection: Mapping[str, Sequence[str]]
+) -> str:
+    """Write one network of the group of fields."""
+    if group.strip("/") != "fields" or variables:
+        raise ValueError(
+            f"{path}: NetCDF takes one network with its fields; give --group fields and such as "
+            "--select beam=200x40,mesh_type=free, or export a table"
+        )
+    fields, labels = _group(tree, group), {}
+    for name, given in selection.items():
+        chosen = _selected(fields, {name: given})[name].values.tolist()
+        if len(chosen) > 1:
+            raise ValueError(f"--select {name}: {len(chosen)} labels; give one, or export a table")
+        labels[name] = chosen[0]
+    found = reading.field(tree, **labels)
+    with replacing(path) as unfinished:
+        found.to_netcdf(unfinished, engine="netcdf4")
+    sizes = found.sizes
+    return f"{path}: {sizes['particle']} particles, {sizes['spring']} springs, {sizes['cell']} cells, as UGRID has them"
+
+
+def selected(text: Sequence[str]) -> dict[str, list[str]]:
+    """Labels by dimension, of texts such as ``beam=200x40,load=traction``.
+
+    Parameters
+    ----------
+    text : sequence of str
+        Several labels of a dimension are several pairs.
+
+    Returns
+    -------
+    dict of str to list of str
+
+    Raises
+    ------
+    ValueError
+        If a pair has no ``=``.
+
+    Examples
+    --------
+    >>> selected(["beam=200x40,mesh_size=5 mm", "beam=100x20"])
+    {'beam': ['200x40', '100x20'], 'mesh_size': ['5 mm']}
+    """
+    found: dict[str, list[str]] = {}
+    for pair in (pair.strip() for one in text for pair in one.split(",")):
+        name, equals, label = pair.partition("=")
+        if not (name and equals and label):
+            raise ValueError(f"--select: '{pair}' is no dimension=label; give such as beam=200x40,mesh_size=5 mm")
+        found.setdefault(name.strip(), []).append(label.strip())
+    return found

@@ -1,0 +1,311 @@
+"""What is told of a dataset, what it is exported to, and what studies leave behind."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.campaign.orphans import orphans
+from springtune.cli import main
+from springtune.kinds import load_study
+from springtune.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
+from springtune.output import dataset
+
+AXES = {
+    "beam": ("200x40", "100x20"),
+    "mesh_type": ("structured", "free"),
+    "mesh_size": (2e-3, 5e-3),
+    "material": ("steel",),
+    "load": ("traction", "bending"),
+    "definition": ("lattice", "patch"),
+    "kinematics": ("linear",),
+    "stiffness_ratio": (0.5, 1.0, 1.5),
+}
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def refused(result, *said):
+    assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1, result.stderr
+    for one in said:
+        assert one in result.stderr
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """Dataset of 8 scenes of one beam: six solved, one failed, one not converged; and of two curves."""
+    root = ROOT.empty(AXES)
+    place = {"beam": "200x40", "mesh_size": 5e-3}
+    for name, value in (("status", 1), ("deformation_error", 0.01), ("displacement", 1e-3), ("solver", "Cholesky")):
+        root[name].loc[place] = value
+    root["particles"].loc[place] = 100
+    root["beam_length"].values[:] = [0.2, 0.1]
+    for mesh_type, status, message in (("free", 3, "last residual 2.5e-01"), ("structured", 5, "springs gone")):
+        cell = place | {"mesh_type": mesh_type, "load": "bending", "definition": "patch"}
+        root["status"].loc[cell], root["message"].loc[cell] = status, message
+        root["deformation_error"].loc[cell] = root["displacement"].loc[cell] = np.nan
+    worst = place | {"mesh_type": "free", "load": "traction", "definition": "lattice"}
+    root["deformation_error"].loc[worst] = -0.2
+    curves = SENSITIVITY.empty(AXES)
+    place = {"beam": "200x40", "mesh_size": 5e-3, "load": "traction"}
+    curves["status"].loc[place], curves["displacement"].loc[place] = 1, 1.0
+    curves["best_stiffness"].loc[place] = 170e6
+    folder = tmp_path_factory.mktemp("results") / "small"
+    attributes = {"title": "A small one", "study": "small", "springtune_version": st.__version__}
+    attributes |= {"git_commit": "f00d+changes", "git_diff": "diff --git a/b a/b\n-1\n+2\n", "host": "here"}
+    attributes |= {"inputs": json.dumps({"config/small.yaml": "5" * 64}), "software": json.dumps({"numpy": "2.0"})}
+    dataset.write(folder / "dataset.nc", {"/": root, "/sensitivity": curves}, attributes)
+    return folder
+
+
+class TestInfo:
+    def test_tells_how_it_ended_and_where_it_comes_from(self, path):
+        result = run("info", path)
+        assert result.exit_code == 0, result.output
+        lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
+        assert lines[0] == "A small one" and lines[1].startswith(f"study small: {path}/dataset.nc, ")
+        for line in (
+            "scenes: 8 asked, 6 solved, 1 not_converged, 1 failed",
+            "1 not_converged: last residual 2.5e-01",
+            "1 failed: springs gone",
+            "/sensitivity: 6 asked, 6 solved",
+            "lattice 4 1 % -20 % 200x40 free 5mm steel traction",
+            "patch 2 1 % +1 % 200x40 structured 5mm steel traction",
+            "commit f00d+changes, 1 changed files in git_diff",
+            "numpy 2.0",
+            "on here",
+            f"sha256 {'5' * 64} config/small.yaml",
+        ):
+            assert line in lines, line
+        assert any(line.startswith("/sensitivity 10 beam 2, mesh_type 2") for line in lines)
+
+    def test_a_dataset_of_all_kinds_is_told(self, tmp_path):
+        from synthetic import dataset as every
+
+        tree = every()
+        tree.attrs = {"springtune_version": "0"}
+        tree.to_netcdf(tmp_path / "dataset.nc", engine="netcdf4")
+        result = run("info", tmp_path)
+        assert result.exit_code == 0 and "  /benchmark " in result.stdout
+
+    def test_what_is_no_dataset_is_told_in_one_line(self, tmp_path):
+        refused(run("info", tmp_path / "none"), "there is no such dataset")
+        (tmp_path / "text.nc").write_text("text")
+        refused(run("info", tmp_path / "text.nc"), "cannot be read")
+
+    def test_nothing_heavy_is_imported(self, path):
+        code = "import sys; from springtune.cli import main; main(standalone_mode=False); "
+        code += (
+            "print([m for m in ('scipy.sparse', 'matplotlib', 'bokeh', 'pydantic', 'snakemake') if m in sys.modules])"
+        )
+        done = subprocess.run([sys.executable, "-c", code, "info", path], capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == "[]"
+
+
+class TestExport:
+    def test_one_row_a_cell_that_was_asked_for(self, path, tmp_path):
+        assert run("export", path, "--to", tmp_path / "cells.csv").exit_code == 0
+        rows = list(csv.DictReader((tmp_path / "cells.csv").read_text().splitlines()))
+        assert len(rows) == 8
+        assert {row["status"] for row in rows} == {"solved", "not_converged", "failed"}
+        first = rows[0]
+        assert (first["beam"], first["mesh_size [m]"], first["displacement [m]"]) == ("200x40", "0.005", "0.001")
+        assert first["particles"] == "100.0" and first["beam_length [m]"] == "0.2" and first["stiffness [N/m]"] == ""
+        failed = next(row for row in rows if row["status"] == "failed")
+        assert failed["displacement [m]"] == "" and failed["message"] == "springs gone"
+
+    def test_chosen_variables_of_a_group_and_labels_with_units(self, path, tmp_path):
+        choice = ("--group", "sensitivity", "--variables", "displacement,best_stiffness")
+        choice += ("--select", "mesh_type=free,mesh_size=5 mm", "--select", "beam=200x40")
+        assert run("export", path, "--to", tmp_path / "curves.csv", *choice).exit_code == 0
+        rows = list(csv.DictReader((tmp_path / "curves.csv").read_text().splitlines()))
+        assert [row["stiffness_ratio"] for row in rows] == ["0.5", "1.0", "1.5"]
+        assert {row["best_stiffness [N/m]"] for row in rows} == {"170000000.0"}
+        assert list(rows[0])[-2:] == ["displacement [m]", "best_stiffness [N/m]"]
+
+    def test_parquet_has_units_with_its_columns(self, path, tmp_path):
+        import pyarrow.parquet
+
+        assert run("export", path, "--to", tmp_path / "cells.parquet").exit_code == 0
+        table = pyarrow.parquet.read_table(tmp_path / "cells.parquet")
+        assert table.num_rows == 8 and table.schema.metadata[b"title"] == b"A small one"
+        assert table.schema.field("displacement").metadata[b"units"] == b"m"
+        assert table.column("displacement").null_count == 2  # no numbers are no NaN
+        assert set(table.column("status").to_pylist()) == {"solved", "not_converged", "failed"}
+
+    def test_zarr_is_the_whole_dataset(self, path, tmp_path):
+        store = tmp_path / "all.zarr"
+        assert run("export", path, "--to", store).exit_code == 0
+        refused(run("export", path, "--to", store), "is there already", "--force")
+        assert run("export", path, "--to", store, "--force").exit_code == 0
+        with st.open(path) as ours, xr.open_datatree(store, engine="zarr", consolidated=True) as theirs:
+            xr.testing.assert_equal(ours.load(), theirs.load())
+            assert theirs.attrs["title"] == "A small one" and theirs.displacement.attrs["units"] == "m"
+        assert os.listdir(tmp_path) == ["all.zarr"]
+
+    def test_a_folder_that_is_no_store_is_never_replaced(self, path, tmp_path):
+        (tmp_path / "mine.zarr").mkdir()
+        (tmp_path / "mine.zarr/thesis.txt").write_text("all of it")
+        refused(run("export", path, "--to", tmp_path / "mine.zarr", "--force"), "no Zarr store")
+        assert (tmp_path / "mine.zarr/thesis.txt").exists()
+
+    def test_one_network_is_written_as_a_mesh(self, tmp_path):
+        axes = AXES | {name: tuple(range(3)) for name in ("particle", "spring", "cell_corner", "outline_point")}
+        fields = FIELDS.empty(axes | {"spring_end": (0, 1), "cell": (0,)})
+        place = {"beam": "200x40", "mesh_type": "free", "mesh_size": 5e-3}
+        fields["x"].loc[place], fields["y"].loc[place] = [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
+        fields["spring_nodes"].loc[place] = np.array([[0, 1], [0, 2], [1, 2]])
+        fields["cell_nodes"].loc[place] = np.array([[0, 1, 2]])
+        dataset.write(tmp_path / "dataset.nc", {"/": ROOT.empty(AXES), "/fields": fields}, {"springtune_version": "0"})
+        result = run("export", tmp_path, "--to", tmp_path / "net.nc", "--group", "fields", "--select", "load=bending")
+        assert result.exit_code == 0, result.stderr
+        with xr.open_dataset(tmp_path / "net.nc", decode_cf=False) as net:
+            assert net.mesh.attrs["cf_role"] == "mesh_topology" and "UGRID-1.0" in net.attrs["Conventions"]
+            assert net.cell_nodes.values.tolist() == [[0, 1, 2]] and net.cell_nodes.attrs["start_index"] == 0
+            assert net.cell_nodes.dtype == np.int32 and net.displacement_x.dims[-1] == "particle"
+            assert "load" not in net.displacement_x.dims
+        refused(run("export", tmp_path, "--to", tmp_path / "no.nc"), "--group fields")
+
+    @pytest.mark.parametrize(
+        ("arguments", "said"),
+        [
+            (("--to", "x.xlsx"), ("'.xlsx' is no format", ".csv, .parquet, .zarr")),
+            (("--to", "x.csv", "--group", "sensitivty"), ("group 'sensitivty'", "did you mean 'sensitivity'?")),
+            (("--to", "x.csv", "--variables", "displacment"), ("variable 'displacment'", "'displacement'?")),
+            (("--to", "x.csv", "--select", "beam=20x40"), ("beam=20x40: no such label", "known: 200x40, 100x20")),
+            (
+                ("--to", "x.csv", "--select", "mesh_size=3 mm"),
+                ("mesh_size=3 mm: no such label; known: 0.002, 0.005 m",),
+            ),
+            (("--to", "x.csv", "--select", "mesh_size=3 kN"), ("'3 kN' is a force; give a length",)),
+            (("--to", "x.csv", "--select", "bean=a"), ("--select bean: no dimension", "did you mean 'beam'?")),
+            (("--to", "x.csv", "--select", "beam"), ("'beam' is no dimension=label",)),
+            (("--to", "x.zarr", "--variables", "status"), ("Zarr takes the whole dataset",)),
+            (("--to", "nowhere/deeper/x.csv", "--group", "none"), ("group 'none'",)),
+        ],
+    )
+    def test_refusals_name_what_there_is_and_leave_nothing(self, path, tmp_path, monkeypatch, arguments, said):
+        monkeypatch.chdir(tmp_path)
+        refused(run("export", path, *arguments), *said)
+        assert not os.listdir(tmp_path)
+
+    @pytest.mark.parametrize(("name", "ending"), [("pyarrow", "parquet"), ("zarr", "zarr")])
+    def test_what_is_not_installed_is_told_with_the_extra(self, path, tmp_path, monkeypatch, name, ending):
+        monkeypatch.setitem(sys.modules, name, None)
+        refused(run("export", path, "--to", tmp_path / f"x.{ending}"), name, "pip install springtune[export]")
+        assert not os.listdir(tmp_path)
+
+
+class TestField:
+    def test_refusals_say_what_there_is(self, path):
+        from synthetic import dataset as every
+
+        tree = every()
+        with pytest.raises(ValueError, match="choose one mesh_size"):
+            st.field(tree, beam="200x40", mesh_type="free")
+        with pytest.raises(ValueError, match="nothing has beam '1x1'; there is '100x20', '200x40'"):
+            st.field(tree, beam="1x1", mesh_type="free", mesh_size=5e-3)
+        with pytest.raises(ValueError, match="nothing has load 'none'; there is 'traction'"):
+            st.field(tree, beam="200x40", mesh_type="free", mesh_size=5e-3, load="none")
+        with pytest.raises(ValueError, match="no dimension 'particle' to choose of|no dimension 'loads'"):
+            st.field(tree, loads="none")
+        with st.open(path) as without, pytest.raises(ValueError, match="no group '/fields'; add 'deformed'"):
+            st.field(without)
+
+
+STUDY = """
+title: Two sizes
+beams: {b: {length: 20 mm, height: 10 mm}}
+materials: {m: {young_modulus: 1 GPa, poisson_ratio: 0.3}}
+grids:
+  g: {beam: b, mesh_type: right, mesh_size: [5 mm, SIZE], material: m, load: LOAD, force: 1 N, definition: lattice,
+      sensitivity: false}
+outputs: [size, tables]
+"""
+
+
+class TestClean:
+    @pytest.fixture
+    def left(self, tmp_path, monkeypatch):
+        """Folder of a study from which values were taken out, and what else may lie there."""
+        monkeypatch.chdir(tmp_path)
+        Path("config").mkdir()
+        Path("config/two.yaml").write_text(STUDY.replace("SIZE", "2.5 mm").replace("LOAD", "[traction, bending]"))
+        files = ["dataset.nc", "browse.html", "meshes/b_right_5mm.vtu", "meshes/b_right_5mm.json", "logs/collect.log",
+                 "solutions/b_right_5mm.h5", "figures/size_right_m_traction.png", "tables/index.html", "notes/mine.txt",
+                 "tasks/bundles.json", "tasks/mesh_0.json", "done/mesh_0.json", "logs/snakemake.log"]  # fmt: skip
+        stale = ["meshes/b_right_2.5mm.vtu", "meshes/b_right_2.5mm.json", "solutions/b_right_2.5mm.h5",
+                 "figures/size_right_m_bending.png", "tables/table_9.csv", "references/0123456789.h5",
+                 "moduli/patch.h5", "tasks/solve_7.json", "logs/solve_7.log", "dataset.nc.unfinished",
+                 "meshes/b_right_5mm.vtu.unfinished.vtu"]  # fmt: skip
+        for name in files + stale:
+            path = Path("results/two") / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text('{"cores": 0}' if name.endswith("bundles.json") else "x" * 100)
+        Path("config/two.yaml").write_text(STUDY.replace("SIZE", "4 mm").replace("LOAD", "traction"))
+        return set(stale)
+
+    @staticmethod
+    def there():
+        return {path.relative_to("results/two").as_posix() for path in Path("results/two").rglob("*") if path.is_file()}
+
+    def test_lists_what_is_not_asked_for_and_removes_nothing(self, left):
+        before = self.there()
+        found = {
+            str(path.relative_to("results/two")) for path in orphans(load_study("config/two.yaml"), Path("results/two"))
+        }
+        assert found == left
+        for given in ([], ["config/two.yaml"], ["results/two"]):
+            result = run("clean", *given)
+            assert result.exit_code == 0, result.stderr
+            assert "results/two: 11 files, 1.1 kB" in result.stdout
+            assert "  solutions/b_right_2.5mm.h5  100 B" in result.stdout
+        assert self.there() == before
+
+    def test_removes_it_on_request_and_nothing_else(self, left):
+        before = self.there()
+        result = run("clean", "config/two.yaml", "--remove")
+        assert result.exit_code == 0 and "removed 11 files, 1.1 kB" in result.stdout
+        assert self.there() == before - left
+        assert not Path("results/two/moduli").exists() and Path("results/two/meshes").exists()
+        assert "results/two: nothing to remove" in run("clean", "results/two").stdout
+
+    def test_links_lead_nowhere(self, left, tmp_path):
+        outside = tmp_path / "elsewhere"
+        outside.mkdir()
+        (outside / "precious.h5").write_text("x")
+        os.symlink(outside, "results/two/linked")
+        os.symlink(outside / "precious.h5", "results/two/curves.h5")
+        assert run("clean", "config/two.yaml", "--remove").exit_code == 0
+        assert (outside / "precious.h5").exists()
+
+    def test_nothing_is_removed_under_a_run_or_with_a_faulty_study(self, left):
+        before = self.there()
+        Path(".snakemake/locks").mkdir(parents=True)
+        Path(".snakemake/locks/0.input.lock").write_text("")
+        refused(run("clean", "config/two.yaml", "--remove"), "a run is under way, nothing is removed")
+        Path("config/two.yaml").write_text("title: none\n")
+        assert run("clean", "config/two.yaml", "--remove").exit_code == 1
+        assert self.there() == before
+
+    def test_a_folder_without_its_study_is_left_alone(self, left):
+        Path("config/two.yaml").unlink()
+        refused(run("clean", "results/two"), "there is no config/two.yaml; give the study's YAML file")
+        result = run("clean", "--remove")
+        assert result.exit_code == 0 and "results/two: left alone" in result.stdout
+
+    def test_where_nothing_was_run_says_so(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        refused(run("clean"), "results: there is no such folder")
+        Path("two.yaml").write_text(STUDY.replace("SIZE", "4 mm").replace("LOAD", "traction"))
+        refused(run("clean", "two.yaml"), "results/two: there is no such folder")
