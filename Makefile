@@ -8,7 +8,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study test slow lint docs lock clean
+.PHONY: study test slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
@@ -31,6 +31,17 @@ lint: $(VENV)/.test
 docs: $(VENV)/.run
 	springtune schema --write
 
+# The pages, the names' docstrings and the examples as a site: build/site/index.html. An example reads the quick study.
+site: $(VENV)/.test results/quick/dataset.nc
+	python -m sphinx -q -W --keep-going -j auto -c docs -d build/doctrees . build/site
+
+results/quick/dataset.nc: | $(VENV)/.run
+	snakemake --configfile config/quick.yaml
+
+# The pictures of the pages, from their studies; the benchmark among them takes minutes.
+pictures: $(VENV)/.run
+	python tools/pictures.py
+
 # Stamps: nothing is installed again until a requirement changes.
 $(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/cholesky.txt pyproject.toml tools/setup.sh
 	sh tools/setup.sh run
@@ -52,4 +63,4 @@ clean:
 	    read -r answer || answer=; \
 	    case "$$answer" in y|Y|yes) ;; *) echo 'Nothing is removed; without the question: make clean YES=1'; exit 1 ;; esac; \
 	fi
-	rm -rf results .snakemake
+	rm -rf build results .snakemake

@@ -3,6 +3,8 @@
 The paper's finite elements give 9.49 mm (its table 1). `patch` derives its springs from one patch test of the mesh.
 """
 
+import matplotlib.pyplot as plt
+
 import springtune as st
 
 
@@ -15,8 +17,10 @@ def main():
     reference = result.reference()
     print(f"network {1e3 * result.displacement:.4f} mm, {result.status} in {result.seconds:.2g} s")
     print(f"reference {1e3 * reference.displacement:.4f} mm: error {100 * result.error:+.2f} %")
+    result.plot()
     return result.displacement
 
 
 if __name__ == "__main__":
     main()
+    plt.show()

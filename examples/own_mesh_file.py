@@ -7,6 +7,7 @@ coupling (`delingette`) are linear triangles, which reproduce that on any mesh.
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import meshio
 import numpy as np
 
@@ -31,11 +32,14 @@ def main():
         graded_mesh(100, 20).write(path)  # in millimetres
         mesh = st.read_mesh(path, beam, unit="1 mm")
     scene = st.Scene(beam, mesh, cork, "traction", "4 N", definition="delingette", kinematics="linear")
-    displacement = scene.solve().displacement
+    result = scene.solve()
     exact = 4 * beam.length / (cork.young_modulus * beam.height * beam.thickness)
-    print(f"{len(mesh.points)} particles: {1e6 * displacement:.6f} um, exact {1e6 * exact:.6f} um")
-    return displacement / exact
+    print(f"{len(mesh.points)} particles: {1e6 * result.displacement:.6f} um, exact {1e6 * exact:.6f} um")
+    plt.triplot(*1e3 * mesh.points.T, mesh.triangles, linewidth=0.8)
+    plt.gca().set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    return result.displacement / exact
 
 
 if __name__ == "__main__":
     main()
+    plt.show()

@@ -4,6 +4,8 @@ Springs on the outline belong to one triangle, not two, and make the beam too st
 sqrt(3)/2 E t, by 1 + sqrt(3)/2 a/H, as the closed form has it. The paper found 170e6 N/m by hand, for all mesh sizes.
 """
 
+import matplotlib.pyplot as plt
+
 import springtune as st
 
 
@@ -16,8 +18,10 @@ def main():
     lowest, highest = 100 * curve.error.min(), 100 * curve.error.max()
     print(f"{len(curve.stiffness)} stiffnesses, errors from {lowest:+.0f} to {highest:+.0f} %")
     print(f"best {curve.best_stiffness / 1e6:.1f}e6 N/m, closed form {curve.predicted_stiffness / 1e6:.1f}e6 N/m")
+    curve.plot()
     return curve.best_stiffness
 
 
 if __name__ == "__main__":
     main()
+    plt.show()

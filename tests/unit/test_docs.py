@@ -1,20 +1,49 @@
-"""The pages: links lead somewhere, and what the README shows is what a reader gets."""
+"""The pages: links lead somewhere, what they tell to type runs, and what they show is what a reader gets."""
 
 import io
 import re
+import shutil
 from contextlib import redirect_stdout
 from pathlib import Path
 
+import matplotlib
 import pytest
+import yaml
 
-from springtune.kinds import load_study
+import springtune as st
+from springtune.kinds import load_study, outputs
+from springtune.mesh import write_mesh
+
+from pages import blocks as blocks_of
+from pages import check_command, follow, typed
+from synthetic import dataset
 
 REPOSITORY = Path(__file__).parents[2]
+SITE = sorted(
+    page
+    for folder in ("docs", "docs/gallery", "docs/reference")
+    for page in (REPOSITORY / folder).glob("*.md")
+    if "```{" in page.read_text()
+)
+"""Pages with directives, of the site alone: other pages do not lead to them. What the site generates has none."""
 PAGES = sorted(
     path
-    for folder in (".", "config", "docs", "examples", "workflow/profiles")
-    for path in (REPOSITORY / folder).glob("*.md")
+    for pattern in (
+        "*.md",
+        "config/*.md",
+        "docs/*.md",
+        "docs/tutorial/*.md",
+        "docs/how-to/*.md",
+        "workflow/profiles/*.md",
+    )
+    for path in REPOSITORY.glob(pattern)
+    if path not in SITE
 )
+
+
+def called(path):
+    """Name of a page in a test's."""
+    return str(path.relative_to(REPOSITORY))
 
 
 def blocks(language):
@@ -29,7 +58,7 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(REPOSITORY)))
+@pytest.mark.parametrize("page", [*PAGES, *SITE], ids=called)
 def test_relative_links_lead_somewhere(page):
     for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if "://" in link:
@@ -79,3 +108,88 @@ def test_study_of_the_readme_is_one(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     assert len(load_study(path).scenes) == 8
+
+
+# -- what pages tell to type -------------------------------------------------------------------------------------------
+
+ELSEWHERE = {REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md", *REPOSITORY.glob("docs/tutorial/*.md")}
+"""Pages that are followed below, by test_places.py and test_recipes.py, and by tests/workflow/test_tutorial.py."""
+
+FOLLOWED = [page for page in PAGES if page not in ELSEWHERE and any(blocks_of(page))]
+
+
+def _of_the_paper(data):
+    """A group with the labels of the paper's study, whose fields are those of the coarsest mesh and of each spring."""
+    data = data.assign_coords(beam=["200x40", "200x30"]) if "beam" in data else data
+    if "displacement_x" not in data:
+        return data
+    return data.assign(x=data.x.where(data.mesh_size == data.mesh_size.max()), force=data.spring_first)
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory):
+    """What a reader has who is past the tutorial: studies, meshes of a mesher, results of two studies."""
+    folder = tmp_path_factory.mktemp("reader")
+    shutil.copytree(REPOSITORY / "config", folder / "config")
+    (folder / "config/meshes").mkdir()
+    for size in (2, 3):
+        mesh = st.make_mesh(st.Beam("60 mm", "12 mm"), "free", f"{size} mm")
+        write_mesh(folder / f"config/meshes/plate_{size}mm.vtu", mesh)
+    mine = dataset()
+    mine["status"].attrs["flag_meanings"] = " ".join(status.name.lower() for status in st.Status)
+    mine["message"] = mine.status.astype(str).where(mine.status > 1, "")
+    mine.attrs = {"springtune_version": st.__version__, "config": (REPOSITORY / "config/quick.yaml").read_text()}
+    paper = mine.map_over_datasets(_of_the_paper)
+    for name, tree in {"mine": mine, "paper": paper}.items():
+        tree.attrs["study"] = name
+        (folder / f"results/{name}").mkdir(parents=True)
+        tree.to_netcdf(folder / f"results/{name}/dataset.nc", engine="h5netcdf")
+    return folder
+
+
+@pytest.mark.parametrize("page", FOLLOWED, ids=called)
+def test_a_page_can_be_followed(page, repository, monkeypatch):
+    from matplotlib import pyplot
+
+    monkeypatch.chdir(repository)
+    with matplotlib.rc_context():
+        pyplot.switch_backend("agg")
+        assert list(follow(page, repository))
+    pyplot.close("all")
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if typed(page)], ids=called)
+def test_commands_are_commands(page, tmp_path):
+    """Of pages as a whole, the commands in running text included; studies of one's own are those of the repository."""
+    shutil.copytree(REPOSITORY / "config", tmp_path / "config")
+    for name in ("mine", "theirs", "coarse_to_fine", "columns"):
+        shutil.copy(tmp_path / "config/quick.yaml", tmp_path / f"config/{name}.yaml")
+    for words in typed(page):
+        check_command(words, tmp_path)
+
+
+# -- the site ----------------------------------------------------------------------------------------------------------
+
+
+def test_every_public_name_is_on_the_site():
+    api = (REPOSITORY / "docs/reference/api.md").read_text()
+    listed = re.findall(r"^   (\w+)$", api, re.MULTILINE) + re.findall(r"\[`([A-Z_]+)`\]", api)
+    assert sorted([*listed, "__version__"]) == sorted(st.__all__)
+
+
+def test_every_module_of_the_rooms_shown_is_on_the_site():
+    text = (REPOSITORY / "docs/reference/library.md").read_text()
+    listed = set(re.findall(r"^   springtune\.(\w+)\.(\w+)$", text, re.MULTILINE))
+    package = Path(st.__file__).parent
+    rooms = {room for room, _ in listed}
+    assert rooms
+    assert listed == {(room, path.stem) for room in rooms for path in (package / room).glob("[a-z]*.py")}
+
+
+def test_every_picture_is_of_a_study():
+    """`make pictures` copies what docs/figures.yaml names, and each of it is a figure that its study makes."""
+    pictures = yaml.safe_load((REPOSITORY / "docs/figures.yaml").read_text())
+    assert set(pictures) == {path.name for path in (REPOSITORY / "docs").glob("*.png")}
+    for picture in pictures.values():
+        study = load_study(REPOSITORY / f"config/{picture['study']}.yaml")
+        assert picture["figure"] in {stem for one in study.outputs for stem in outputs()[one].figures(study)}, picture

@@ -77,7 +77,7 @@ def _remedy(kind: str) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """``did you mean ...? `` if one of the words is near, and all of them.
+    """``did you mean ...?`` if one of the words is near, and all of them.
 
     Parameters
     ----------

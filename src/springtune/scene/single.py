@@ -53,12 +53,6 @@ class Scene:
     sheet : Sheet, optional
         Of another scene of the same mesh and thickness: what the two have in common is then computed once.
 
-    Raises
-    ------
-    ValueError
-        If an argument is unknown or out of its range, or the mesh does not fill the beam; the message says which one
-        and what to give.
-
     Attributes
     ----------
     sheet : Sheet
@@ -71,6 +65,12 @@ class Scene:
     kind : LoadKind
     follower : bool
         Whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
+
+    Raises
+    ------
+    ValueError
+        If an argument is unknown or out of its range, or the mesh does not fill the beam; the message says which one
+        and what to give.
 
     Notes
     -----

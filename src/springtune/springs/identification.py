@@ -1,6 +1,6 @@
 """Stiffness of each spring from displacements that the network is to have: what searches minimise.
 
-A case is a load and the displacements that it should cause. The misfit of a network is
+A case is a load and the displacements that it should cause. The misfit of a network is ::
 
     J = 1/2 sum over cases |u - u*|^2 / |u*|^2
 

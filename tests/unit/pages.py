@@ -1,0 +1,143 @@
+"""Pages as a reader follows them: blocks are run in their order, and what they print is what the page shows."""
+
+import doctest
+import io
+import re
+import shlex
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+from click.testing import CliRunner
+
+from springtune.cli import main
+from springtune.kinds import load_study
+
+REPOSITORY = Path(__file__).parents[2]
+COMMANDS = ("make", "snakemake", "springtune", "python", "cp", ".", "cd", "paraview")
+"""What pages tell readers to type."""
+
+
+class Block(NamedTuple):
+    """A fenced block, and what a block of text after it shows; None where there is none."""
+
+    language: str
+    code: str
+    shown: str | None
+
+
+def blocks(page):
+    """Fenced blocks of a page, in their order."""
+    found = re.findall(r"^```(\w+)\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    for (language, code), after in zip(found, [*found[1:], ("", "")]):
+        if language != "text":
+            yield Block(language, code, after[1] if after[0] == "text" else None)
+
+
+def typed(page):
+    """Commands of a page: in blocks for a shell, and in lines that are indented as such."""
+    text = page.read_text()
+    lines = "".join(re.findall(r"^```sh\n(.*?)^```", text, re.DOTALL | re.MULTILINE)).splitlines()
+    outside = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+    lines += re.findall(rf"^    ((?:{'|'.join(map(re.escape, COMMANDS))}) .*)$", outside, re.MULTILINE)
+    return [shlex.split(line, comments=True) for line in lines if line.strip()]
+
+
+def check_command(words, folder):
+    """Assert that a command is one: its name, its options, and the files that it reads in a folder."""
+    from snakemake.cli import parse_args
+
+    name, *arguments = words
+    assert name in COMMANDS, words
+    if name == "make":
+        targets = re.findall(r"^([\w-]+):", (REPOSITORY / "Makefile").read_text(), re.MULTILINE)
+        assert all(word in targets or word.startswith("STUDY=") for word in arguments), words
+        arguments = ["--configfile", *(word.removeprefix("STUDY=") for word in arguments if "=" in word)]
+    if name in ("make", "snakemake"):
+        _, options = parse_args(arguments if len(arguments) > 1 else [])
+        for study in options.configfile or []:
+            load_study(folder / study)
+    elif name == "python":
+        assert (REPOSITORY / arguments[0]).is_file() or arguments[0] == "-m", words
+    elif name == "springtune":
+        command = main.get_command(None, arguments[0])
+        assert command is not None, words
+        known = {option for parameter in command.params for option in parameter.opts} | {"--help"}
+        assert {word for word in arguments if word.startswith("--")} <= known, words
+
+
+def agree(page, shown, printed):
+    """Assert that what is printed is what the page shows; spaces at ends of lines and ``...`` are free."""
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    assert doctest.OutputChecker().check_output(shown, printed, flags), f"{page.name} shows\n{shown}\nbut\n{printed}"
+
+
+def write_study(text, folder):
+    """Write a study where its first line says, or add its sections to the one that is there; else None."""
+    found = re.match(r"# (added to )?(config/[\w.]+)\n", text)
+    if not found:
+        return None
+    path, study = folder / found[2], yaml.safe_load(text)
+    if found[1]:
+        whole = yaml.safe_load(path.read_text())
+        for key, section in study.items():
+            whole[key] = whole.get(key, {}) | section
+        text = yaml.safe_dump(whole, sort_keys=False)
+    path.write_text(text)
+    return path
+
+
+def patch(text, folder):
+    """Apply a diff of one file whose lines stand in one place, the first that they fit."""
+    header, _, lines = text.partition("\n@@\n")
+    path = folder / header.splitlines()[0].removeprefix("--- ")
+    before, after = ("".join(f"{line[1:]}\n" for line in lines.splitlines() if line[0] in (" ", side)) for side in "-+")
+    assert before in path.read_text(), f"{path.name} has no such lines:\n{before}"
+    path.write_text(path.read_text().replace(before, after, 1))
+
+
+def follow(page, folder, run=None):
+    """Do what a page says, in a folder that has `config/`, and assert that it prints what it shows.
+
+    Python is run, a page in one namespace; studies are written and changed; commands of `springtune` are run, others
+    are checked to be commands.
+
+    Parameters
+    ----------
+    page, folder : Path
+        The folder is the current one.
+    run : callable, optional
+        Given the path of a study whenever the page runs one.
+
+    Yields
+    ------
+    tuple of (Block, str)
+        Each block and what it printed.
+    """
+    names = {"__name__": "page"}
+    for block in blocks(page):
+        printed = ""
+        if block.language == "python":
+            with redirect_stdout(io.StringIO()) as output:
+                exec(compile(block.code, page.name, "exec"), names)
+            printed = output.getvalue()
+        elif block.language == "yaml":
+            assert yaml.safe_load(block.code)
+            write_study(block.code, folder)
+        elif block.language == "diff":
+            patch(block.code, folder)
+        else:
+            assert block.language == "sh", block
+            for line in block.code.splitlines():
+                words = shlex.split(line, comments=True)
+                check_command(words, folder)
+                if words[0] == "springtune" and words[1] != "browse":  # which serves until it is stopped
+                    done = CliRunner().invoke(main, words[1:])
+                    assert done.exit_code == 0, done.output
+                    printed += done.output
+                elif words[:2] == ["make", "study"] and run:
+                    run(words[2].removeprefix("STUDY=") if words[2:] else "config/paper.yaml")
+        if block.shown is not None:
+            agree(page, block.shown, printed)
+        yield block, printed

@@ -1,0 +1,70 @@
+"""The tutorial, as a reader follows it; its first chapter takes the paper's study twice, and is slow."""
+
+import shutil
+
+import matplotlib
+import pytest
+from matplotlib import pyplot
+
+import springtune as st
+from springtune.kinds import load_study
+
+from pages import blocks, follow, patch, write_study
+
+CHAPTERS = ("own-beam", "own-material", "own-mesh-file", "own-definition", "own-figure")
+
+
+@pytest.fixture
+def reader(run, repository, monkeypatch):
+    """A run whose folder has the studies, and is the current one; what chapters declare and draw is put away."""
+    if not (run.folder / "config").exists():
+        shutil.copytree(repository / "config", run.folder / "config")
+    monkeypatch.chdir(run.folder)
+    known = list(st.DEFINITIONS)
+    with matplotlib.rc_context():
+        pyplot.switch_backend("agg")
+        yield run
+    pyplot.close("all")
+    for name in set(st.DEFINITIONS) - set(known):
+        st.DEFINITIONS.discard(name)
+
+
+def test_the_chapters_can_be_followed(reader, repository):
+    """Chapters add to one study, so that one run of what it is in the end serves them all."""
+    pages = [repository / f"docs/tutorial/{name}.md" for name in CHAPTERS]
+    for page in pages:
+        for block in blocks(page):
+            if block.language == "yaml":
+                study = write_study(block.code, reader.folder)
+            elif ".write(" in block.code:
+                exec(block.code, {})  # the mesh file
+    code, output = reader.snakemake("config/mine.yaml")
+    assert code == 0, output
+    study.unlink()
+    steps = [block for page in pages for block, _ in follow(page, reader.folder)]
+    assert sum("make study" in block.code for block in steps) == 3
+    for figure in ("finger.pdf", "shear.pdf"):
+        assert (reader.folder / figure).stat().st_size > 5000
+
+
+def test_the_change_of_the_first_chapter_adds_the_cells_that_it_shows(reader, repository):
+    page = repository / "docs/tutorial/from-clone-to-paper.md"
+    (diff,) = (block for block in blocks(page) if block.language == "diff")
+    before = load_study(reader.folder / "config/paper.yaml")
+    patch(diff.code, reader.folder)
+    after = load_study(reader.folder / "config/paper.yaml")
+    assert set(after.axes["mesh_size"]) - set(before.axes["mesh_size"]) == {3e-3}
+    assert len(after.scenes) == len(before.scenes) + 18
+    shutil.copy(repository / "config/paper.yaml", reader.folder / "config")
+
+
+@pytest.mark.slow
+def test_from_a_clone_to_a_paper(reader, repository):
+    """Both runs are made, and every number that the page shows is theirs."""
+
+    def study(path):
+        code, output = reader.snakemake(path)
+        assert code == 0, output
+
+    steps = list(follow(repository / "docs/tutorial/from-clone-to-paper.md", reader.folder, study))
+    assert sum("make study" in block.code for block, _ in steps) == 2
