@@ -1,5 +1,6 @@
 # make study                             the paper's study: results/paper
 # make study STUDY=config/quick.yaml     another one
+# make report                            the same, and its report: results/paper/report.zip
 # make test                              the tests; `make slow` runs the slow ones, and draws
 #                                        new examples for the others
 # make clean                             removes all results, when you say yes; YES=1 does
@@ -8,10 +9,14 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study test slow lint docs site pictures lock clean
+.PHONY: study report test slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
+
+# One file with the study's results, captions and run times, to be opened without a network.
+report: study
+	snakemake --configfile $(STUDY) --report results/$(basename $(notdir $(STUDY)))/report.zip
 
 # Files in this order, those that take longest first: at the end no core waits for the other.
 test: $(VENV)/.test

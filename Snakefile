@@ -10,12 +10,27 @@ include: "workflow/rules/collect.smk"
 include: "workflow/rules/outputs.smk"
 
 
+report: "workflow/report/study.rst"
+
+
 rule all:
     default_target: True
     message:
-        f"The study is in {RESULTS}: dataset.nc, figures, tables/index.html"
+        f"{RESULTS} is complete"
     input:
         # Stages before the dataset, too: what they store is made again where it is missing.
         DONE,
         rules.collect.output,
         OUTPUTS.values(),
+
+
+onstart:
+    tell_start()
+
+
+onsuccess:
+    tell_end("ending")
+
+
+onerror:
+    tell_end("broken")

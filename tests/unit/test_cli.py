@@ -15,7 +15,7 @@ import yaml
 from click.testing import CliRunner
 
 from springtune import prediction
-from springtune.cli import main
+from springtune.cli import COMMANDS, main
 from springtune.cli.predict import prediction_text
 from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.kinds import kinds, load_study
@@ -36,6 +36,42 @@ def run(*arguments):
 def words(text):
     """Lines of a text with their runs of blanks made one."""
     return [" ".join(line.split()) for line in text.splitlines()]
+
+
+def completed(words, number):
+    """What bash is offered for the last of the words."""
+    environment = {"COMP_WORDS": words, "COMP_CWORD": str(number), "_SPRINGTUNE_COMPLETE": "bash_complete"}
+    result = CliRunner().invoke(main, env=environment, prog_name="springtune")
+    return result.output.splitlines()
+
+
+def test_shells_complete_commands_and_values(monkeypatch):
+    monkeypatch.chdir(CONFIG.parent)
+    assert completed("springtune ", 1) == [f"plain,{name}" for name in COMMANDS]
+    assert completed("springtune scenes config/p", 2) == ["plain,config/paper.yaml"]
+    assert completed("springtune scenes elsewhere/", 2) == ["file,elsewhere/"]
+    assert completed("springtune predict --mesh f", 3) == ["plain,free"]
+    assert completed("springtune predict --mesh my.m", 3) == ["file,my.m"]
+    assert completed("springtune predict --material s", 3) == ["plain,steel"]
+    assert "plain,--beam" in completed("springtune predict --", 2)
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help_has_examples_that_name_real_commands_and_options(command):
+    lines = run(*filter(None, [command]), "--help").stdout.splitlines()
+    examples = [line.split() for line in lines[lines.index("  Examples:") + 1 :]]
+    assert examples
+    for program, name, *arguments in examples:
+        if program == "springtune":
+            assert name in ([command] if command else COMMANDS)
+            known = {option for one in main.get_command(None, name).params for option in one.opts}
+            assert {word for word in arguments if word.startswith("--")} <= known
+
+
+def test_wrong_calls_exit_with_2():
+    assert run("no-such-command").exit_code == 2
+    assert run("predict").exit_code == 2 and "Missing option '--beam'" in run("predict").stderr
+    assert run("scenes", "--no-such-option").exit_code == 2
 
 
 @pytest.mark.parametrize("command", ["which", "stability", "bench"])

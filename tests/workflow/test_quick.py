@@ -6,6 +6,7 @@ import json
 import re
 import runpy
 import shutil
+import zipfile
 
 import meshio
 import numpy as np
@@ -257,9 +258,35 @@ def test_example_reads_the_dataset(run, tree, repository, monkeypatch, tmp_path)
     assert (tmp_path / "curves.png").stat().st_size > 5000
 
 
-def test_second_run_has_nothing_to_do(run, tree):
+def test_second_run_has_nothing_to_do_and_reminds_of_holes(run, tree):
     code, output = run.snakemake("quick.yaml")
     assert code == 0 and "Nothing to be done" in output
+    holes = int((tree["stability"].contrast_status > 1).sum())
+    assert holes and f"Not everything is solved: {holes} of " in output and "results/quick: dataset.nc" in output
+
+
+def test_report_has_the_results_with_captions_labels_and_run_times(run, tree):
+    """Every figure once, every table; nothing is loaded from elsewhere (the template's own links are only shown)."""
+    code, output = run.snakemake("quick.yaml", "--report", run.folder / "report.zip")
+    assert code == 0 and "WARNING" not in output and "(ERROR" not in output, output
+    with zipfile.ZipFile(run.folder / "report.zip") as archive:
+        names = archive.namelist()
+        page = archive.read("report/report.html").decode()
+    results = run.folder / "results/quick"
+    made = [path for path in results.glob("*/*") if path.parent.name in ("figures", "tables") and path.suffix != ".pdf"]
+    held = [name.rpartition("/")[2] for name in names if name.startswith("report/data/")]
+    assert sorted(held) == sorted(["summary.txt", *(path.name for path in made)])
+    assert "Quick study, the smallest beam on two mesh sizes" in page and "Deformation error against mesh size" in page
+    assert '"mesh type": "free"' in page and '"runtime"' in page
+    assert "One of the results of this study" not in page, "an output without a caption of its own"
+    assert not re.search(r'<(script|link|img)[^>]+(src|href)="https?:', page)
+
+
+def test_lint_has_one_remark(run, tree):
+    """What is left is explained in workflow/profiles/README.md: all rules share one locked environment."""
+    _, output = run.snakemake("quick.yaml", "--lint")
+    remarks = {line.strip() for line in output.splitlines() if line.startswith("    * ")}
+    assert remarks == {"* Specify a conda environment or container for each rule.:"}
 
 
 def test_numbers_do_not_depend_on_the_number_of_cores(run, tree, repository):

@@ -56,6 +56,7 @@ def test_only_what_is_new_is_computed(grown):
     run.write("grow.yaml", study("10 mm, 5 mm, 4 mm"))
     code, output = run.snakemake("grow.yaml", "--until", "collect")
     assert code == 0, output
+    assert "solve 2 of 6" in output and "the others were stored before" in output
     after = run.times(stored)
     assert {name: after[name] for name in before} == before
     assert len(after) == 3 * 4
@@ -100,6 +101,9 @@ def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     run.write("heavy.yaml", study("5 mm", "compression", "100 MN"))
     code, output = run.snakemake("heavy.yaml")
     assert code == 0, output
+    # A run that finished with holes says so, by name, at its end.
+    assert "scenes, not converged: 2 of 2\n  small, structured, 5 mm, steel, compression, paper, nonlinear: " in output
+    assert "Not everything is solved: 2 of 2 scenes" in output and "results/heavy: dataset.nc" in output
     root = dataset(run, "heavy").to_dataset()
     assert (root.status == 3).all() and root.displacement.isnull().all() and root.deformation_error.isnull().all()
     assert (root.residual > 1e-10).all()

@@ -11,12 +11,15 @@ rule collect:
             *(made.collect for made in outputs().values() if made.collect and made.name in STUDY.outputs),
         ),
     output:
-        RESULTS / "dataset.nc",
+        dataset=RESULTS / "dataset.nc",
+        summary=report(
+            RESULTS / "summary.txt", caption="../report/summary.rst", category="summary", labels={"name": "summary"}
+        ),
     params:
-        folder=str(RESULTS),
+        folder=lambda wildcards, output: str(Path(output.dataset).parent),
     log:
         RESULTS / "logs/collect.log",
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.campaign.collect {input.config} {params.folder} {output} > {log} 2>&1 && cat {log}"
+        "python -m springtune.campaign.collect {input.config} {params.folder} {output.dataset} > {log} 2>&1"

@@ -2,13 +2,17 @@
 
 import os
 import sys
+import time
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+from snakemake.settings.enums import Quietness
 
 from springtune.campaign import plan
 from springtune.jobs.dependencies import PACKAGE, modules
 from springtune.kinds import KINDS, kinds, load_study, outputs
+from springtune.kinds.base import FORMATS
 from springtune.study import StudyError
 
 # One thread a process: the solvers are sequential, and cores are Snakemake's to share out.
@@ -22,7 +26,7 @@ os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(2**29))
 os.environ.setdefault("MALLOC_TOP_PAD_", str(2**25))
 
 # Jobs run on the Python that runs Snakemake, whether its environment is activated or not.
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+os.environ |= {"PATH": os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])}
 
 
 def chosen_config():
@@ -46,4 +50,68 @@ def loaded_study():
 CONFIG = chosen_config()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
+config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
 BUNDLES = plan.write_tasks(STUDY, RESULTS, workflow.cores or 1)
+SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
+CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
+
+for handler in workflow.logger_manager.get_log_handlers():
+    handler.results = RESULTS  # whose summary to show where nothing is to be done
+
+
+def done(stage):
+    """What all jobs of a stage make when they are done."""
+    return [RESULTS / "done" / f"{stage}_{label}.json" for label in BUNDLES[stage]]
+
+
+def files(one):
+    """Figures and tables of an output."""
+    figures = [
+        shown(one, path, selection) if ending == SHOWN else path
+        for stem, selection in one.figures(STUDY).items()
+        for ending in FORMATS
+        for path in [RESULTS / "figures" / f"{stem}.{ending}"]
+    ]
+    return figures + [shown(one, RESULTS / "tables" / name, {}) for name in plan.table_files(one, STUDY)]
+
+
+def shown(one, path, selection):
+    """A file of an output, in Snakemake's report under what it is, with what it selects."""
+    named = path.stem.removesuffix("_".join(["", *selection.values()])) if selection else path.stem
+    labels = {"name": named.replace("_", " ")}
+    labels |= {dimension.replace("_", " "): str(label) for dimension, label in selection.items()}
+    return report(path, caption=caption(one.name), category=one.name, subcategory=path.parent.name, labels=labels)
+
+
+def caption(name):
+    """Caption of an output, or that of any."""
+    return f"../report/{name if name in CAPTIONS else 'output'}.rst"
+
+
+def code(one):
+    """Modules that an output is made by."""
+    pages = ["campaign.page", *(f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables)] if one.page else []
+    found = modules("campaign.present", *filter(None, (one.module, one.write)), *pages)
+    return [*found, PACKAGE / "output/page.html"] if one.page else list(found)
+
+
+def tell_start():
+    """Say how much there is to do; the progress display reads what each job is expected to take."""
+    from springtune.campaign import workload  # here: only a run needs it
+
+    dag = workflow.dag
+    jobs = [(dag.jobid(job), job.rule.name, job.threads, list(map(str, job.output))) for job in dag.needrun_jobs()]
+    found = workload.loads(STUDY, RESULTS, jobs)
+    cores = workflow.cores or min(workflow.nodes or 1, len(jobs) or 1)  # on a cluster, jobs side by side
+    text = f"{STUDY.name}: {workload.told(found, cores)}"
+    logger.info(text, extra={"quietness": Quietness.PROGRESS, "loads": found, "cores": cores})
+
+
+def tell_end(how):
+    """Say what became of the study, see `springtune.campaign.summary`; `--quiet all` alone keeps it back."""
+    from springtune.campaign import summary  # here: only a run needs it
+
+    names = [f"{stage}_{label}" for stage, labels in BUNDLES.items() for label in labels]
+    since = workflow.start_time.timestamp()
+    text = getattr(summary, how)(STUDY, RESULTS, names, since)
+    logger.info(text, extra={"ends": True})

@@ -2,12 +2,6 @@
 
 import re
 
-
-def done(stage):
-    """What all jobs of a stage make when they are done."""
-    return [RESULTS / "done" / f"{stage}_{label}.json" for label in BUNDLES[stage]]
-
-
 for stage in plan.stages():
 
     rule:

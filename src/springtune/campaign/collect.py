@@ -1,16 +1,15 @@
 """Compare what was solved with its references and gather everything in one dataset."""
 
 import sys
-from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
 import xarray as xr
 
-from ..jobs import bundles
+from ..jobs import atomic, bundles
 from ..kinds import kinds, load_study, outputs
 from ..output import dataset
-from . import provenance
+from . import provenance, summary
 from .plan import COSTS_FILE, usual_costs
 
 
@@ -38,19 +37,8 @@ def run(config: str | Path, folder: str | Path, output: str | Path) -> None:
         dataset.write(output, groups, provenance.attributes(study, config))
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
-    print(*_objected(groups["/"]), sep="", end="")
+    atomic.write_text(Path(output).with_name(summary.FILE), summary.text(groups, study.title))
     bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob("done/*_*.json")), usual_costs())
-
-
-def _objected(root: xr.Dataset) -> Iterator[str]:
-    """Lines on scenes whose errors are missing or not the networks' own."""
-    requested, there = root.status != 0, root.reference_displacement.notnull()
-    for scenes, what in (
-        (requested & ~there, "have no reference and no error"),
-        (requested & there & (root.reference_applies == 0), "are beyond the reference of small strain"),
-    ):
-        if scenes.any():
-            yield f"{int(scenes.sum())} of {int(requested.sum())} scenes {what}: `message` says why\n"
 
 
 if __name__ == "__main__":

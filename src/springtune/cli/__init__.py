@@ -7,6 +7,7 @@ from typing import NamedTuple
 import click
 
 from .. import __version__
+from .examples import examples
 
 
 class Row(NamedTuple):
@@ -57,7 +58,20 @@ class Commands(click.Group):
                 formatter.write_dl([(name, row.meaning) for name, row in rows])
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Commands,
+    epilog=examples(
+        "springtune scenes config/paper.yaml",
+        'springtune predict --beam 200x40 --size "2 mm" --material steel',
+        "snakemake --configfile config/paper.yaml",
+    ),
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__)
 def main() -> None:
-    """Tune the stiffness of 2-D mass-spring models against finite elements."""
+    """Tune the stiffness of 2-D mass-spring models against finite elements.
+
+    Studies are run by Snakemake, see the last example. `springtune COMMAND --help` has examples of each command. A
+    command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
+    wrong way.
+    """

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .examples import examples
+
 if TYPE_CHECKING:
     from ..study import Study
 
@@ -15,7 +17,7 @@ LISTED = 12
 """Files of a folder that are listed by name."""
 
 
-@click.command()
+@click.command(epilog=examples("springtune clean config/paper.yaml", "springtune clean results/paper --remove"))
 @click.argument("study", required=False, type=click.Path(path_type=Path))
 @click.option("--remove", is_flag=True, help="Remove what is listed.")
 def clean(study: Path | None, remove: bool) -> None:

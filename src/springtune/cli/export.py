@@ -4,8 +4,16 @@ from pathlib import Path
 
 import click
 
+from .examples import examples
 
-@click.command()
+
+@click.command(
+    epilog=examples(
+        "springtune export results/paper --to cells.csv",
+        "springtune export results/paper --group sensitivity --select beam=200x30 --to curves.parquet",
+        "springtune export results/paper --group fields --select beam=200x40,mesh_type=free --to network.nc",
+    )
+)
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option(
     "--to", "target", required=True, type=click.Path(path_type=Path), help="File: .csv, .parquet, .zarr or .nc."

@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from ..output.text import aligned
+from .examples import examples
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +22,7 @@ REASONS = 5
 NUMBER = re.compile(r"[0-9][0-9.]*(e[+-]?[0-9]+)?")
 
 
-@click.command()
+@click.command(epilog=examples("springtune info results/paper"))
 @click.argument("path", type=click.Path(path_type=Path))
 def info(path: Path) -> None:
     """Say what a dataset holds: how its scenes ended, its errors, its groups, and where it comes from.

@@ -7,12 +7,18 @@ from typing import TYPE_CHECKING
 import click
 
 from ..jobs.atomic import write_text
+from .examples import examples
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "springtune which results/definitions/dataset.nc",
+        "springtune which --write",
+    )
+)
 @click.argument("dataset", type=click.Path(path_type=Path), default="results/definitions/dataset.nc")
 @click.option("--write", is_flag=True, help="Renew the tables of the page instead of printing them.")
 @click.option("--page", default="docs/which-definition.md", show_default=True, type=click.Path(path_type=Path))
@@ -23,7 +29,12 @@ def which(dataset: Path, write: bool, page: Path) -> None:
     _tables("which", decision, "moduli", dataset, page if write else None)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "springtune stability results/stability/dataset.nc",
+        "springtune stability --write",
+    )
+)
 @click.argument("dataset", type=click.Path(path_type=Path), default="results/stability/dataset.nc")
 @click.option("--write", is_flag=True, help="Renew the tables of the page instead of printing them.")
 @click.option("--page", default="docs/stability.md", show_default=True, type=click.Path(path_type=Path))
@@ -34,13 +45,21 @@ def stability(dataset: Path, write: bool, page: Path) -> None:
     _tables("stability", tables, "stability", dataset, page if write else None)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "springtune bench results/benchmark/dataset.nc",
+        "springtune bench --compare before/dataset.nc results/benchmark/dataset.nc",
+    )
+)
 @click.argument("dataset", type=click.Path(path_type=Path), default="results/benchmark/dataset.nc")
 @click.option("--compare", type=click.Path(path_type=Path), help="An earlier dataset: print ratios to it.")
 @click.option("--write", is_flag=True, help="Renew the tables of the page instead of printing them.")
 @click.option("--page", default="docs/speed.md", show_default=True, type=click.Path(path_type=Path))
 def bench(dataset: Path, compare: Path | None, write: bool, page: Path) -> None:
-    """Show the benchmark of a dataset, or how its seconds compare with an earlier one's."""
+    """Show the benchmark of a dataset, or how its seconds compare with an earlier one's.
+
+    Compared, it exits with 1 where something is slower than the scatter of its seconds explains.
+    """
     from ..kinds.benchmark.tables import comparison
     from ..kinds.benchmark.tables import page as tables
 

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .completion import mesh_types
+from .examples import examples
+
 if TYPE_CHECKING:
     from ..mesh import Mesh
     from ..prediction import Choice, Number, References
@@ -16,13 +19,33 @@ MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 """Young's modulus and Poisson's ratio of the paper's materials."""
 
 
-@click.command()
+def known_materials(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Materials whose names begin so, for a shell to complete."""
+    return [name for name in MATERIALS if name.startswith(begun)]
+
+
+@click.command(
+    epilog=examples(
+        'springtune predict --beam 200x40 --size "2 mm" --material steel',
+        'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
+        'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
+    )
+)
 @click.option("--beam", required=True, help="Length x height in mm, such as 200x40.")
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
-@click.option("--mesh", "mesh_type", default="structured", show_default=True, help="A mesh type, or a mesh file.")
+@click.option(
+    "--mesh",
+    "mesh_type",
+    default="structured",
+    show_default=True,
+    shell_complete=mesh_types,
+    help="A mesh type, or a mesh file.",
+)
 @click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
 @click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
-@click.option("--material", help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson.")
+@click.option(
+    "--material", shell_complete=known_materials, help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson."
+)
 @click.option("--young", help="Young's modulus, such as '210 GPa'.")
 @click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
 def predict(

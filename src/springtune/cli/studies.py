@@ -4,11 +4,22 @@ from pathlib import Path
 
 import click
 
+from .completion import studies_here
+from .examples import examples
 
-@click.command()
-@click.argument("config", type=click.Path(path_type=Path))
+
+@click.command(
+    epilog=examples(
+        "springtune scenes config/paper.yaml",
+    )
+)
+@click.argument("config", type=click.Path(path_type=Path), shell_complete=studies_here)
 def scenes(config: Path) -> None:
-    """Say what a study asks for, before anything runs."""
+    """Say what a study asks for, before anything runs.
+
+    Counts scenes, meshes, references and curves, and what grids share. A study with mistakes is refused with the line
+    of each.
+    """
     from ..kinds import kinds, load_study  # here, so that --help does not wait for it
     from ..kinds.scenes.summary import summary
     from ..study import StudyError
@@ -22,7 +33,11 @@ def scenes(config: Path) -> None:
     click.echo(summary(study, [row for kind, part in parts if part for row in kind.summary(part)]))
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "springtune definitions | grep area",
+    )
+)
 def definitions() -> None:
     """List the definitions of spring stiffness."""
     from ..output.text import aligned

@@ -1,0 +1,170 @@
+"""Snakemake's logger plugin of springtune: progress of a study on a terminal, Snakemake's own lines everywhere else.
+
+Snakemake imports every installed plugin whenever it starts, so what draws is imported by the first run that has
+something to do.
+"""
+
+import os
+import sys
+from logging import ERROR, WARNING, LogRecord
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
+
+if TYPE_CHECKING:
+    from logging import Handler
+
+    from .display import Display
+
+SEEN = {
+    LogEvent.JOB_FINISHED,
+    LogEvent.JOB_INFO,
+    LogEvent.JOB_STARTED,
+    LogEvent.PROGRESS,
+    LogEvent.RESOURCES_INFO,
+    LogEvent.RUN_INFO,
+    LogEvent.SHELLCMD,
+    LogEvent.WORKFLOW_STARTED,
+}
+"""Events that the display shows in its own way."""
+
+LOG = "Complete log"
+"""Beginning of the message that names Snakemake's log; read where something failed."""
+
+IDLE = ("Assuming unrestricted", "Building DAG", "Elapsed time", "Select jobs", "Using shell")
+"""Beginnings of messages that say nothing beside the display."""
+
+NOTHING = "Nothing to be done"
+"""Beginning of the message of a run that finds everything made."""
+
+
+class LogHandler(LogHandlerBase):
+    """Handler of Snakemake's records.
+
+    A terminal gets a display of the stages with tasks done, seconds gone by and left, and above it whatever fails. A
+    file, a pipe, continuous integration (``CI`` is set), a terminal that cannot move its cursor, and runs that ask for
+    more or for less (``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag``, ``--quiet``) get what
+    Snakemake prints without a plugin.
+    """
+
+    def __post_init__(self) -> None:
+        self.display: Display | None = None
+        self.plain: Handler | None = None
+        self.results: Path | None = None  # the Snakefile says it
+        self.failed = False
+        self.wanted = self._wanted()
+
+    @property
+    def writes_to_stream(self) -> bool:
+        """Whether it writes to the terminal: it stands in for Snakemake's own handler."""
+        return True
+
+    @property
+    def writes_to_file(self) -> bool:
+        """Whether it writes a file."""
+        return False
+
+    @property
+    def has_filter(self) -> bool:
+        """Whether it filters records by itself: ``--quiet`` is Snakemake's to obey."""
+        return False
+
+    @property
+    def has_formatter(self) -> bool:
+        """Whether it formats records by itself."""
+        return False
+
+    @property
+    def needs_rulegraph(self) -> bool:
+        """Whether it wants the graph of rules."""
+        return False
+
+    def emit(self, record: LogRecord) -> None:
+        """Show a record.
+
+        Parameters
+        ----------
+        record : LogRecord
+        """
+        try:
+            self._show(record)
+        except Exception:
+            # A display that fails must not take what the run has to say with it.
+            self.wanted = False
+            self._stop()
+            self._plain().emit(record)
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+        self._stop()
+        super().close()
+
+    def _wanted(self) -> bool:
+        asked = self.common_settings
+        quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()}
+        otherwise = asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag
+        able = sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
+        return able and not otherwise and not quiet & {"all", "progress", "rules"}
+
+    def _show(self, record: LogRecord) -> None:
+        loads = getattr(record, "loads", None)
+        if not self.wanted:
+            self._plain().emit(record)
+        elif loads is not None:
+            from .display import Display
+
+            title, colourless = record.getMessage(), self.common_settings.nocolor
+            self.display = Display(loads, record.cores, title, colourless)  # type: ignore[attr-defined]
+        elif getattr(record, "ends", False):
+            self._stop()
+            sys.stderr.write(record.getMessage() + "\n")
+        else:
+            self._follow(record)
+        if self.results is not None and not self.common_settings.dryrun and record.getMessage().startswith(NOTHING):
+            self._remind(self.results)
+
+    def _follow(self, record: LogRecord) -> None:
+        event = getattr(record, "event", None)
+        self.failed |= record.levelno >= ERROR
+        if self.display is None:
+            # Without the Snakefile's hooks (--no-hooks) there is nothing to display.
+            self.wanted = event != LogEvent.JOB_INFO
+            if self._is_told(record) or not self.wanted:
+                self._plain().emit(record)
+            return
+        if event == LogEvent.JOB_INFO:
+            self.display.begin(record.jobid)  # type: ignore[attr-defined]
+        elif event == LogEvent.JOB_FINISHED:
+            self.display.finish(record.job_id)  # type: ignore[attr-defined]
+        elif event == LogEvent.JOB_ERROR:
+            self.display.fail(record.jobid)  # type: ignore[attr-defined]
+        if self._is_told(record):
+            style = "red" if record.levelno >= ERROR else "yellow"
+            self.display.tell(self.format(record), style)
+
+    def _is_told(self, record: LogRecord) -> bool:
+        """Whether the display does not show it in its own way."""
+        idle = IDLE if self.failed else (*IDLE, LOG)
+        shown = getattr(record, "event", None) in SEEN or record.getMessage().startswith(idle)
+        return record.levelno >= WARNING or not shown
+
+    def _remind(self, results: Path) -> None:
+        from springtune.campaign.summary import reminder
+
+        sys.stderr.write(reminder(results))
+
+    def _stop(self) -> None:
+        if self.display is not None:
+            self.display.stop()
+            self.display = None
+
+    def _plain(self) -> "Handler":
+        """Snakemake's own handler, which writes where it would without a plugin."""
+        if self.plain is None:
+            from snakemake.logging import ColorizingTextHandler
+
+            stream = sys.stdout if self.common_settings.stdout else sys.stderr
+            self.plain = ColorizingTextHandler(self.common_settings.nocolor, stream, self.formatter)
+        return self.plain

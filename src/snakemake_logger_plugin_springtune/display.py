@@ -1,0 +1,191 @@
+"""Stages of a study on a terminal: tasks done, seconds gone by, and about how many are left."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from springtune.campaign.workload import Load
+
+LOOKED_AT = 200
+"""So many files that jobs are still to make are looked for at a time."""
+
+PRIOR = 5.0
+"""Seconds of measured work that an expectation counts for: the first jobs do not turn it over."""
+
+OVERDUE = 0.2
+"""A job that runs longer than expected is expected to run on for this share of what it has run."""
+
+
+class Job:
+    """A job and how far it is.
+
+    Parameters
+    ----------
+    load : Load
+    """
+
+    def __init__(self, load: "Load") -> None:
+        self.load = load
+        self.begun = self.ended = 0.0
+        self.failed = False
+        self.waiting = list(load.products)
+        self.before = 0.0
+
+    def start(self) -> None:
+        """It runs from now on."""
+        self.begun, self.before = time.monotonic(), time.time()
+
+    def made(self) -> float:
+        """Share of its files that it has made since it began."""
+        if self.ended:
+            return 0.0 if self.failed else 1.0
+        if not self.begun or not self.load.products:
+            return 0.0
+        late = self.waiting[LOOKED_AT:]
+        self.waiting = [path for path in self.waiting[:LOOKED_AT] if not _newer(path, self.before)] + late
+        return 1 - len(self.waiting) / len(self.load.products)
+
+    def left(self, pace: float) -> float:
+        """Seconds that it still needs, at so many for each expected one."""
+        if self.ended:
+            return 0.0
+        expected = pace * self.load.seconds
+        if not self.begun:
+            return expected
+        gone = time.monotonic() - self.begun
+        made = self.made()
+        rest = max(expected - gone, OVERDUE * gone)
+        # The more it has made, the more that says, and the less what was expected.
+        return (1 - made) * rest + gone * (1 - made) if made else rest
+
+
+def _newer(path: Path, than: float) -> bool:
+    try:
+        return path.stat().st_mtime >= than
+    except OSError:
+        return False
+
+
+class Display:
+    """The display of a run, from its beginning until `stop`.
+
+    Parameters
+    ----------
+    loads : dict of int to Load
+        What each job has to do, by the job's number.
+    cores : int
+    title : str
+        First line.
+    colourless : bool, optional
+        Whether it is to do without colours.
+    console : rich.console.Console, optional
+        Where it is shown; on stderr without.
+    """
+
+    def __init__(
+        self,
+        loads: "Mapping[int, Load]",
+        cores: int,
+        title: str,
+        colourless: bool = False,
+        console: Console | None = None,
+    ) -> None:
+        self.jobs = {number: Job(load) for number, load in loads.items()}
+        self.cores, self.begun, self.over = cores, time.monotonic(), False
+        self.console = console or Console(stderr=True, no_color=colourless, highlight=False)
+        self.console.print(Text(title, "bold"))
+        self.live = Live(
+            console=self.console,
+            get_renderable=self.picture,
+            refresh_per_second=2,
+            redirect_stdout=False,
+            redirect_stderr=False,
+        )
+        self.live.start()
+
+    def begin(self, number: int) -> None:
+        """A job begins."""
+        if number in self.jobs:
+            self.jobs[number].start()
+
+    def finish(self, number: int) -> None:
+        """A job is done."""
+        if number in self.jobs:
+            self.jobs[number].ended = time.monotonic()
+            self.jobs[number].failed = False
+
+    def fail(self, number: int) -> None:
+        """A job failed."""
+        if number in self.jobs:
+            self.jobs[number].ended, self.jobs[number].failed = time.monotonic(), True
+
+    def tell(self, text: str, style: str = "") -> None:
+        """Print something above the display."""
+        self.console.print(Text(text, style), soft_wrap=True)
+
+    def stop(self) -> None:
+        """Leave the last picture on the terminal."""
+        self.over = True
+        self.live.stop()
+
+    def left(self) -> float:
+        """Seconds that the run still needs, about: at the pace of the jobs that are done."""
+        now = time.monotonic()
+        took = [
+            (job.load.seconds, (job.ended or now) - job.begun, bool(job.ended))
+            for job in self.jobs.values()
+            if job.begun and not job.failed
+        ]
+        # A job that runs tells something, too, once it takes longer than expected.
+        told = [(expected, gone) for expected, gone, over in took if over or gone > expected]
+        pace = (sum(gone for _, gone in told) + PRIOR) / (sum(expected for expected, _ in told) + PRIOR)
+        rest = [(job.left(pace), min(job.load.threads, self.cores)) for job in self.jobs.values()]
+        shared = sum(seconds * threads for seconds, threads in rest) / self.cores
+        return max([shared, *(seconds for seconds, _ in rest)])
+
+    def picture(self) -> Table:
+        """A row for each stage, and one for the run."""
+        table = Table.grid(padding=(0, 2))
+        table.add_column(no_wrap=True)
+        table.add_column()
+        table.add_column(justify="right", no_wrap=True)
+        table.add_column(no_wrap=True)
+        parts: dict[str, list[Job]] = {}
+        for job in self.jobs.values():
+            parts.setdefault(job.load.part, []).append(job)
+        for part, jobs in parts.items():
+            table.add_row(*self._row(part, jobs))
+        gone, left = time.monotonic() - self.begun, self.left()
+        table.add_row(
+            Text(f"{_clock(gone)} gone by" if self.over else f"{_clock(gone)}, about {_clock(left)} left", "bold")
+        )
+        return table
+
+    def _row(self, part: str, jobs: list[Job]) -> tuple[Text, ProgressBar, Text, Text]:
+        tasks = sum(job.load.tasks for job in jobs)
+        done = sum(job.load.tasks * job.made() for job in jobs)
+        failed, running = any(job.failed for job in jobs), any(job.begun and not job.ended for job in jobs)
+        style = "red" if failed else "" if running else "green" if done >= tasks else "dim"
+        begun = [job.begun for job in jobs if job.begun]
+        ends = time.monotonic() if running else max((job.ended for job in jobs), default=0.0)
+        spent = _clock(ends - min(begun)) if begun and ends else ""
+        return (
+            Text(part, style),
+            ProgressBar(total=tasks, completed=done, width=24),
+            Text(f"{int(done)}/{tasks}", style),
+            Text(f"{spent} failed" if failed else spent, style),
+        )
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -1,0 +1,273 @@
+"""What became of a study, in a few lines at the end of its run: solved, not solved and why, worst errors, where it is.
+
+`text` is written beside the dataset by the stage `collect`; Snakemake's process reads that and adds what it knows of
+the run (`ending`, `broken`), without xarray.
+"""
+
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..jobs import atomic
+from ..output.text import aligned
+from ..problem.status import Status
+from .workload import clock, computed, keys_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..study.model import Study
+
+FILE = "summary.txt"
+"""File beside the dataset."""
+
+NAMED = 3
+"""So many cells are named of those that share a status; more if fewer than two would be left out."""
+
+WORST = 8
+"""So many definitions are told with their worst error."""
+
+HOLES = "Not everything is solved"
+"""Beginning of the last line, where that is so."""
+
+SCENES = "/"
+"""Group of the scenes."""
+
+
+def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
+    """What became of a study's cells.
+
+    Parameters
+    ----------
+    groups : dict of str to xarray.Dataset
+        Groups of its dataset by name.
+    title : str
+        Title of the study.
+
+    Returns
+    -------
+    str
+        Lines: counts, worst errors, and what is not solved by its labels and with its reason.
+    """
+    states = [state for name, data in groups.items() for state in _states(name, data)]
+    rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
+    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES]), *_unreferenced(groups[SCENES])]
+    holes = [(what, found, lost) for what, found, lost in states if lost]
+    for what, found, lost in holes:
+        for status, cells in lost.items():
+            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {sum(found.values())}", *_named(cells)]
+    if holes:
+        told = "; ".join(
+            f"{sum(map(len, lost.values()))} of {sum(found.values())} {what}" for what, found, lost in holes
+        )
+        lines += ["", f"{HOLES}: {told}. dataset.nc names each, and why: `status`, `message`."]
+    return "\n".join(lines) + "\n"
+
+
+Cells = list[tuple[str, str]]
+"""Labels and message of each cell."""
+
+
+def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
+    """What each status of a group is of, how many cells have which flag, and those that are not solved."""
+    for variable in data.data_vars.values():
+        label = str(variable.name)
+        message = label.removesuffix("status") + "message"
+        if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
+            continue
+        flags = variable.values
+        found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
+        lost: dict[Status, Cells] = {
+            status: [
+                (_labels(data, variable.dims, place), str(data[message].values[tuple(place)]))
+                for place in np.argwhere(flags == status)
+            ]
+            for status, number in found.items()
+            if number and status != Status.SOLVED
+        }
+        part = label.removesuffix("status").strip("_").replace("_", " ")
+        what = "scenes" if name == SCENES else ", ".join(filter(None, (name.strip("/"), part)))
+        yield what, {status: number for status, number in found.items() if number}, lost
+
+
+def _words(status: Status) -> str:
+    return str(status).replace("_", " ")
+
+
+def _parts(found: Mapping[Status, int]) -> str:
+    return ", ".join(f"{number} {_words(status)}" for status, number in found.items())
+
+
+def _labels(data: "xr.Dataset", dims: Sequence[object], place: Iterable[int]) -> str:
+    """Labels of a cell, as a reader writes them."""
+    return ", ".join(_label(data[dim], number) for dim, number in zip(dims, place))
+
+
+def _label(axis: "xr.DataArray", number: int) -> str:
+    value = axis.values[number]
+    if isinstance(value, str):
+        return value
+    if axis.attrs.get("units") == "m":
+        return f"{1e3 * value:g} mm"
+    unit = axis.attrs.get("units", "1")
+    return f"{str(axis.name).replace('_', ' ')} {value:g}{'' if unit == '1' else ' ' + unit}"
+
+
+def _named(cells: Cells) -> Iterator[str]:
+    """Some of the cells with their reasons, of each reason one at first, and how many there are besides."""
+    reasons: dict[str, Cells] = {}
+    for cell in cells:
+        reasons.setdefault(re.sub(r"[\d.e+-]+", "#", cell[1]), []).append(cell)
+    order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
+    shown = order if len(order) <= NAMED + 1 else order[:NAMED]
+    for labels, message in shown:
+        yield f"  {labels}: {message}" if message else f"  {labels}"
+    if len(shown) < len(order):
+        yield f"  and {len(order) - len(shown)} more"
+
+
+def _worst(root: "xr.Dataset") -> Iterator[str]:
+    """The largest error of each definition among the scenes that are solved and whose reference applies."""
+    counted = (root.status == Status.SOLVED) & (root.reference_applies == 1)
+    errors = root.deformation_error.where(counted)
+    axis = errors.dims.index("definition")
+    found = []
+    for number in range(errors.sizes["definition"]):
+        values = np.take(errors.values, number, axis)
+        if np.isfinite(values).any():
+            place = list(np.unravel_index(np.nanargmax(abs(values)), values.shape))
+            error = float(values[tuple(place)])
+            others = [dim for dim in errors.dims if dim != "definition"]
+            found.append((error, _label(root.definition, number), _labels(root, others, map(int, place))))
+    found.sort(key=lambda row: -abs(row[0]))
+    if found:
+        yield from ("", f"worst deformation error of each definition, of the {int(counted.sum())} scenes that have one")
+        yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
+    if len(found) > WORST:
+        yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
+
+
+def _unreferenced(root: "xr.Dataset") -> Iterator[str]:
+    """References that are missing or do not apply, each with the scenes that have no error of their own for it."""
+    requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
+    for scenes, what in (
+        (requested & ~there, "without a reference, and so without an error"),
+        (
+            requested & there & (root.reference_applies == 0),
+            "beyond small strain, so the error is not the network's alone",
+        ),
+    ):
+        if not scenes.any():
+            continue
+        few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
+        few = few.transpose(*root.reference_message.dims)
+        messages = root.reference_message.values
+        cells = [(_labels(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
+        yield from ("", f"scenes {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
+
+
+def ending(study: "Study", folder: Path, names: Sequence[str], since: float) -> str:
+    """What to say at the end of a run that finished.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where its results are.
+    names : sequence of str
+        Stems of the files of its bundles.
+    since : float
+        When the run began, seconds since the epoch.
+
+    Returns
+    -------
+    str
+        The stored text, what was computed by this run, what it took and where the results are.
+    """
+    new, took = _computed(folder, names, since), clock(time.time() - since)
+    rows = [["new", new], ["took", took], ["results", _places(folder)]]
+    return f"\n{_stored(study, folder, names)}\n{aligned(rows, 0)}\n"
+
+
+def broken(study: "Study", folder: Path, names: Sequence[str], since: float) -> str:
+    """What to say at the end of a run of which a job failed.
+
+    Parameters
+    ----------
+    study, folder, names, since
+        As of `ending`.
+
+    Returns
+    -------
+    str
+    """
+    undone = [name for name in names if not (folder / "done" / f"{name}.json").exists()]
+    logs = [path for name in undone if _time(path := folder / "logs" / f"{name}.log") >= since]
+    lines = [f"{study.name} is not complete: a job failed or was stopped.", *(f"  its log: {path}" for path in logs)]
+    lines += ["What is computed is kept: the same command takes up where this one stopped."]
+    return "\n" + "\n".join(lines) + "\n"
+
+
+def reminder(folder: Path) -> str:
+    """What to say of a study of which everything is made already.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are.
+
+    Returns
+    -------
+    str
+        Lines; none where there is no summary.
+    """
+    try:
+        lines = (folder / FILE).read_text().splitlines()
+    except OSError:
+        return ""
+    last = [lines[-1], f"{folder / FILE} has the reasons."] if lines[-1].startswith(HOLES) else []
+    return "\n".join([*last, _places(folder)]) + "\n"
+
+
+def _time(path: Path) -> float:
+    """When a file was last changed; minus infinity where there is none."""
+    return path.stat().st_mtime if path.exists() else float("-inf")
+
+
+def _stored(study: "Study", folder: Path, names: Sequence[str]) -> str:
+    """The text beside the dataset, if it is of what the stages made."""
+    path = folder / FILE
+    if not path.exists():
+        return f"{study.title}\n\nThere is no dataset yet.\n"
+    if any(_time(folder / "done" / f"{name}.json") > _time(path) for name in names):
+        return f"{study.title}\n\nThe dataset is older than these results.\n"
+    return path.read_text()
+
+
+def _computed(folder: Path, names: Sequence[str], since: float) -> str:
+    """What a run computed, stage by stage, and what was there before."""
+    new: dict[str, int] = {}
+    asked: dict[str, int] = {}
+    for name in names:
+        done, stage = folder / "done" / f"{name}.json", name.rpartition("_")[0]
+        number = computed(done) if done.exists() else None
+        if number is not None:
+            asked[stage] = asked.get(stage, 0) + len(keys_of(atomic.read_json(folder / "tasks" / f"{name}.json")))
+            new[stage] = new.get(stage, 0) + (number if _time(done) >= since else 0)
+    told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
+    if not told:
+        return "nothing: all results were stored before"
+    return ", ".join(told) + ("" if new == asked else "; the others were stored before")
+
+
+def _places(folder: Path) -> str:
+    """Results that are there, those first that are looked at first."""
+    names = [name for name in ("index.html", "dataset.nc", "tables/index.html") if (folder / name).exists()]
+    names += [f"{name}/" for name in ("figures", "tables", "meshes") if (folder / name).is_dir()]
+    if "tables/index.html" in names:
+        names.remove("tables/")
+    return f"{folder}: {', '.join(names)}"

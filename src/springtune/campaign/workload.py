@@ -1,0 +1,193 @@
+"""How much a run has to do: tasks of its jobs, the seconds they are expected to take, and where they have got to."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..jobs import atomic, bundles
+from ..springs import DEFINITIONS
+from .plan import COSTS_FILE, stages, usual_costs
+
+if TYPE_CHECKING:
+    from ..study.model import Study
+
+PRESENTED = (1.5, 0.3)
+"""Seconds of a job that makes no results of scenes, before one was measured: in any case, and for each of its files."""
+
+AFTER = "Dataset, figures and tables"
+"""What jobs after the stages do."""
+
+
+@dataclass
+class Load:
+    """What a job has to do.
+
+    Attributes
+    ----------
+    part : str
+        What it is part of, for a reader.
+    tasks : int
+        Its scenes, references or what else its stage works on.
+    seconds : float
+        What it is expected to take if nothing of it is stored.
+    threads : int
+        Cores that it takes.
+    products : list of Path
+        Files that it makes one by one.
+    """
+
+    part: str
+    tasks: int
+    seconds: float
+    threads: int = 1
+    products: list[Path] = field(default_factory=list)
+
+
+def keys_of(content: Any) -> set[str]:
+    """Keys of the results that a task file asks for.
+
+    Parameters
+    ----------
+    content : object
+        Of the file.
+
+    Returns
+    -------
+    set of str
+
+    Examples
+    --------
+    >>> sorted(keys_of({"folder": "x", "scenes": [{"key": "a", "reference": {"key": "r"}}, {"key": "b"}]}))
+    ['a', 'b']
+    """
+    if isinstance(content, dict):
+        if "key" in content:
+            return {content["key"]}
+        content = list(content.values())
+    return set().union(*map(keys_of, content)) if isinstance(content, list) else set()
+
+
+def computed(done: Path) -> int | None:
+    """Number of tasks that a job computed, those left out whose results were there; None where it does not say.
+
+    Parameters
+    ----------
+    done : Path
+        What it wrote at its end, see `springtune.jobs.spent.Spent.summary`.
+
+    Returns
+    -------
+    int or None
+    """
+    work = atomic.read_json(done).get("work")
+    # What definitions cost is told beside the task that they are part of.
+    return None if work is None else sum(row[0] for name, row in work.items() if name not in DEFINITIONS)
+
+
+def loads(study: "Study", folder: Path, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Load]:
+    """What each job of a run has to do.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where its results go.
+    jobs : iterable of tuple
+        Of each job its number, the name of its rule, its threads and its outputs.
+
+    Returns
+    -------
+    dict of int to Load
+        By number, in the order of stages; without jobs that only name targets.
+    """
+    of_bundles = _of_bundles(study, folder)
+    order = {stem: place for place, stem in enumerate(of_bundles)}
+    found = []
+    for number, rule, threads, outputs in jobs:
+        if outputs:
+            stem = Path(outputs[0]).stem if Path(outputs[0]).parent == folder / "done" else ""
+            load = of_bundles.get(stem) or _presented(folder, rule, outputs)
+            load.threads = threads
+            found.append((order.get(stem, len(order)), number, load))
+    return {number: load for _, number, load in sorted(found, key=lambda row: row[:2])}
+
+
+def _of_bundles(study: "Study", folder: Path) -> dict[str, Load]:
+    """Loads of all bundles of a study, by the stem of their files."""
+    costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
+    notes = atomic.read_json(folder / "tasks/bundles.json")
+    seconds = {
+        (stage.name, label): sum(members[name][0] for name in names if name in members)
+        for stage in stages()
+        if stage.members is not None
+        for members in [stage.members(study, costs)]
+        for label, names in notes.get(stage.name, {}).items()
+    }
+    found: dict[str, Load] = {}
+    parts: dict[tuple[str, str], list[Load]] = {}
+    for stage in stages():
+        for label in notes.get(stage.like or stage.name, {}):
+            path = folder / "tasks" / f"{stage.name}_{label}.json"
+            if path.exists():
+                content = atomic.read_json(path)
+                products = list(stage.products(content))
+                found[path.stem] = Load(stage.message, max(1, len(keys_of(content))), 0.0, 1, products)
+                parts.setdefault((stage.like or stage.name, label), []).append(found[path.stem])
+    # Stages that share bundles share their seconds, too, as they share their tasks: what each takes is not told apart.
+    for place, sharing in parts.items():
+        tasks = sum(load.tasks for load in sharing)
+        for load in sharing:
+            load.seconds = seconds.get(place, 0.0) * load.tasks / tasks + costs.start_up
+    return found
+
+
+def _presented(folder: Path, rule: str, outputs: list[str]) -> Load:
+    """Load of a job after the stages: what it took before, if it ran before."""
+    always, each = PRESENTED
+    seconds = always + each * len(outputs)
+    try:
+        seconds = float((folder / "benchmarks" / f"{rule}.tsv").read_text().splitlines()[1].split("\t")[0])
+    except (OSError, IndexError, ValueError):
+        pass  # never run, or not to its end
+    return Load(AFTER, len(outputs), seconds, products=list(map(Path, outputs)))
+
+
+def told(found: dict[int, Load], cores: int) -> str:
+    """What a run has to do, in a line.
+
+    Parameters
+    ----------
+    found : dict of int to Load
+    cores : int
+
+    Returns
+    -------
+    str
+    """
+    seconds = sum(load.seconds * min(load.threads, cores) for load in found.values()) / cores
+    jobs = f"{len(found)} job{'' if len(found) == 1 else 's'}"
+    return f"{jobs}, about {clock(seconds)} on {cores} core{'' if cores == 1 else 's'} if nothing is stored yet"
+
+
+def clock(seconds: float) -> str:
+    """Seconds as people read them.
+
+    Parameters
+    ----------
+    seconds : float
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> clock(3.4), clock(75), clock(7300)
+    ('3 s', '1:15 min', '2:01 h')
+    """
+    seconds = round(seconds)
+    if seconds < 60:
+        return f"{seconds} s"
+    minutes, rest = divmod(seconds, 60)
+    return f"{minutes}:{rest:02d} min" if minutes < 60 else f"{minutes // 60}:{minutes % 60:02d} h"

@@ -1,0 +1,325 @@
+"""What a run says at its end and on its way: the summary of a study, what its jobs have to do, and the display."""
+
+import io
+import json
+import logging
+import os
+import re
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rich.console import Console
+from snakemake_interface_logger_plugins.common import LogEvent
+from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLogHandlerBase
+
+from snakemake_logger_plugin_springtune import LogHandler
+from snakemake_logger_plugin_springtune.display import Display
+from springtune.campaign import plan, summary, workload
+from springtune.kinds import load_study
+from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.output.dataset import Filler
+from springtune.problem.status import Status
+
+AXES = {
+    "beam": ("100x20", "80x10"),
+    "mesh_type": ("free",),
+    "mesh_size": (1e-3, 5e-3),
+    "material": ("steel",),
+    "load": ("traction",),
+    "definition": ("lattice", "patch"),
+    "kinematics": ("linear",),
+    "stiffness_ratio": (1.0,),
+}
+
+
+def cell(**chosen):
+    return {name: chosen.get(name, labels[0]) for name, labels in AXES.items() if name != "stiffness_ratio"}
+
+
+@pytest.fixture
+def root():
+    """Four scenes on one beam and one on the other: solved by 1 % and -20 %, one each of what may go wrong."""
+    root = Filler(ROOT.empty(AXES))
+    for beam in AXES["beam"]:
+        known = {"beam": beam, "material": "steel", "load": "traction"}
+        root.put({"reference_displacement": 1e-3}, **known)
+        root.put({"reference_applies": 1}, kinematics="linear", **known)
+    root.put({"status": Status.SOLVED, "deformation_error": 0.01}, **cell())
+    root.put({"status": Status.SOLVED, "deformation_error": -0.2}, **cell(definition="patch"))
+    lost = {"status": Status.UNSTABLE, "deformation_error": 5.0, "message": "it would leave"}
+    root.put(lost, **cell(definition="patch", mesh_size=5e-3))
+    root.put({"status": Status.NOT_CONVERGED, "message": "residual 1e-3"}, **cell(mesh_size=5e-3))
+    root.put({"status": Status.FAILED, "message": "refuses the mesh"}, **cell(beam="80x10"))
+    return root
+
+
+class TestText:
+    def test_counts_holes_and_errors(self, root):
+        text = summary.text({"/": root.data}, "A study")
+        lines = text.splitlines()
+        assert lines[0] == "A study"
+        assert "  scenes  5  2 solved, 1 not converged, 1 unstable, 1 failed" in lines
+        assert "  100x20, free, 5 mm, steel, traction, lattice, linear: residual 1e-3" in lines
+        assert "  80x10, free, 1 mm, steel, traction, lattice, linear: refuses the mesh" in lines
+        assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes.")
+        # The unstable scene's error of 500 % is none; the largest error comes first.
+        errors = [line.split()[:3] for line in lines if " %" in line]
+        assert errors == [["patch", "-20.00", "%"], ["lattice", "+1.00", "%"]]
+        assert "of the 2 scenes that have one" in text
+
+    def test_everything_solved_has_no_holes(self, root):
+        data = root.data.where(root.data.status.isin([0, 1]), 0)
+        text = summary.text({"/": data.assign(status=data.status.astype("int8"))}, "A study")
+        assert "2 solved\n" in text and "Not everything" not in text and "2 of" not in text
+
+    def test_nothing_solved(self, root):
+        data = root.data
+        data["status"].values[data.status.values > 0] = Status.FAILED
+        lines = summary.text({"/": data}, "A study").splitlines()
+        assert "  scenes  5  5 failed" in lines and not any("worst" in line for line in lines)
+        assert lines[-1].startswith("Not everything is solved: 5 of 5 scenes.")
+
+    def test_scenes_without_a_reference_are_named(self, root):
+        place = {"beam": "80x10", "material": "steel", "load": "traction"}
+        root.put({"reference_displacement": np.nan, "reference_message": "no reference: too slender"}, **place)
+        text = summary.text({"/": root.data}, "A study")
+        assert "without a reference, and so without an error: 1 of 5\n  80x10, steel, traction: no reference" in text
+
+    def test_scenes_beyond_small_strain_are_named(self, root):
+        place = {"beam": "100x20", "material": "steel", "load": "traction"}
+        root.put({"reference_applies": 0}, kinematics="linear", **place)
+        root.put({"reference_message": "it turns by 1 rad"}, **place)
+        text = summary.text({"/": root.data}, "A study")
+        assert "beyond small strain, so the error is not the network's alone: 4 of 5" in text
+        assert "100x20, steel, traction: it turns by 1 rad" in text and "worst" not in text
+
+    def test_other_groups_are_counted_where_messages_are_of_their_cells(self, root):
+        curves = Filler(SENSITIVITY.empty(AXES))
+        place = {name: label for name, label in cell().items() if name != "definition"}
+        curves.put({"best_stiffness_status": Status.FAILED, "best_stiffness_message": "no minimum"}, **place)
+        lines = summary.text({"/": root.data, "/sensitivity": curves.data}, "A study").splitlines()
+        assert "  sensitivity, best stiffness  1  1 failed" in lines
+        assert "  100x20, free, 1 mm, steel, traction, linear: no minimum" in lines
+        assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes; 1 of 1 sensitivity, best stiffness.")
+
+    def test_a_few_are_named_of_many_and_of_each_reason_one_first(self):
+        beams = [f"beam-{letter}" for letter in "abcdefghij"]
+        root = Filler(ROOT.empty(AXES | {"beam": beams}))
+        for number, beam in enumerate(beams):
+            why = "refused" if number == 9 else f"residual {number}.5e-3"
+            root.put({"status": Status.FAILED, "message": why}, **cell(beam=beam))
+        lines = summary.text({"/": root.data}, "A study").splitlines()
+        named = lines[lines.index("scenes, failed: 10 of 10") + 1 :][:4]
+        assert [line.partition(",")[0].strip() for line in named] == ["beam-a", "beam-j", "beam-b", "and 7 more"]
+
+
+STUDY = """
+title: Two definitions
+beams: {80x10: {length: 80 mm, height: 10 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  one: {beam: 80x10, mesh_type: structured, mesh_size: [2 mm, 5 mm], material: steel, load: traction, force: 1 kN,
+        definition: [lattice, patch]}
+"""
+
+
+@pytest.fixture
+def planned(tmp_path):
+    """A study whose tasks are written, its folder, and the stems of its bundles' files."""
+    (tmp_path / "two.yaml").write_text(STUDY)
+    study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
+    labels = plan.write_tasks(study, folder, 2)
+    return study, folder, [f"{stage}_{label}" for stage, found in labels.items() for label in found]
+
+
+class TestWorkload:
+    def test_jobs_have_tasks_seconds_and_products(self, planned):
+        study, folder, names = planned
+        jobs = [(number, "any", 1, [str(folder / "done" / f"{name}.json")]) for number, name in enumerate(names)]
+        found = workload.loads(study, folder, [*jobs, (98, "present_x", 1, ["a.png", "a.pdf"]), (99, "all", 1, [])])
+        assert 99 not in found and found[98].part == workload.AFTER and found[98].tasks == 2
+        tasks = {load.part: load.tasks for load in found.values()}
+        assert tasks["Solving the networks"] == 4 and tasks["Meshing"] == 2
+        assert tasks["Tracing the sensitivity curves"] == 2
+        assert all(load.seconds > 0 and load.products for load in found.values())
+        # What stages cost that share bundles is shared out, start-up comes on top.
+        costs = workload.bundles.Costs(folder.parent / plan.COSTS_FILE, plan.usual_costs())
+        mesh = next(stage for stage in plan.stages() if stage.name == "mesh")
+        expected = sum(seconds for seconds, _ in mesh.members(study, costs).values()) + 3 * costs.start_up
+        stages = ("Meshing", "Tracing the sensitivity curves", "Solving the networks")
+        assert sum(load.seconds for load in found.values() if load.part in stages) == pytest.approx(expected)
+        assert re.fullmatch(r"\d+ jobs, about \d+ s on 2 cores if nothing is stored yet", workload.told(found, 2))
+
+    def test_tasks_computed_are_counted_without_their_definitions(self, tmp_path):
+        path = tmp_path / "done.json"
+        path.write_text(json.dumps({"work": {"linear": [3, 1.0, 0.1], "nonlinear": [2, 1.0, 0.1], "patch": [5, 1, 1]}}))
+        assert workload.computed(path) == 5
+        path.write_text(json.dumps({"cases": 1}))
+        assert workload.computed(path) is None
+
+
+class TestEnding:
+    def finish(self, planned, new):
+        """Mark all bundles done, those of the stages in `new` now, the others before."""
+        study, folder, names = planned
+        since = time.time() - 100
+        for name in names:
+            done = folder / "done" / f"{name}.json"
+            done.parent.mkdir(exist_ok=True)
+            count = len(workload.keys_of(json.loads((folder / "tasks" / f"{name}.json").read_text())))
+            done.write_text(json.dumps({"work": {"linear": [count, 1.0, 1.0]}}))
+            moment = since + (50 if name.startswith(new) else -50)
+            os.utime(done, (moment, moment))
+        return summary.ending(study, folder, names, since), folder, since
+
+    def test_says_what_is_new_and_where_it_is(self, planned):
+        study, folder, names = planned
+        (folder / "figures").mkdir(parents=True)
+        (folder / "dataset.nc").touch()
+        (folder / summary.FILE).write_text("Told before\n")
+        text, *_ = self.finish(planned, "solve")
+        assert "Told before" in text and "new      solve 4 of 4; the others were stored before" in text
+        assert f"results  {folder}: dataset.nc, figures/" in text
+        assert "new      nothing: all results were stored before" in self.finish(planned, "none")[0]
+
+    def test_a_summary_older_than_the_results_is_not_shown(self, planned):
+        study, folder, names = planned
+        (folder / summary.FILE).write_text("Told before\n")
+        os.utime(folder / summary.FILE, (0, 0))
+        text, *_ = self.finish(planned, "solve")
+        assert "Told before" not in text and "The dataset is older than these results." in text
+
+    def test_what_broke_is_named(self, planned):
+        study, folder, names = planned
+        _, _, since = self.finish(planned, "solve")
+        (folder / "done" / f"{names[-1]}.json").unlink()
+        (folder / "logs").mkdir()
+        (folder / "logs" / f"{names[-1]}.log").write_text("why")
+        text = summary.broken(study, folder, names, since)
+        assert "two is not complete" in text and f"logs/{names[-1]}.log" in text and text.count(".log") == 1
+
+    def test_a_run_with_nothing_to_do_reminds_of_holes(self, tmp_path):
+        assert summary.reminder(tmp_path) == ""
+        (tmp_path / summary.FILE).write_text("A study\n\nNot everything is solved: 1 of 2 scenes.\n")
+        lines = summary.reminder(tmp_path).splitlines()
+        assert lines[0] == "Not everything is solved: 1 of 2 scenes." and f"{summary.FILE} has the reasons" in lines[1]
+
+
+class Terminal(io.StringIO):
+    """A terminal."""
+
+    def isatty(self):
+        return True
+
+
+def on_terminal(monkeypatch, ci="", **chosen):
+    """Handler on a terminal, and what it writes there; not a fixture, since pytest captures a test's own streams."""
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("CI", ci)
+    settings = MockOutputSettings()
+    vars(settings).update({"printshellcmds": False} | chosen)
+    return LogHandler(common_settings=settings, settings=None), terminal
+
+
+def record(message, level=logging.INFO, **more):
+    made = logging.LogRecord("snakemake", level, "x.py", 1, message, (), None)
+    vars(made).update(more)
+    return made
+
+
+class TestHandler(TestLogHandlerBase):
+    """With all that the interface's own tests ask of a plugin."""
+
+    __test__ = True
+
+    def get_log_handler_cls(self):
+        return LogHandler
+
+    def get_log_handler_settings(self):
+        return None
+
+    def test_terminal_shows_stages_then_the_ending(self, monkeypatch):
+        made, terminal = on_terminal(monkeypatch)
+        loads = {1: workload.Load("Meshing", 3, 1.0), 2: workload.Load("Solving", 4, 1.0)}
+        made.emit(record("Building DAG of jobs..."))
+        made.emit(record("two: 2 jobs", loads=loads, cores=2))
+        made.emit(record("x", event=LogEvent.JOB_INFO, jobid=1))
+        made.emit(record("x", event=LogEvent.JOB_FINISHED, job_id=1))
+        made.emit(record("x", event=LogEvent.JOB_INFO, jobid=2))
+        made.emit(record("Error in rule solve", logging.ERROR, event=LogEvent.JOB_ERROR, jobid=2))
+        made.emit(record("what became of it", ends=True))
+        text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", terminal.getvalue())
+        assert "Building DAG" not in text and text.index("two: 2 jobs") < text.index("Error in rule solve")
+        last = text[text.rindex("Meshing") :]
+        assert re.search(r"Meshing .* 3/3", last) and re.search(r"Solving .* 0/4 .*failed", last)
+        assert last.rstrip().endswith("what became of it") and " left" not in last
+
+    @pytest.mark.parametrize(
+        ("setting", "value"), [("dryrun", True), ("verbose", True), ("quiet", {"all"}), ("printshellcmds", True)]
+    )
+    def test_runs_that_ask_for_more_or_less_get_snakemakes_lines(self, monkeypatch, setting, value):
+        assert on_terminal(monkeypatch)[0].wanted
+        assert not on_terminal(monkeypatch, **{setting: value})[0].wanted
+
+    def test_elsewhere_all_is_as_without_a_plugin(self, monkeypatch):
+        stream = io.StringIO()
+        monkeypatch.setattr("sys.stderr", stream)
+        made = LogHandler(common_settings=MockOutputSettings(), settings=None)
+        made.setFormatter(logging.Formatter("%(message)s"))
+        for message in ("Building DAG of jobs...", "2 jobs", "what became of it"):
+            made.emit(record(message, **({"loads": {}, "cores": 2} if message == "2 jobs" else {})))
+        assert stream.getvalue() == "Building DAG of jobs...\n2 jobs\nwhat became of it\n"
+
+    def test_continuous_integration_is_quiet(self, monkeypatch):
+        assert not on_terminal(monkeypatch, ci="true")[0].wanted
+
+    def test_without_hooks_jobs_are_told_as_ever(self, monkeypatch):
+        made, terminal = on_terminal(monkeypatch)
+        made.setFormatter(logging.Formatter("%(message)s"))
+        made.emit(record("Job 1: Meshing", event=LogEvent.JOB_INFO, jobid=1))
+        made.emit(record("Finished", event=LogEvent.JOB_FINISHED, job_id=1))
+        assert "Job 1: Meshing" in terminal.getvalue() and "Finished" in terminal.getvalue()
+
+    def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
+        made, terminal = on_terminal(monkeypatch)
+        made.emit(record("two", loads={1: SimpleNamespace()}, cores=2))
+        made.emit(record("still told"))
+        assert "two" in terminal.getvalue() and "still told" in terminal.getvalue()
+
+
+class TestDisplay:
+    def shown(self, loads):
+        console = Console(file=io.StringIO(), force_terminal=True, width=100)
+        return Display(loads, 2, "title", console=console)
+
+    def test_what_is_left_follows_jobs_that_are_done(self):
+        display = self.shown({1: workload.Load("a", 1, 100.0), 2: workload.Load("b", 1, 100.0)})
+        try:
+            assert display.left() == pytest.approx(100.0)  # a job each core
+            now = time.monotonic()
+            display.jobs[1].begun, display.jobs[1].ended = now - 400, now
+            assert display.left() == pytest.approx(100 * 405 / 105)  # four times as long as expected, about
+            display.fail(2)
+            assert display.left() == 0
+        finally:
+            display.stop()
+
+    def test_files_that_a_job_has_made_count(self, tmp_path):
+        paths = [tmp_path / str(number) for number in range(4)]
+        paths[0].touch()
+        os.utime(paths[0], (0, 0))  # from an earlier run
+        display = self.shown({1: workload.Load("a", 8, 10.0, 1, paths)})
+        try:
+            display.begin(1)
+            assert display.jobs[1].made() == 0
+            paths[1].touch()
+            os.utime(paths[1], (time.time() + 60,) * 2)
+            assert display.jobs[1].made() == 0.25
+            display.finish(1)
+            assert display.jobs[1].made() == 1
+        finally:
+            display.stop()
