@@ -1,6 +1,7 @@
 # make study                             the paper's study: results/paper
 # make study STUDY=config/quick.yaml     another one
 # make report                            the same, and its report: results/paper/report.zip
+# make paper                             the paper: results/paper/paper.pdf, and the studies that it reads
 # make test                              the tests; `make slow` runs the slow ones, and draws
 #                                        new examples for the others
 # make clean                             removes all results, when you say yes; YES=1 does
@@ -9,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report test slow lint docs site pictures lock clean
+.PHONY: study report paper test slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
@@ -17,6 +18,9 @@ study: $(VENV)/.run
 # One file with the study's results, captions and run times, to be opened without a network.
 report: study
 	snakemake --configfile $(STUDY) --report results/$(basename $(notdir $(STUDY)))/report.zip
+
+paper: $(VENV)/.run
+	snakemake paper
 
 # Files in this order, those that take longest first: at the end no core waits for the other.
 test: $(VENV)/.test

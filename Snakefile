@@ -2,12 +2,16 @@
 
     snakemake                                          the paper's study
     snakemake --configfile config/quick.yaml           another one
+    snakemake paper                                    the paper, and the studies that it reads
 """
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/stages.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/outputs.smk"
+if "study" not in config:  # a study that is read for the paper has none of its own
+
+    include: "workflow/rules/paper.smk"
 
 
 report: "workflow/report/study.rst"

@@ -30,7 +30,9 @@ os.environ |= {"PATH": os.pathsep.join([str(Path(sys.executable).parent), *os.ge
 
 
 def chosen_config():
-    """The study that --configfile names, or the paper's."""
+    """The study that --configfile names, or the paper's; one that is read for the paper is told by it."""
+    if "study" in config:
+        return Path(config["study"])
     named = [str(path) for path in workflow.configfiles]
     if len(named) > 1:
         raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
@@ -55,8 +57,9 @@ BUNDLES = plan.write_tasks(STUDY, RESULTS, workflow.cores or 1)
 SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
 CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
 
-for handler in workflow.logger_manager.get_log_handlers():
-    handler.results = RESULTS  # whose summary to show where nothing is to be done
+if "study" not in config:
+    for handler in workflow.logger_manager.get_log_handlers():
+        handler.results = RESULTS  # whose summary to show where nothing is to be done
 
 
 def done(stage):

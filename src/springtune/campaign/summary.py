@@ -266,7 +266,8 @@ def _computed(folder: Path, names: Sequence[str], since: float) -> str:
 
 def _places(folder: Path) -> str:
     """Results that are there, those first that are looked at first."""
-    names = [name for name in ("index.html", "dataset.nc", "tables/index.html") if (folder / name).exists()]
+    files = ("paper.pdf", "index.html", "dataset.nc", "tables/index.html")
+    names = [name for name in files if (folder / name).exists()]
     names += [f"{name}/" for name in ("figures", "tables", "meshes") if (folder / name).is_dir()]
     if "tables/index.html" in names:
         names.remove("tables/")

@@ -1,0 +1,483 @@
+"""Numbers of a paper by name: declared beside its text, read from datasets, formatted once.
+
+``numbers.yaml`` declares numbers and tables, ``printed.yaml`` what another publication prints. A number is a variable
+of a study's dataset at some labels, reduced where that leaves several cells, or a formula of other numbers:
+
+    largest_error:  {study: paper, variable: deformation_error, at: {definition: lattice}, reduce: largest,
+                     absolute: true, unit: "%", digits: 2}
+    lattice_rule:   {formula: sqrt(3) / 2 * sheet, unit: N/m, digits: 1}
+
+A table is the product of its rows and columns, each a part of such a declaration.
+"""
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import xarray as xr
+import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from ..output.dataset import STATUS
+from . import PaperError
+from .datasets import HASH_SHOWN, Dataset, chosen
+
+UNITS = {
+    "": ("1", 1.0), "%": ("1", 1e-2),
+    "mm": ("m", 1e-3), "mm²": ("m2", 1e-6),
+    "s": ("s", 1.0), "ms": ("s", 1e-3), "µs": ("s", 1e-6), "ns": ("s", 1e-9),
+    "N": ("N", 1.0), "kN": ("N", 1e3), "N/m": ("N/m", 1.0), "N/mm": ("N/m", 1e3), "×10⁶ N/m": ("N/m", 1e6),
+    "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9), "MB": ("B", 1e6),
+}  # fmt: skip
+"""Units that a paper shows: the dataset's unit, and how many of that."""
+
+Selection = Annotated[list[dict[str, Any]], BeforeValidator(lambda at: at if isinstance(at, list) else [at])]
+
+REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
+    "mean": np.mean,
+    "median": np.median,
+    "smallest": np.min,
+    "largest": np.max,
+    "count": len,
+}
+"""What makes one number of several cells; cells without a value are left out."""
+
+
+class Number(BaseModel):
+    """Declaration of a number.
+
+    Attributes
+    ----------
+    study, variable : str
+        Study, and variable or coordinate with its group, such as ``sensitivity/best_stiffness``.
+    at : dict or list of dict
+        Labels by dimension, a list of them for several; of a list of dicts the cells together count.
+    over : str
+        Variable of the same group that it is divided by.
+    minus : float
+        What is taken off after that.
+    where : str
+        A variable of flags and what it must be, or must not: ``status=unstable``, ``status!=not_requested``.
+    reduce : str
+        Key of `REDUCTIONS`, where the labels leave several cells.
+    absolute : bool
+        Whether cells count by their size.
+    cells : int, optional
+        How many cells must have a value, where a reduction over fewer would mislead.
+    formula : str
+        In place of a variable: of other numbers, in SI units.
+    unit : str
+        Key of `UNITS`.
+    digits, figures : int
+        Digits after the point, or significant ones.
+    sign : bool
+        Whether a plus is written.
+    optional : bool
+        Whether the text has a branch for the case that it is not there.
+    marks : dict of str to str
+        Mark by the variable that sets it: a text that is not empty, or a status that is not ``solved``.
+    title, group : str
+        Of rows and columns of tables; ``{beam}`` stands for its label.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    study: str = ""
+    variable: str = ""
+    at: Selection = [{}]
+    over: str = ""
+    minus: float = 0.0
+    where: str = ""
+    reduce: Literal["", "mean", "median", "smallest", "largest", "count"] = ""
+    absolute: bool = False
+    cells: int | None = None
+    formula: str = ""
+    unit: Literal[tuple(UNITS)] = ""  # type: ignore[valid-type]  # the keys
+    digits: int | None = None
+    figures: int | None = None
+    sign: bool = False
+    optional: bool = False
+    marks: dict[str, str] = {}
+    title: str = ""
+    group: str = ""
+
+    def text(self, value: float) -> str:
+        """A value, formatted, without its unit."""
+        value = value / UNITS[self.unit][1]
+        if self.figures is not None:
+            text = _significant(value, self.figures)
+        else:
+            text = f"{value:.{self.digits or 0}f}"
+            if float(text) == 0:
+                text = text.lstrip("-")
+        if self.sign and not text.startswith("-") and float(text.partition("×")[0]) != 0:
+            text = "+" + text
+        return text.replace("-", "−")
+
+    def source(self) -> str:
+        """Where it comes from, in words."""
+        if self.formula:
+            return self.formula
+        labels = "; ".join(", ".join(f"{name}={label}" for name, label in at.items()) for at in self.at)
+        return f"{self.reduce} {self.study}:/{self.variable}[{labels}]".strip()
+
+
+class Printed(BaseModel):
+    """A number that another publication prints.
+
+    Attributes
+    ----------
+    printed : str
+        As printed.
+    unit : str
+        Key of `UNITS`.
+    where : str
+        Section, figure or sentence.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    printed: str
+    unit: Literal[tuple(UNITS)] = ""  # type: ignore[valid-type]  # the keys
+    where: str
+
+
+class Table(BaseModel):
+    """Declaration of a table: what all its cells share, rows and columns.
+
+    Attributes
+    ----------
+    all : dict
+        Declaration that every cell begins with.
+    rows, columns : list of dict
+        Declarations that are put on top of it, with ``title`` and ``group``.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    all: dict[str, Any] = {}
+    rows: list[dict[str, Any]]
+    columns: list[dict[str, Any]]
+
+
+def load(path: Path) -> dict[str, Any]:
+    """Content of a YAML file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    PaperError
+        If it cannot be read.
+    """
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise PaperError(f"{path}: cannot be read: {error}") from None
+
+
+def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: Mapping[str, Dataset]) -> dict[str, Any]:
+    """All numbers of a paper.
+
+    Parameters
+    ----------
+    declared, printed : mapping
+        Declarations by name: of `Number` and of `Printed`.
+    datasets : mapping of str to Dataset
+
+    Returns
+    -------
+    dict of str to dict
+        ``text``, ``unit``, ``value`` in SI units and ``source``, by name; a number that is optional and not there has
+        the text None.
+
+    Raises
+    ------
+    PaperError
+        If a declaration is wrong, or a number is not there.
+    """
+    twice = sorted(set(declared) & set(printed))
+    if twice:
+        raise PaperError(f"{', '.join(twice)}: declared twice, in numbers.yaml and printed.yaml; rename one")
+    found: dict[str, Any] = {}
+    for name, entry in printed.items():
+        one = checked(Printed, entry, name)
+        value = float(one.printed) * UNITS[one.unit][1]
+        found[name] = {"text": one.printed.replace("-", "−"), "unit": one.unit, "value": value, "source": one.where}
+    wrong = []
+    for name, entry in declared.items():
+        try:
+            found[name] = _read(checked(Number, entry, name), found, datasets, name)
+        except PaperError as error:  # told together with what else is wrong
+            wrong.append(str(error))
+            found[name] = {"text": None, "unit": "", "value": None, "source": ""}
+    if wrong:
+        raise PaperError("\n".join(wrong))
+    return found
+
+
+def _read(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
+    value = _formula(number.formula, found, name) if number.formula else _value(number, datasets, name)
+    there = math.isfinite(value)
+    if not there and not number.optional:
+        raise PaperError(_lacking(number, datasets, name))
+    return {
+        "text": number.text(value) if there else None,
+        "unit": number.unit,
+        "value": value if there else None,
+        "source": number.source(),
+    }
+
+
+def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
+    """A table of a paper: titles and formatted cells.
+
+    Parameters
+    ----------
+    declared : mapping
+        Declaration, see `Table`.
+    datasets : mapping of str to Dataset
+    name : str
+
+    Returns
+    -------
+    dict
+        ``columns`` with ``title`` and ``group``, ``rows`` with ``title``, ``unit`` and ``cells``, texts, and ``data``,
+        the datasets for the caption. A cell without a value is a dash.
+    """
+    made = checked(Table, declared, name)
+    columns = [checked(Number, entry, name) for entry in made.columns]
+    rows, studies = [], set()
+    for entry in made.rows:
+        cells = []
+        for column in made.columns:
+            number = _without(checked(Number, _together(made.all, entry, column), name), datasets, name)
+            studies.add(number.study)
+            value = _value(number, datasets, name)
+            cells.append(number.text(value) + _marks(number, datasets, name) if math.isfinite(value) else "–")
+        rows.append(_head(checked(Number, entry, name)) | {"cells": cells})
+    data = "; ".join(f"{study}, sha256 {datasets[study].sha256[:HASH_SHOWN]}" for study in sorted(studies))
+    return {"columns": [_head(one) for one in columns], "rows": rows, "data": data}
+
+
+def checked(model: type[Any], entry: object, name: str) -> Any:
+    """A declaration, validated.
+
+    Parameters
+    ----------
+    model : type
+    entry : object
+    name : str
+        For the message.
+
+    Returns
+    -------
+    instance of the model
+
+    Raises
+    ------
+    PaperError
+        If it is not one.
+    """
+    try:
+        return model.model_validate(entry)
+    except ValidationError as error:
+        wrong = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'entry'}: {one['msg']}" for one in error.errors())
+        raise PaperError(f"{name}: {wrong}") from None
+
+
+def _together(*parts: Mapping[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    at: dict[str, Any] = {}
+    for part in parts:
+        found |= part
+        at |= part.get("at", {})
+    return found | {"at": at}
+
+
+def _without(number: Number, datasets: Mapping[str, Dataset], name: str) -> Number:
+    """A cell's declaration without labels of dimensions that its variable does not have, but its dataset has."""
+    data, variable = _group(number, datasets, name)
+    kept = [dimension for dimension in number.at[0] if dimension in data[variable].dims or dimension not in data.dims]
+    return number.model_copy(update={"at": [{dimension: number.at[0][dimension] for dimension in kept}]})
+
+
+def _titled(text: str, number: Number) -> str:
+    """A title with labels put in: a mesh size in mm, others as they are."""
+    for name, label in number.at[0].items():
+        shown = f"{1e3 * label:g} mm" if name == "mesh_size" else f"{label}"
+        text = text.replace(f"{{{name}}}", shown)
+    return text
+
+
+def _head(number: Number) -> dict[str, str]:
+    return {"title": _titled(number.title, number), "group": _titled(number.group, number), "unit": number.unit}
+
+
+def _group(number: Number, datasets: Mapping[str, Dataset], name: str) -> tuple[xr.Dataset, str]:
+    if not number.study or not number.variable:
+        raise PaperError(f"{name}: give a study and a variable, or a formula")
+    one = chosen(datasets, number.study, name)
+    group, _, variable = number.variable.rpartition("/")
+    if group and group not in one.tree.children:
+        raise PaperError(f"{name}: {one.path} has no group /{group}; give one that it has, or run the study again")
+    data = (one.tree[group] if group else one.tree).to_dataset()
+    for wanted in filter(None, (variable, number.over, _flag(number.where)[0], *number.marks)):
+        if wanted not in data.variables:
+            raise PaperError(f"{name}: {one.path} has no variable '{wanted}' in /{group}; give one that it has")
+    shown, kept = UNITS[number.unit][0], data[variable].attrs.get("units", "")
+    if kept and kept != shown and not number.over and number.reduce != "count":
+        raise PaperError(f"{name}: '{variable}' is in {kept}, which '{number.unit}' does not show; give another unit")
+    return data, variable
+
+
+def _selected(array: xr.DataArray, at: Mapping[str, Any], name: str, optional: bool = False) -> xr.DataArray:
+    for dimension, label in at.items():
+        if dimension not in array.dims:
+            raise PaperError(
+                f"{name}: '{array.name}' has no dimension '{dimension}'; it has {', '.join(map(str, array.dims))}"
+            )
+        labels = array[dimension].values.tolist()
+        lacking = [one for one in (label if isinstance(label, list) else [label]) if one not in labels]
+        if lacking and optional:
+            return array.isel({dimension: []})
+        if lacking:
+            raise PaperError(
+                f"{name}: {dimension} {lacking[0]!r} is not in the dataset; it has {', '.join(map(repr, labels))}"
+            )
+        array = array.sel({dimension: label})
+    return array
+
+
+def _value(number: Number, datasets: Mapping[str, Dataset], name: str) -> float:
+    data, variable = _group(number, datasets, name)
+    array = data[variable] / data[number.over] if number.over else data[variable]
+    array = array.rename(variable)
+    if array.dtype.kind not in "fiu":
+        return float(_selected(array, number.at[0], name).size) if number.reduce == "count" else math.nan
+    array = (array - number.minus).rename(variable) if number.minus else array
+    if number.where:
+        flag, equal, wanted = _flag(number.where)
+        if wanted not in STATUS:
+            raise PaperError(f"{name}: '{wanted}' is no status; give one of {', '.join(STATUS)}")
+        array = array.where((data[flag] == STATUS.index(wanted)) == equal)
+    values = np.concatenate([np.ravel(_selected(array, at, name, number.optional).values) for at in number.at])
+    values = values[np.isfinite(values)]
+    if number.cells is not None and len(values) != number.cells:
+        raise PaperError(
+            f"{name}: {len(values)} of {number.cells} cells have a value in {number.source()}; run "
+            f"config/{number.study}.yaml again with what it needs, or correct 'cells' and say in the text what lacks"
+        )
+    if number.reduce == "count":
+        return len(values)
+    if not len(values):
+        return math.nan
+    if number.absolute:
+        values = np.abs(values)
+    if number.reduce:
+        return float(REDUCTIONS[number.reduce](values))
+    if len(values) > 1:
+        raise PaperError(
+            f"{name}: {len(values)} cells are left; choose labels, or reduce them by {', '.join(REDUCTIONS)}"
+        )
+    return float(values[0])
+
+
+def _flag(where: str) -> tuple[str, bool, str]:
+    """Variable, whether it is to be equal, and to what."""
+    variable, _, wanted = where.partition("=")
+    return variable.rstrip("!"), not variable.endswith("!"), wanted
+
+
+def _marks(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
+    data, _ = _group(number, datasets, name)
+    text = ""
+    for variable, mark in number.marks.items():
+        array = data[variable]
+        here = {dimension: label for dimension, label in number.at[0].items() if dimension in array.dims}
+        found = np.ravel(_selected(array, here, name).values)
+        if variable == "status":
+            text += mark * bool((found != STATUS.index("solved")).any())
+        else:
+            text += mark * any(map(str, found))
+    return text
+
+
+def _lacking(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
+    """Message on a number that is not there: what was looked for, what the dataset says of it, and the remedy."""
+    if number.formula:
+        return f"{name}: the formula '{number.formula}' has no value"
+    data, variable = _group(number, datasets, name)
+    said = ""
+    if "message" in data and set(data.message.dims) <= set(data[variable].dims):
+        messages = np.concatenate([np.ravel(_selected(data.message, at, name).values.astype(str)) for at in number.at])
+        said = next((f": {message}" for message in messages if message), "")
+    path = chosen(datasets, number.study, name).path
+    return (
+        f"{name}: {path} has no value of {number.source()}{said}; run config/{number.study}.yaml again with what it "
+        "needs, or declare the number optional and give the text a branch without it"
+    )
+
+
+_OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+}
+_FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
+
+
+def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
+    """Value of a formula: arithmetic of numbers that stand above it, NaN where one of them is not there."""
+
+    def value(node: ast.AST) -> float:
+        match node:
+            case ast.Expression(body):
+                return value(body)
+            case ast.Constant(int() | float() as number):
+                return number
+            case ast.Name("pi"):
+                return math.pi
+            case ast.Name(other) if other in found:
+                known = found[other]["value"]
+                return math.nan if known is None else known
+            case ast.BinOp(left, kind, right) if type(kind) in _OPERATORS:
+                return _OPERATORS[type(kind)](value(left), value(right))
+            case ast.UnaryOp(kind, operand) if type(kind) in _OPERATORS:
+                return _OPERATORS[type(kind)](value(operand))
+            case ast.Call(ast.Name(function), arguments, []) if function in _FUNCTIONS:
+                return _FUNCTIONS[function](*map(value, arguments))
+        raise PaperError(
+            f"{name}: '{ast.unparse(node)}' of the formula is not known; give a number that is declared above, "
+            f"+ - * / ** or {', '.join(_FUNCTIONS)}"
+        )
+
+    try:
+        return value(ast.parse(text, mode="eval"))
+    except (SyntaxError, ArithmeticError, ValueError) as error:
+        raise PaperError(f"{name}: the formula '{text}' cannot be computed: {error}") from None
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _significant(value: float, figures: int) -> str:
+    """A number with significant digits, with a power of ten where it is far from one."""
+    mantissa, _, power = f"{value:.{figures - 1}e}".partition("e")
+    exponent = int(power)
+    if -4 <= exponent < 5:
+        return f"{float(f'{mantissa}e{power}'):.{max(figures - 1 - exponent, 0)}f}"
+    return f"{mantissa} × 10{str(exponent).translate(_RAISED)}"

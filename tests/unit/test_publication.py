@@ -1,0 +1,361 @@
+"""The paper: numbers by name, nothing typed, the same bytes from the same datasets; and its own source."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+from springtune.publication import PaperError
+from springtune.publication.build import run
+from springtune.publication.datasets import read
+from springtune.publication.figures import draw
+from springtune.publication.numbers import numbers, table
+from springtune.publication.typed import typed_numbers
+
+import synthetic
+
+REPOSITORY = Path(__file__).parents[2]
+PAPER = REPOSITORY / "workflow/paper"
+ATTRIBUTES = {
+    "title": "All kinds",
+    "study": "mine",
+    "springtune_version": "0.1.0",
+    "git_commit": "0123456789abcdef+changes",
+    "created": "2026-01-02T03:04:05+00:00",
+    "software": json.dumps({"numpy": "2.0.0"}),
+}
+CELL = {"beam": "200x40", "mesh_type": "free", "mesh_size": 2e-3, "material": "rubber", "load": "traction",
+        "definition": "area", "kinematics": "linear"}  # fmt: skip
+CURVE = {"beam": "200x40", "mesh_type": "free", "material": "rubber", "load": "traction"}
+
+
+def write(path, change=lambda tree: None, **attributes):
+    """A dataset of a study of all kinds, with a cell of each status."""
+    tree = synthetic.dataset()
+    data = tree.to_dataset()
+    data["status"] = data.status.copy()
+    data.status.loc[CELL] = 4
+    data["message"] = xr.full_like(data.status, "", dtype=object)
+    data.message.loc[CELL | {"definition": "paper"}] = "it buckled"
+    data.deformation_error.loc[CELL | {"definition": "paper"}] = np.nan
+    data.mesh_size.attrs["units"] = "m"
+    tree.dataset = data
+    tree.attrs = ATTRIBUTES | attributes
+    change(tree)
+    tree.to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("datasets") / "mine.nc")
+
+
+@pytest.fixture(scope="module")
+def datasets(path):
+    return read([path])
+
+
+def number(datasets, **entry):
+    """Text of a number of the study."""
+    entry = {"study": "mine"} | entry
+    return numbers({"it": entry}, {}, datasets)["it"]["text"]
+
+
+# -- numbers -----------------------------------------------------------------------------------------------------------
+
+
+def test_numbers_are_cells_reductions_and_formulas_of_the_dataset(datasets):
+    root = datasets["mine"].tree.to_dataset()
+    errors = root.deformation_error.sel(load="traction", definition="area").values
+    at = {"load": "traction", "definition": "area"}
+    share = {"variable": "deformation_error", "at": at, "unit": "%", "digits": 3}
+    assert (
+        number(datasets, variable="deformation_error", at=CELL, digits=6) == f"{root.deformation_error.sel(CELL):.6f}"
+    )
+    assert number(datasets, **share, reduce="median") == f"{100 * np.median(errors):.3f}"
+    assert number(datasets, **share, reduce="largest") == f"{100 * errors.max():.3f}"
+    assert number(datasets, variable="deformation_error", at=at, reduce="count") == str(errors.size)
+    several = [at | {"beam": "100x20"}, at | {"beam": ["200x40"]}]
+    assert number(datasets, **share | {"at": several}, reduce="mean") == f"{100 * errors.mean():.3f}"
+    assert number(datasets, variable="status", where="status=unstable", reduce="count") == "1"
+    assert number(datasets, variable="status", where="status!=unstable", reduce="count") == str(root.status.size - 1)
+    assert number(datasets, variable="mesh_type", reduce="count") == "2"
+    best = datasets["mine"].tree["sensitivity"].best_stiffness
+    share = {"over": "best_stiffness", "minus": 1, "reduce": "largest", "unit": "%", "digits": 4}
+    ratio = number(datasets, variable="sensitivity/predicted_stiffness", **share)
+    assert ratio == f"{100 * (50 / best).max():.4f}"
+    found = numbers(
+        {
+            "a": {"study": "mine", "variable": "mesh_size", "reduce": "largest", "unit": "mm"},
+            "b": {"formula": "sqrt(3) / 2 * a - printed_length", "unit": "mm", "digits": 2},
+        },
+        {"printed_length": {"printed": "12.50", "unit": "mm", "where": "Figure 1"}},
+        datasets,
+    )
+    assert [found[name]["text"] for name in ("printed_length", "a", "b")] == ["12.50", "5", "−8.17"]
+    assert found["printed_length"]["source"] == "Figure 1"
+
+
+@pytest.mark.parametrize(
+    ("value", "shown", "text"),
+    [
+        (-1.25, {"digits": 1}, "−1.2"),
+        (0.004, {"digits": 1, "sign": True}, "0.0"),
+        (-0.004, {"digits": 1, "sign": True}, "0.0"),
+        (3.25e6, {"digits": 2, "unit": "×10⁶ N/m", "sign": True}, "+3.25"),
+        (123456, {"figures": 3}, "1.23 × 10⁵"),
+        (9.2e-7, {"figures": 1}, "9 × 10⁻⁷"),
+        (0.0999, {"figures": 2, "unit": "%"}, "10"),
+        (0.234, {"figures": 1, "unit": "s"}, "0.2"),
+        (1462.0, {"figures": 3}, "1460"),
+    ],
+)
+def test_numbers_are_shown_as_declared(datasets, value, shown, text):
+    found = numbers({"it": {"formula": repr(value)} | shown}, {}, datasets)["it"]
+    assert found["text"] == text and found["value"] == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        ({"study": "other", "variable": "mesh_size"}, "no dataset of the study 'other'.*run config/other.yaml"),
+        ({"variable": "nothing/x"}, "has no group /nothing"),
+        ({"variable": "x"}, "has no variable 'x'"),
+        ({"variable": "force", "at": {"definition": "area"}}, "'force' has no dimension 'definition'"),
+        ({"variable": "force", "at": {"beam": "1x1"}}, "beam '1x1' is not in the dataset; it has '100x20', '200x40'"),
+        ({"variable": "force"}, "12 cells are left; choose labels, or reduce them"),
+        ({"variable": "status", "where": "status=lost", "reduce": "count"}, "'lost' is no status; give one of"),
+        ({"variable": "deformation_error", "at": CELL | {"definition": "paper"}},
+         r"mine.nc has no value of mine:/deformation_error.*: it buckled; run config/mine.yaml again"),
+        ({"variable": "force", "unit": "stone"}, "it: unit: "),
+        ({"variable": "mesh_size", "unit": "kN", "reduce": "mean"}, "'mesh_size' is in m, which 'kN' does not show"),
+        ({"variable": "deformation_error", "reduce": "mean", "cells": 1000}, "287 of 1000 cells have a value"),
+        ({"variable": "force", "place": {}}, "it: place: Extra inputs"),
+        ({"formula": "1 + unheard"}, "'unheard' of the formula is not known"),
+        ({"formula": "().__class__"}, "of the formula is not known"),
+        ({"formula": "1 / 0"}, "cannot be computed"),
+        ({"formula": "1 +"}, "cannot be computed"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_number_is_told_with_its_name(datasets, entry, told):
+    with pytest.raises(PaperError, match="^it: ") as error:
+        number(datasets, **entry)
+    assert re.search(told, str(error.value)), error.value
+
+
+def test_all_that_is_wrong_is_told_at_once(datasets):
+    with pytest.raises(PaperError) as error:
+        numbers({name: {"study": "mine", "variable": name} for name in ("x", "y")}, {}, datasets)
+    assert len(str(error.value).splitlines()) == 2
+    with pytest.raises(PaperError, match="x: declared twice"):
+        numbers({"x": {}}, {"x": {}}, datasets)
+
+
+def test_an_optional_number_may_lack_and_so_does_what_is_made_of_it(datasets):
+    lacking = {"study": "mine", "variable": "deformation_error", "at": CELL | {"definition": "paper"}, "optional": True}
+    found = numbers(
+        {"a": lacking, "b": {"formula": "2 * a", "optional": True}, "c": lacking | {"at": CELL | {"beam": "1x1"}}},
+        {},
+        datasets,
+    )
+    assert [found[name]["text"] for name in "abc"] == [None, None, None]
+
+
+def test_a_table_is_the_product_of_rows_and_columns(datasets):
+    made = table(
+        {
+            "all": {"study": "mine", "at": {"mesh_type": "free", "material": "rubber", "load": "traction"}},
+            "columns": [{"group": "{beam} mm", "title": "{mesh_size}", "at": {"beam": "200x40", "mesh_size": 2e-3}}],
+            "rows": [
+                {"title": "force", "variable": "force", "unit": "N", "digits": 3},
+                {"title": "area", "variable": "deformation_error", "digits": 3, "marks": {"status": "†"},
+                 "at": {"definition": "area", "kinematics": "linear"}},
+                {"title": "paper", "variable": "deformation_error",
+                 "at": {"definition": "paper", "kinematics": "linear"}},
+            ],
+        },
+        datasets,
+        "t",
+    )  # fmt: skip
+    root = datasets["mine"].tree.to_dataset()
+    assert made["columns"] == [{"group": "200x40 mm", "title": "2 mm", "unit": ""}]
+    force, error = root.force.sel(beam="200x40", material="rubber", load="traction"), root.deformation_error.sel(CELL)
+    assert [row["cells"] for row in made["rows"]] == [[f"{force:.3f}"], [f"{error:.3f}†"], ["–"]]
+
+
+# -- typed numbers -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "The error is 3.4 %.", "over 45 cells", "by 170e6 N/m", "#emph[12]", "$k = 0.866 E t$", "$k = 170$", "a 10th",
+        "in 1998", '#strong("a")7', "#text(size: 8pt)[0.5]", "line\n7 more", "`1e-3`", "half = ½ or 50",
+        "Table 1 has 9", "#figure(caption: [of 3 beams])",
+        "#let error = [3.4 %]", "#let error = 3.4", '#raw("3.4")',
+    ],
+)  # fmt: skip
+def test_a_typed_number_is_found(text):
+    assert list(typed_numbers(text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'The error is #n("e_1"), #v("a2") to #n("b"); see @tab-1, @fig-2.', "$E t = (2 k) / sqrt(3), nu = 1 / 3$",
+        "Tables 1 to 5, its Figures 7 and 8, section 4.1, Table 3", "in 2-D, P1 elements, C1122, hal-x", "// 3.4 %",
+        '#import "template.typ": *', "#set text(size: 9pt)", '#drawing("x", width: 88%, [a]) <fig-12>',
+        '#beam("200x40") of #named("nu-0.5")',
+        '#if has("x_1") [there] else [not]',
+    ],
+)  # fmt: skip
+def test_names_references_and_structure_are_no_typed_numbers(text):
+    assert not list(typed_numbers(text))
+
+
+def test_the_paper_has_no_typed_number_and_one_that_is_planted_stops_the_build(tmp_path, path):
+    text = (PAPER / "main.typ").read_text()
+    assert not list(typed_numbers(text))
+    source = tmp_path / "paper"
+    shutil.copytree(PAPER, source)
+    (source / "main.typ").write_text(text.replace("= Limits", "= Limits\n\nErrors of 3.4 % remain.", 1))
+    line = text[: text.index("= Limits")].count("\n") + 3
+    with pytest.raises(PaperError, match=rf"main.typ:{line}: '3.4 %' is typed; declare it"):
+        run(source, tmp_path / "build", tmp_path / "paper.pdf", path)
+    assert not (tmp_path / "paper.pdf").exists()
+
+
+# -- the paper's own source --------------------------------------------------------------------------------------------
+
+
+def test_every_number_is_declared_and_used():
+    text = (PAPER / "main.typ").read_text()
+    declared = yaml.safe_load((PAPER / "numbers.yaml").read_text())
+    printed = yaml.safe_load((PAPER / "printed.yaml").read_text())
+    figures = yaml.safe_load((PAPER / "figures.yaml").read_text())
+    called = set(re.findall(r'#?\b(?:n|v|has)\("([^"]+)"\)', text))
+    called |= {name for pair in re.findall(r'\brange\("([^"]+)", "([^"]+)"\)', text) for name in pair}
+    assert called <= set(declared["numbers"]) | set(printed)
+    formulas = " ".join(entry.get("formula", "") for entry in declared["numbers"].values())
+    used = called | set(re.findall(r"[a-z]\w+", formulas))
+    assert not (set(declared["numbers"]) | set(printed)) - used
+    assert set(re.findall(r'#tabular\("([^"]+)"', text)) == set(declared["tables"])
+    assert set(re.findall(r'#drawing\("([^"]+)"', text)) == set(figures)
+
+
+def test_every_reference_says_what_was_read():
+    references = yaml.safe_load((PAPER / "references.yml").read_text())
+    text = (PAPER / "main.typ").read_text()
+    cited = set(re.findall(r"@([\w-]+)", text)) - set(re.findall(r"<([\w-]+)>", text))
+    assert cited == set(references)
+    for name, one in references.items():
+        assert re.search(r"\bread\b|software", one["note"]), name
+        assert name == "original" or one["author"], name
+        doi = one.get("serial-number", {}).get("doi")
+        assert doi is None or re.fullmatch(r"10\.\d{4,}/\S+", doi), name
+
+
+# -- figures and the whole ---------------------------------------------------------------------------------------------
+
+MAIN = """#import "template.typ": *
+#show: article.with(title: [A title], authors: [somebody], abstract: [A number: #n("error").])
+
+= Results
+The error is #n("error"), in @tab as in @fig. #if has("lacking") [More: #n("lacking").] else [No more.]
+
+#tabular("errors", [Errors.]) <tab>
+#drawing("curve", [A curve.]) <fig>
+#datasets()
+"""
+NUMBERS = {
+    "numbers": {
+        "error": {"study": "mine", "variable": "deformation_error", "at": CELL, "unit": "%", "digits": 2},
+        "lacking": {"study": "mine", "variable": "deformation_error", "at": CELL | {"definition": "paper"},
+                    "optional": True},
+    },
+    "tables": {
+        "errors": {
+            "all": {"study": "mine", "variable": "deformation_error", "at": CELL, "digits": 3},
+            "columns": [{"group": "{beam}", "title": "{mesh_size}", "at": {"beam": "200x40", "mesh_size": 2e-3}}],
+            "rows": [{"title": "area"}],
+        }
+    },
+}  # fmt: skip
+FIGURES = {"curve": {"panels": [{"plot": "plot_sensitivity", "study": "mine", "at": CURVE}]}}
+
+
+def paper(folder, main=MAIN, declared=NUMBERS, figures=FIGURES):
+    """Source of a small paper."""
+    folder.mkdir(exist_ok=True)
+    shutil.copy(PAPER / "template.typ", folder)
+    (folder / "main.typ").write_text(main)
+    for name, content in {"numbers": declared, "printed": {}, "figures": figures}.items():
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+    return folder
+
+
+def test_the_same_dataset_gives_the_same_bytes_and_another_one_others(tmp_path, path):
+    pypdf = pytest.importorskip("pypdf")
+    source, output = paper(tmp_path / "source"), tmp_path / "paper.pdf"
+    run(source, tmp_path / "build", output, path)
+    content = output.read_bytes()
+    # Another process, another folder.
+    command = [sys.executable, "-m", "springtune.publication.build", source, tmp_path / "other", tmp_path / "again.pdf"]
+    done = subprocess.run([*command, path], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "again.pdf").read_bytes() == content
+    text = "\n".join(page.extract_text() for page in pypdf.PdfReader(output).pages)
+    (sha256,) = (one.sha256[:12] for one in read([path]).values())
+    assert "No more." in text and "0123456789ab+" in text and text.count(sha256) == 3
+    assert "mine: 200x40, free, rubber, traction, sha256" in " ".join(text.split())
+    assert not list(tmp_path.rglob("*.unfinished"))
+
+    later = write(tmp_path / "later.nc", created="2026-01-03T00:00:00+00:00")
+    run(source, tmp_path / "build", output, later)
+    assert output.read_bytes() != content
+
+    # What fails leaves what was there.
+    content = output.read_bytes()
+    paper(source, MAIN.replace('The error is #n("error")', 'The error is #n("unheard")'))
+    with pytest.raises(PaperError) as error:
+        run(source, tmp_path / "build", output, path)
+    assert "no number is called 'unheard'" in str(error.value) and "main.typ:5" in str(error.value)
+    assert output.read_bytes() == content
+
+
+def test_figures_tell_what_is_wrong_with_them(tmp_path, datasets):
+    panel = {"plot": "plot_sensitivity", "study": "mine", "at": CURVE}
+    for panels, told in (
+        ([panel | {"plot": "plot_nothing"}], "nothing plots 'plot_nothing'; give one of sketch_block"),
+        ([panel | {"plot": "open"}], "nothing plots 'open'"),
+        ([panel | {"at": {}}], "plot_sensitivity of the study 'mine': choose one beam"),
+        ([panel | {"at": {"colour": 1}}], "unexpected keyword argument 'colour'"),
+        ([panel, panel], "several panels; give the figure a size"),
+        ([panel | {"study": "other"}], "no dataset of the study 'other'"),
+    ):
+        with pytest.raises(PaperError, match="^figure f: ") as error:
+            draw({"f": {"panels": panels}}, datasets, tmp_path)
+        assert told in str(error.value)
+    with pytest.raises(PaperError, match="figure f: colums: "):
+        draw({"f": {"panels": [panel], "colums": 2}}, datasets, tmp_path)
+
+
+def test_without_typst_the_message_says_what_to_install(tmp_path, path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "typst", None)
+    with pytest.raises(PaperError, match=re.escape('pip install "springtune[paper]"')):
+        run(paper(tmp_path / "source"), tmp_path / "build", tmp_path / "paper.pdf", path)
+
+
+def test_a_dataset_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(PaperError, match=r"lost.nc: there is no such dataset"):
+        run(paper(tmp_path / "source"), tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "lost.nc")
+    with pytest.raises(PaperError, match=r"main.typ: there is no such file"):
+        run(tmp_path / "nowhere", tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "lost.nc")

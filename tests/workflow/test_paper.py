@@ -1,0 +1,85 @@
+"""`snakemake paper`: the studies that it reads in one run, and what it costs the others."""
+
+import re
+
+import pytest
+
+STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark")
+STUDY = """
+title: As small as it gets
+beams:
+  80x10: {{length: 80 mm, height: {height} mm}}
+materials:
+  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
+outputs: [tables]
+grids:
+  one: {{beam: 80x10, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
+        definition: lattice, kinematics: linear, sensitivity: false}}
+"""
+
+
+def write(run):
+    """The studies of the paper, each of one scene, of which each has another beam."""
+    for height, name in enumerate(STUDIES, 10):
+        run.write(f"{name}.yaml", STUDY.format(height=height))
+
+
+def jobs(output):
+    """Rules of the jobs of a dry run."""
+    return set(re.findall(r"^(\w+) +\d+$", output, re.MULTILINE))
+
+
+def test_the_paper_takes_all_its_studies_and_another_target_takes_one(run):
+    write(run)
+    code, output = run.snakemake("paper.yaml", "-n", "paper")
+    assert code == 0, output
+    assert {"paper", "collect", *(f"{name}_collect" for name in STUDIES[1:])} <= jobs(output)
+    code, output = run.snakemake("definitions.yaml", "-n")
+    assert code == 0, output
+    assert {"collect", "mesh", "solve"} <= jobs(output) and not {"paper", "block_collect"} & jobs(output)
+
+
+@pytest.mark.slow
+def test_a_paper_without_its_numbers_says_which_and_studies_are_as_if_they_were_run_by_themselves(run):
+    write(run)
+    code, output = run.snakemake("paper.yaml", "--keep-going", "paper")
+    assert code != 0
+    assert "has no group /sensitivity" in output and "give one that it has, or run the study again" in output
+    assert not (run.folder / "results/paper/paper.pdf").exists()
+    times = run.times("results/*/dataset.nc")
+    assert len(times) == len(STUDIES)
+    for name in ("paper", "definitions"):
+        code, output = run.snakemake(f"{name}.yaml", "--keep-going", f"results/{name}/dataset.nc")
+        assert code == 0 and "Nothing to be done" in output, output
+    assert run.times("results/*/dataset.nc") == times
+
+
+def fonts(resources):
+    """Fonts of a page and of the figures on it: name, and whether it is embedded."""
+    for font in (resources.get("/Font") or {}).values():
+        font = font.get_object()
+        parts = [one.get_object() for one in font.get("/DescendantFonts", [font])]
+        files = ("/FontFile", "/FontFile2", "/FontFile3")
+        embedded = any(name in part.get("/FontDescriptor", {}) for part in parts for name in files)
+        yield font.get("/BaseFont"), embedded or font["/Subtype"] == "/Type3"
+    for one in (resources.get("/XObject") or {}).values():
+        if "/Resources" in one.get_object():
+            yield from fonts(one.get_object()["/Resources"].get_object())
+
+
+@pytest.mark.slow
+def test_the_paper_is_made_of_its_studies(run, repository, tmp_path):
+    pypdf = pytest.importorskip("pypdf")
+    run = type(run)(tmp_path)
+    code, output = run.snakemake(repository / "config/paper.yaml", "--keep-going", "paper")
+    assert code == 0, output
+    path = run.folder / "results/paper/paper.pdf"
+    content, reader = path.read_bytes(), pypdf.PdfReader(path)
+    assert 8 <= len(reader.pages) <= 12
+    found = [font for page in reader.pages for font in fonts(page["/Resources"].get_object())]
+    assert len(found) > 5 and all(embedded for _, embedded in found), found
+    code, output = run.snakemake(repository / "config/paper.yaml", "--keep-going", "paper")
+    assert code == 0 and "Nothing to be done" in output
+    path.unlink()
+    code, output = run.snakemake(repository / "config/paper.yaml", "--keep-going", "paper")
+    assert code == 0 and path.read_bytes() == content
