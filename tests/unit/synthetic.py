@@ -35,6 +35,7 @@ def root():
         paper_displacement=mesh, paper_reference_displacement=mesh, paper_stiffness=mesh,
         material_young_modulus=("material",), material_poisson_ratio=("material",),
     )  # fmt: skip
+    data["beam_length"], data["beam_height"] = ("beam", [0.1, 0.2]), ("beam", [0.02, 0.04])
     return data.assign(status=xr.ones_like(data.deformation_error, dtype=np.int8))
 
 

@@ -1,9 +1,12 @@
 """Pages made from datasets: what they print, and that nothing of one mesh stands there as if it were of all."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from springtune.campaign import page as tables_page
 from springtune.kinds.benchmark import tables as benchmark
 from springtune.kinds.benchmark.variables import BENCHMARK
 from springtune.kinds.moduli import tables as definitions
@@ -11,6 +14,7 @@ from springtune.kinds.moduli.variables import MODULI
 from springtune.kinds.scenes.variables import ROOT
 from springtune.kinds.stability import tables as stability
 from springtune.kinds.stability.variables import STABILITY
+from springtune.output.tables import decimals, number
 from springtune.problem.compare import assured
 
 
@@ -225,3 +229,83 @@ def test_page_tells_flutter_from_buckling_and_says_why_a_scene_is_not_solved():
     rows = tables(text)["Scenes of the study"]
     assert [(row["status"], row["message"]) for row in rows] == [("unstable", "why not")]
     assert "1 of 2 scenes are solved" in text
+
+
+# -- the page of all tables --------------------------------------------------------------------------------------------
+
+
+def scenes(printed=False):
+    """Root of a bar, 2 mm thick, whose `area` is linear alone and whose `lattice` is unstable in compression."""
+    axes = {
+        "beam": ("alu-bar",), "mesh_type": ("free",), "mesh_size": (4e-3,), "material": ("alu",),
+        "load": ("traction", "compression"), "definition": ("lattice", "area"), "kinematics": ("nonlinear", "linear"),
+    }  # fmt: skip
+    root = ROOT.empty(axes)
+    root["beam_length"].values[:], root["beam_height"].values[:] = 0.12, 0.025
+    root["beam_thickness"] = ("beam", [2e-3])
+    root["force"].values[:], root["reference_displacement"].values[:] = 1e4, 3.42e-6
+    root["reference_applies"].values[:] = 1
+    root["status"].loc[{"definition": "lattice"}] = 1
+    root["displacement"].loc[{"definition": "lattice"}] = 3.5e-6
+    root["deformation_error"].loc[{"definition": "lattice"}] = 0.0234
+    place = {"definition": "lattice", "load": "compression", "kinematics": "nonlinear"}
+    root["status"].loc[place] = 4
+    place = {"definition": "area", "kinematics": "linear", "load": "traction"}
+    root["status"].loc[place], root["displacement"].loc[place] = 1, 3.4e-6
+    root["deformation_error"].loc[place] = -0.006
+    place = {"definition": "area", "kinematics": "linear", "load": "compression"}
+    root["status"].loc[place], root["message"].loc[place] = 3, "no equilibrium"
+    if printed:
+        place = {"load": "traction"}
+        root["paper_displacement"].loc[place], root["paper_reference_displacement"].loc[place] = 3.6e-3, 3.4e-3
+        root["paper_deformation_error"].loc[place], root["paper_table"].loc[place] = 0.0588, 7
+    return xr.DataTree(root.assign_attrs(title="A bar", springtune_version="1", git_commit="", created="today"))
+
+
+def lines_of(folder):
+    """Texts of the cells of the page, line by line."""
+    html = (folder / "index.html").read_text()
+    rows = re.findall(r"<tr.*?</tr>", html, re.DOTALL)
+    return html, [[re.sub(r"<.*?>", "", cell) for cell in re.findall(r"<t[dh].*?</t[dh]>", row)] for row in rows]
+
+
+def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
+    assert tables_page.write(scenes(), tmp_path)[-1] == "index.html"
+    html, lines = lines_of(tmp_path)
+    found = [line for line in lines if "nonlinear" in line or "linear" in line]
+    compression, traction = found[:2], found[2:]
+    assert traction[0] == ["alu-bar", "4", "10000", "0.003420", "nonlinear", "0.003500", "+2.34", "not asked"]
+    assert traction[1] == ["linear", "0.003500", "+2.34", "0.003400", "−0.60"]
+    assert compression[0][5:] == ["0.003500u", "+2.34", "not asked"] and compression[1][-1] == "not converged"
+    assert 'title="no equilibrium"' in html and "u</span> marks an equilibrium that is unstable" in html
+    assert "alu-bar, 120 x 25 mm, 2 mm thick" in html
+
+
+def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_path):
+    tables_page.write(scenes(), tmp_path)
+    html, _ = lines_of(tmp_path)
+    assert "paper prints" not in html and "printed" not in html.split("</style>")[1] and "Table" not in html
+    tables_page.write(scenes(printed=True), tmp_path)
+    html, lines = lines_of(tmp_path)
+    assert "the paper prints" in html and "Table 7: traction" in html
+    assert ["3.400", "3.60", "5.88"] in [line[3:6] for line in lines]
+
+
+@pytest.mark.parametrize(
+    "values, texts",
+    [
+        ((9.5004, 0.4751), ["9.500", "0.475"]),  # three digits of the smallest
+        ((234.56, 12.3), ["234.6", "12.3"]),
+        ((0.00342, np.nan), ["0.003420", "–"]),
+        ((1e-12, 3.0), ["1e−12", "3"]),  # no number of decimals serves both
+        ((0.0, -0.0), ["0", "0"]),
+        ((-2.5, 2.5), ["−2.500", "2.500"]),
+    ],
+)
+def test_a_column_has_the_decimals_that_its_numbers_need(values, texts):
+    places = decimals(values)
+    assert [number(value, places) for value in values] == texts
+
+
+def test_a_number_that_is_nothing_has_no_sign():
+    assert number(-0.001, 2, sign=True) == "0.00" and number(0.5, 1, sign=True) == "+0.5"

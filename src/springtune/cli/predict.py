@@ -87,7 +87,7 @@ def predict(
         click.echo(str(getattr(error, "message", error)), err=True)
         raise SystemExit(1) from None
     name = f"{mesh_type} {size}" if made else Path(mesh_type).name
-    click.echo(prediction_text(f"{sheet.name} mm, {name}: {about}", sheet, solid, found, known, mesh_type, sizes))
+    click.echo(prediction_text(f"{sheet.label}, {name}: {about}", sheet, solid, found, known, mesh_type, sizes))
 
 
 def _quantity(option: str, text: str, kind: str) -> float:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from ..problem.geometry import beam_label
+
 if TYPE_CHECKING:
     from .dataset import Label
 
@@ -101,3 +103,23 @@ def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label
 
 def _listed(labels: Iterable[object]) -> str:
     return ", ".join(repr(label) for label in labels) or "nothing"
+
+
+def labelled_beam(data: xr.Dataset, name: str) -> str:
+    """A beam's name with what it measures, see `springtune.problem.geometry.beam_label`.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Root of a dataset, or of that beam; the name alone where it does not say how long a beam is.
+    name : str
+
+    Returns
+    -------
+    str
+    """
+    if "beam_length" not in data:
+        return str(name)
+    found = data[["beam_length", "beam_height"]]
+    found = found.sel(beam=name) if "beam" in found.dims else found
+    return beam_label(str(name), float(found.beam_length), float(found.beam_height))

@@ -1,6 +1,6 @@
-"""One style for all figures: readable in grey, at the width of a text column."""
+"""One style for all figures: at the width of a column or of a page of a journal, and readable in grey."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any, Literal, ParamSpec, TypeVar
 
@@ -8,52 +8,94 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 P = ParamSpec("P")
 Drawn = TypeVar("Drawn")
 
+COLUMN = 3.5
+"""Width of a column of a journal with two [inch]."""
+
+PAGE = 7.16
+"""Width of its page [inch]."""
+
+SMALL = 7.0
+"""Size of the smallest text of a figure [pt], which journals still take at these widths."""
+
 SETTINGS: dict[Any, object] = {
     "axes.axisbelow": True,
     "axes.grid": True,
-    "axes.labelsize": 9,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.7,
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",
-    "axes.titlesize": 9.5,
+    "axes.titlesize": 8,
     "axes.titley": 1.0,  # without a look at what stands on top of the axes, which takes a tenth of drawing
     "figure.dpi": 100,
-    "figure.titlesize": 10,
-    "font.size": 9,
+    "figure.titlesize": 8.5,
+    "font.size": 8,
     "grid.color": "0.9",
-    "grid.linewidth": 0.6,
-    "legend.fontsize": 8,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": SMALL,
     "legend.frameon": False,
-    "lines.linewidth": 1.6,
-    "lines.markersize": 5,
-    "pdf.fonttype": 3,  # type 42 cuts fonts to size, in half of the time of a figure
-    "savefig.dpi": 150,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 3.6,
+    "pdf.fonttype": 42,  # TrueType: IEEE and ACM refuse Type 3
+    "ps.fonttype": 42,
+    "savefig.dpi": 300,
+    "svg.fonttype": "none",
+    "xtick.labelsize": SMALL,
+    "xtick.major.size": 2.5,
+    "xtick.minor.pad": 4.5,  # texts of both kinds of ticks on one line
+    "xtick.minor.size": 1.5,
+    "ytick.labelsize": SMALL,
+    "ytick.major.size": 2.5,
+    "ytick.minor.pad": 4.5,
+    "ytick.minor.size": 1.5,
 }
 
-# Of falling darkness, each with its own dashes and marker: the order survives a grey print.
+# Okabe and Ito's colours (https://jfly.uni-koeln.de/color), which the colour-blind tell apart; dashes and markers tell
+# lines apart in grey.
 LINES: tuple[dict[str, Any], ...] = (
-    {"color": "#14213d", "linestyle": "-", "marker": "o"},
-    {"color": "#b5382a", "linestyle": "--", "marker": "s"},
-    {"color": "#e09f3e", "linestyle": "-.", "marker": "D"},
-    {"color": "#6a994e", "linestyle": ":", "marker": "^"},
-    {"color": "#8d99ae", "linestyle": (0, (6, 2, 1, 2, 1, 2)), "marker": "v"},
+    {"color": "#000000", "linestyle": "-", "marker": "o"},
+    {"color": "#d55e00", "linestyle": (0, (5, 1.6)), "marker": "s"},
+    {"color": "#0072b2", "linestyle": (0, (6, 1.5, 1.2, 1.5)), "marker": "D"},
+    {"color": "#009e73", "linestyle": (0, (1.4, 1.4)), "marker": "^"},
+    {"color": "#e69f00", "linestyle": (0, (8, 2)), "marker": "v"},
+    {"color": "#aa4488", "linestyle": (0, (3, 1.4, 1.2, 1.4, 1.2, 1.4)), "marker": "P"},
 )
 
 LOGARITHMIC = {"xscale": "log", "yscale": "log"}
 
 
 def line(number: int) -> dict[str, Any]:
-    """Colour, dashes and marker of the line of that number; beyond the fifth, colours come back with other markers."""
+    """Colour, dashes and marker of the line of that number; beyond the last, colours come back with other markers."""
     turn, colour = divmod(number, len(LINES))
     return {"color": LINES[colour]["color"]} | {
         key: LINES[(colour + 2 * turn) % len(LINES)][key] for key in ("linestyle", "marker")
     }
+
+
+def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
+    """Numbers such as 0.5, 2 and 300 in place of powers on a logarithmic axis.
+
+    Parameters
+    ----------
+    panel : matplotlib.axes.Axes
+    *axes : str
+        ``"x"``, ``"y"``.
+    """
+    for name in axes:
+        chosen, (low, high) = getattr(panel, f"{name}axis"), sorted(getattr(panel, f"get_{name}lim")())
+        chosen.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        if low <= 0 or high / low > 150:
+            chosen.set_minor_locator(NullLocator())
+            continue
+        kept = "25" if high / low > 5 else "2345678"
+        chosen.set_minor_formatter(
+            FuncFormatter(lambda value, _, kept=kept: f"{value:g}" if f"{value:e}"[0] in kept else "")
+        )
 
 
 def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
@@ -76,6 +118,8 @@ def panels(
     layout: Literal["constrained", "compressed", "tight"] | None = None,
     sharex: bool = False,
     sharey: bool = False,
+    ratios: Sequence[float] | None = None,
+    widths: Sequence[float] | None = None,
 ) -> tuple[Figure | SubFigure | None, np.ndarray]:
     """Axes to plot on, and the figure where that is to be arranged.
 
@@ -91,6 +135,8 @@ def panels(
         Layout engine of a figure that is made.
     sharex, sharey : bool, optional
         Whether the panels of a figure share their axes.
+    ratios, widths : sequence of float, optional
+        Heights of its rows and widths of its columns, to each other.
 
     Returns
     -------
@@ -109,7 +155,9 @@ def panels(
 
         ax = plt.figure(figsize=figsize, layout=layout)
     if isinstance(ax, Figure | SubFigure):
-        return ax, ax.subplots(nrows, ncols, squeeze=False, sharex=sharex, sharey=sharey)
+        return ax, ax.subplots(
+            nrows, ncols, squeeze=False, sharex=sharex, sharey=sharey, height_ratios=ratios, width_ratios=widths
+        )
     given = np.asarray(ax, dtype=object)
     if given.size != nrows * ncols:
         raise ValueError(f"the plot has {nrows} x {ncols} panels, ax has {given.size} Axes")
@@ -124,20 +172,45 @@ def size(figure: Figure | SubFigure) -> tuple[float, float]:
 
 def arrange(
     figure: Figure | SubFigure | None,
+    axes: np.ndarray,
     *,
     left: float,
     right: float,
     bottom: float,
     top: float,
-    wspace: float | None = None,
-    hspace: float | None = None,
-    title: str | None = None,
+    across: float = 0.0,
+    down: float = 0.0,
+    title: str = "",
 ) -> None:
-    """Margins of a figure [inch] and the title above its panels, at the upper left."""
+    """Margins of a figure and the gaps between its panels [inch], and the title above them, at the upper left.
+
+    Parameters
+    ----------
+    figure : Figure, SubFigure or None
+        None, as `panels` returns it, leaves everything as it is.
+    axes : (nrows, ncols) ndarray of Axes
+    left, right, bottom, top : float
+        Margins [inch].
+    across, down : float
+        Gaps between columns and between rows [inch].
+    title : str, optional
+    """
     if figure is None:
         return
     width, height = size(figure)
     margins = {"left": left / width, "right": 1 - right / width, "bottom": bottom / height, "top": 1 - top / height}
-    figure.subplots_adjust(**margins, wspace=wspace, hspace=hspace)
+    rows, columns = axes.shape
+    # Gaps are over what is left for a panel; a figure that is too small for its margins keeps a little.
+    one = max((width - left - right - (columns - 1) * across) / columns, 0.1)
+    other = max((height - bottom - top - (rows - 1) * down) / rows, 0.1)
+    figure.subplots_adjust(**_kept(margins), wspace=across / one, hspace=down / other)
     if title:
-        figure.suptitle(title, x=0.01, y=1 - 0.06 / height, va="top", ha="left")
+        figure.suptitle(title, x=0.05 / width, y=1 - 0.05 / height, va="top", ha="left")
+
+
+def _kept(margins: dict[str, float]) -> dict[str, float]:
+    """Margins that leave panels a tenth of a figure at least."""
+    for low, high in (("left", "right"), ("bottom", "top")):
+        if margins[high] - margins[low] < 0.1:
+            margins |= {low: 0.2, high: 0.8}
+    return margins

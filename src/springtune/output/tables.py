@@ -39,6 +39,57 @@ def _number(value: object) -> object:
     return "" if np.isnan(value) else f"{value:.8g}"
 
 
+def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
+    """Decimals with which the numbers of a column show so many significant digits.
+
+    The largest number has as many, the smallest that is not zero at most one fewer. Points of a column stay in line.
+
+    Parameters
+    ----------
+    values : iterable of float
+        NaN where there is none.
+    digits : int
+        Significant digits.
+    most : int
+        Decimals from which on a column is better off with a power of ten in each number.
+
+    Returns
+    -------
+    int or None
+        None where no number of decimals serves: sizes differ too much, or are too small or too large.
+    """
+    sizes = np.abs(np.fromiter(values, dtype=float))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    if not len(sizes):
+        return 0
+    high, low = (int(np.floor(np.log10(size))) for size in (sizes.max(), sizes.min()))
+    found = max(digits - 1 - high, digits - 2 - low, 0)
+    return found if found <= most and high + found < digits + 4 and high < 9 else None
+
+
+def number(value: float, places: int | None, sign: bool = False) -> str:
+    """A number with decimals as `decimals` finds them; "–" where there is none.
+
+    Parameters
+    ----------
+    value : float
+    places : int or None
+        None writes four significant digits.
+    sign : bool
+        Whether a plus is written.
+
+    Returns
+    -------
+    str
+    """
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:{'+' if sign else ''}{'.4g' if places is None else f'.{places}f'}}"
+    # Nothing is not below nothing.
+    text = text.lstrip("-+") if not float(text) else text
+    return text.replace("-", "−")
+
+
 def markdown_table(heads: list[str], rows: Iterable[list[str]]) -> list[str]:
     """Lines of a table: texts in the first column, numbers flush right in the others."""
     lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]

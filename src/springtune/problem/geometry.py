@@ -46,6 +46,37 @@ class Beam:
         if not self.name:
             object.__setattr__(self, "name", f"{1e3 * self.length:g}x{1e3 * self.height:g}")
 
+    @property
+    def label(self) -> str:
+        """Name with what the sheet measures, for titles, as `beam_label` gives it.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Beam("200 mm", "40 mm").label, st.Beam("80 mm", "30 mm", name="pad").label
+        ('200x40 mm', 'pad (80 x 30 mm)')
+        """
+        return beam_label(self.name, self.length, self.height)
+
+
+def beam_label(name: str, length: float, height: float) -> str:
+    """A beam's name with what it measures: ``"200x40 mm"``, or ``"pad (80 x 30 mm)"`` of a name that does not say it.
+
+    Parameters
+    ----------
+    name : str
+    length, height : float
+        [m]; NaN where they are not known, then it is the name alone.
+
+    Returns
+    -------
+    str
+    """
+    long, high = (round(1e3 * side, 9) for side in (length, height))
+    if long != long or high != high:
+        return name
+    return f"{name} mm" if name == f"{long:g}x{high:g}" else f"{name} ({long:.4g} x {high:.4g} mm)"
+
 
 @dataclass(frozen=True)
 class Strip:

@@ -155,26 +155,12 @@ class Curve:
         >>> beam, steel = st.Beam("200 mm", "30 mm"), st.Material("210 GPa", 0.3)
         >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "300 kN")
         >>> axes = st.sensitivity(scene).plot()
-        >>> axes.get_title(), axes.get_ylabel()
-        ('200x30 mm, traction of 300000 N', 'deformation error [%]')
+        >>> axes.get_title(loc="left"), axes.get_ylabel()
+        ('200x30 mm, traction of 300000 N', 'Deformation error [%]')
         """
-        from .drawing import axes
+        from .drawing import drawer
 
-        ax = axes(ax)
-        ax.axhline(0.0, color="0.6", linewidth=0.8)
-        unstable = np.where(self.stable, np.nan, 100 * self.error)
-        ax.plot(self.stiffness, np.where(self.stable, 100 * self.error, np.nan), label="network")
-        if np.isfinite(unstable).any():
-            ax.plot(self.stiffness, unstable, linestyle=":", color="0.4", label="not stable")
-        for value, label, style in (
-            (self.best_stiffness, "best", "-"),
-            (self.predicted_stiffness, "closed form", "--"),
-        ):
-            if np.isfinite(value):
-                ax.axvline(value, color="0.3", linewidth=0.8, linestyle=style, label=f"{label}, {value:.4g} N/m")
-        ax.set(xlabel="stiffness [N/m]", ylabel="deformation error [%]", title=self.title)
-        ax.legend()
-        return ax
+        return drawer().draw_curve(ax, self)
 
 
 def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Curve:
@@ -238,5 +224,5 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         best.status,
         best.message,
         predicted_stiffness(scene.material, beam, face_edge(scene.mesh), scene.load),
-        f"{beam.name} mm, {scene.load} of {abs(force):g} N",
+        f"{beam.label}, {scene.load} of {abs(force):g} N",
     )

@@ -144,7 +144,7 @@ class Scene:
 
     def __repr__(self) -> str:
         return (
-            f"Scene({self.beam.name} mm, {len(self.mesh.points)} particles, {self.material.name}, {self.load} of "
+            f"Scene({self.beam.label}, {len(self.mesh.points)} particles, {self.material.name}, {self.load} of "
             f"{abs(self.force):g} N, {self.definition.name}, {self.kinematics})"
         )
 
@@ -443,16 +443,15 @@ class Result:
         >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
         >>> mesh = st.make_mesh(beam, "structured", "5 mm")
         >>> axes = st.Scene(beam, mesh, steel, "traction", "400 kN").solve().plot()
-        >>> axes.get_title()
+        >>> axes.get_title(loc="left")
         'traction of 400000 N: 9.508 mm'
         """
-        from .drawing import draw_springs
+        from .drawing import drawer
 
         if not np.isfinite(self.displacement):
             raise ValueError(f"there is no equilibrium to draw: {self.message}")
-        ax = draw_springs(ax, self.scene.mesh, self.displacements, self.spring_forces)
-        ax.set_title(f"{self.scene.load} of {abs(self.scene.force):g} N: {1e3 * self.displacement:.4g} mm")
-        return ax
+        title = f"{self.scene.load} of {abs(self.scene.force):g} N: {1e3 * self.displacement:.4g} mm"
+        return drawer().draw_springs(ax, self.scene.mesh, self.displacements, self.spring_forces, title)
 
 
 @lru_cache(maxsize=32)

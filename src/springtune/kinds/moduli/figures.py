@@ -1,21 +1,21 @@
 """Definitions compared: effective against asked Poisson's ratio, error against mesh size, and errors by load."""
 
 import numpy as np
+from matplotlib.ticker import NullLocator
 
-from ...output import style
-from ...output.dataset import most_requested
-from ...output.selection import choose, group, labels_of
+from ...output import labels, style
+from ...output.dataset import STATUS, most_requested
+from ...output.selection import choose, group, labelled_beam, labels_of
 from .outputs import figures
-
-DEFINITION_FAMILIES = (
-    ("uniform", "van-gelder", "lattice", "element-fit"),
-    ("area", "angular", "delingette", "adjoint"),
-    ("baudet", "baudet-corrected", "flechon", "axis-exact"),
-)
-"""Definitions in the order in which lines take their looks; the others come after."""
 
 FLOOR = 1e-5
 """Smallest error drawn on a logarithmic axis [1]; below is rounding and the reference's own error."""
+
+MOST_NAMED = 6
+"""Lines with a name in a panel of errors against mesh size; the others are there in grey."""
+
+BASELINE = "uniform"
+"""The definition that is named beside the best ones."""
 
 
 def definitions(tree):
@@ -52,52 +52,38 @@ def _main(root, names, selection):
     return chosen
 
 
-def _looks(names):
-    """Look of the line of each definition."""
-    order = [name for family in DEFINITION_FAMILIES for name in family]
-    order += [name for name in names if name not in order]
-    return {name: style.line(number) for number, name in enumerate(order)}
-
-
-def _panels(ax, types, height):
-    """Figure, or None, and one panel a mesh type, at most four in a row, with room for a legend under each."""
+def _panels(ax, count, height):
+    """Figure, or None, its panels in rows of two, those of them that are used, and the height without notes."""
+    columns = min(2, max(1, count))
+    rows = -(-count // columns)
+    width, height = (style.COLUMN if columns == 1 else style.PAGE), 0.2 + height * rows
     if ax is not None and not hasattr(ax, "subplots"):
-        figure, axes = style.panels(ax, ncols=len(types), figsize=(1, 1))
-        return None, axes
-    columns = min(4, max(1, len(types)))
-    rows = max(1, -(-len(types) // columns))
-    figure, axes = style.panels(ax, rows, columns, sharey=True, figsize=(0.8 + 2.55 * columns, 0.5 + height * rows))
-    for panel in axes.flat[len(types) :]:
+        figure, axes = style.panels(ax, 1, count, figsize=(width, height))
+        return figure, axes, axes.ravel(), height
+    figure, axes = style.panels(ax, rows, columns, figsize=(width, height))
+    for panel in axes.flat[count:]:
         panel.set_visible(False)
-    return figure, axes
+    return figure, axes, axes.ravel()[:count], height
 
 
-def _arrange(figure, axes, legend, title):
-    """Place panels of `_panels`; `legend` is the room under each [inch]."""
-    if figure is None:
-        return
-    panel = (style.size(figure)[1] - 0.5) / len(axes)
-    hspace = (legend + 0.2) / (panel - legend - 0.2)
-    style.arrange(figure, left=0.62, right=0.1, bottom=legend, top=0.6, wspace=0.06, hspace=hspace, title=title)
+def _arrange(figure, axes, title, ax=None, height=0.0, notes=()):
+    """Place panels of `_panels`, with room for notes below each; a figure of our own grows by that."""
+    under = labels.LINE * max(map(labels.lines_of, notes), default=0)
+    if ax is None and notes:
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
+    title = labels.wrapped(title, (style.PAGE if axes.shape[1] > 1 else style.COLUMN) - 0.1, 8.5)
+    place = {"left": 0.5, "right": 0.06, "bottom": 0.4 + under, "top": 0.36 + 0.14 * labels.lines_of(title),
+             "across": 0.5, "down": 0.68 + under, "title": title}  # fmt: skip
+    if notes:
+        labels.settle(figure, axes, place | {"across": 0.1})
+    else:
+        style.arrange(figure, axes, **place)
 
 
-def _legend(panel):
-    """Legend under a panel; a panel without lines says why."""
-    if not panel.get_legend_handles_labels()[0]:
-        panel.text(0.5, 0.5, "not solved on every mesh size", transform=panel.transAxes, ha="center", va="center")
-        return
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.24)}
-    panel.legend(**place, fontsize=5.4, ncols=2, handlelength=2.0, columnspacing=0.6)
-
-
-def _grouped(curves):
-    """Curves by label: those that are one line to the eye share it."""
-    groups = {}
-    for name, values in curves.items():
-        groups.setdefault(tuple(np.round(values, 3)), []).append(name)
-    for names in groups.values():
-        label = ", ".join(names[:2]) + (f" +{len(names) - 2}" if len(names) > 2 else "")
-        yield names[0], label, curves[names[0]]
+def _statuses(flags):
+    """How many of some cells became what, in words."""
+    counts = {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
+    return ", ".join(f"{name} ({count})" for name, count in counts.items()) or "none was asked for"
 
 
 @style.styled
@@ -131,33 +117,55 @@ def plot_moduli(data, ax=None):
     ('asked for', 'effective')
     """
     moduli = group(data, "moduli")
-    types = labels_of(moduli.status == 1, "mesh_type") or labels_of(moduli.status != 0, "mesh_type")
-    looks = _looks(moduli.definition.values)
-    wanted = moduli.poisson_ratio.values
-    figure, axes = _panels(ax, types, 3.1)
-    for panel, mesh_type in zip(axes.flat, types):
-        panel.plot([0, 0.5], [0, 0.5], color="0.75", linewidth=3, zorder=0, label="as asked")
-        curves = {}
-        for definition in moduli.definition.values:
-            here = moduli.sel(mesh_type=mesh_type, definition=definition)
-            sizes = np.flatnonzero((here.status == 1).any("poisson_ratio").values)
-            if len(sizes):
-                curves[definition] = here.effective_poisson_ratio.values[sizes[0]]
-        for definition, label, found in _grouped(curves):
-            panel.plot(wanted, found, label=label, **looks[definition])
-        panel.set(title=mesh_type, xlim=(-0.01, 0.51), ylim=(-0.4, 0.65), xlabel="asked for")
-        _legend(panel)
-    for panel in axes[:, 0]:
-        panel.set_ylabel("effective")
-    _arrange(figure, axes, 1.15, "Effective Poisson's ratio against the one asked for")
-    return axes.ravel()[: len(types)]
+    types = labels_of(moduli.status != 0, "mesh_type")
+    figure, axes, flat, height = _panels(ax, len(types), 1.95)
+    title = "Effective Poisson's ratio against the one asked for; grey: as asked"
+    _arrange(figure, axes, title)
+    drawn = [_moduli(panel, moduli.sel(mesh_type=mesh_type)) for panel, mesh_type in zip(flat, types)]
+    for panel, mesh_type in zip(flat, types):
+        panel.set(title=mesh_type, xlabel="asked for", ylabel="effective")
+    _arrange(figure, axes, title, ax, height, [said for _, said, _ in drawn])
+    for panel, (ends, said, why) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    return flat
+
+
+def _moduli(panel, here):
+    """Draw one mesh type: ends of lines for their names, a note, and what to say where there is no line."""
+    curves, lacking, wanted = {}, [], here.poisson_ratio.values
+    for definition in here.definition.values:
+        one = here.sel(definition=definition)
+        sizes = np.flatnonzero((one.status == 1).any("poisson_ratio").values)
+        if len(sizes):
+            curves[str(definition)] = one.effective_poisson_ratio.values[sizes[0]]
+        elif (one.status != 0).any():
+            lacking.append(str(definition))
+    low, high = wanted.min(), max(wanted.max(), wanted.min() + 1e-3)
+    panel.plot([low, high], [low, high], color="0.8", linewidth=3.5, zorder=0)
+    panel.set_xlim(low - 0.02, high + 0.02)
+    values = np.concatenate([[low, high], *curves.values()])
+    bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
+    panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
+    ends = []
+    for number, names in enumerate(labels.alike(curves, 0.012)):
+        found, look = curves[names[0]], style.line(number)
+        panel.plot(wanted, found, label=", ".join(names), **look)
+        known = np.flatnonzero(np.isfinite(found))
+        if len(known):
+            ends.append((wanted[known[-1]], found[known[-1]], ", ".join(names), look["color"]))
+    room = panel.get_window_extent().width / panel.figure.dpi
+    said = labels.wrapped(f"no moduli: {', '.join(lacking)}", room) if lacking and ends else ""
+    return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
 
 
 @style.styled
 def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None, kinematics=None):
     """Field error against mesh size with fitted rates, a panel a mesh type, a line a definition.
 
-    Definitions that are one line to the eye share it.
+    Definitions that are one line to the eye share it; of many the best and `uniform` have names, the others are grey.
 
     Parameters
     ----------
@@ -185,33 +193,75 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
     >>> [panel.get_title(loc="left") for panel in axes]
     ['structured', 'free']
     >>> axes[0].figure.get_suptitle()
-    '200x40, steel, traction: error of the displacement field in L2, fitted rate in brackets'
+    '200x40 mm, steel, traction: error of the displacement field in L2, fitted rate in brackets'
     """
     root = group(data, "/")
     chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
     root = root.sel(chosen)
     error = root.field_error
-    types = labels_of(np.isfinite(error).all("mesh_size"), "mesh_type") or labels_of(root.status != 0, "mesh_type")
-    looks = _looks(root.definition.values)
-    figure, axes = _panels(ax, types, 3.5)
-    for panel, mesh_type in zip(axes.flat, types):
-        every = error.sel(mesh_type=mesh_type).transpose("definition", "mesh_size").values
-        full = np.isfinite(every).all(axis=1)
-        curves = {name: 100 * np.maximum(row, FLOOR) for name, row in zip(root.definition.values[full], every[full])}
-        sizes = 1e3 * root.mesh_size.values
-        for definition, label, values in _grouped(curves):
-            if len(sizes) > 1:
-                label += f" ({np.polyfit(np.log(sizes), np.log(values), 1)[0]:.1f})"
-            panel.loglog(sizes, values, label=label, **looks[definition])
-        panel.set(title=mesh_type, xlabel="Mesh size [mm]")
-        panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-        panel.minorticks_off()
-        _legend(panel)
-    for panel in axes[:, 0]:
-        panel.set_ylabel("Error [%]")
-    title = f"{chosen['beam']}, {chosen['material']}, {chosen['load']}"
-    _arrange(figure, axes, 1.5, f"{title}: error of the displacement field in L2, fitted rate in brackets")
-    return axes.ravel()[: len(types)]
+    types = labels_of(root.status != 0, "mesh_type")
+    figure, axes, flat, height = _panels(ax, len(types), 1.95)
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['material']}, {chosen['load']}"
+    title = f"{title}: error of the displacement field in L2, fitted rate in brackets"
+    _arrange(figure, axes, title)
+    drawn = [_field_errors(panel, error.sel(mesh_type=name), root.status.sel(mesh_type=name))
+             for panel, name in zip(flat, types)]  # fmt: skip
+    values = 100 * np.maximum(error.values[np.isfinite(error.values)], FLOOR)
+    for panel, mesh_type in zip(flat, types):
+        panel.set(title=mesh_type, xlabel="Mesh size [mm]", ylabel="Error [%]")
+        if len(values):
+            panel.set_ylim(0.7 * values.min(), 1.4 * values.max())
+        style.plain(panel, "y")
+    _arrange(figure, axes, title, ax, height, [said for _, said, _ in drawn])
+    for panel, (ends, said, why) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    return flat
+
+
+def _field_errors(panel, error, status):
+    """Draw one mesh type, see `_moduli`: the best definitions and the baseline with names, the others in grey."""
+    asked = np.flatnonzero((status != 0).any("definition").values)
+    error, status = error.isel(mesh_size=asked), status.isel(mesh_size=asked)
+    every = error.transpose("definition", "mesh_size").values
+    flags = status.transpose("definition", "mesh_size").values
+    sizes, names = 1e3 * error.mesh_size.values, error.definition.values
+    known = np.isfinite(every)
+    curves = {str(name): 100 * np.maximum(row, FLOOR) for name, row, there in zip(names, every, known) if there.any()}
+    panel.set(xscale="log", yscale="log", xlim=(sizes.min() / 1.2, sizes.max() * 1.2))
+    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    panel.xaxis.set_minor_locator(NullLocator())
+    if not curves:
+        return [], "", f"No definition has a field error here: {_statuses(flags)}."
+    together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
+    together.sort(key=lambda one: np.nanmean(np.log(curves[one[0]])))
+    base, named = next((one for one in together if BASELINE in one), None), together[:MOST_NAMED]
+    if base is not None and base not in named:
+        named[-1] = base
+    others = [name for one in together if one not in named for name in one]
+    for name in others:
+        panel.plot(sizes, curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
+    ends = []
+    for number, one in enumerate(named):
+        values, look = curves[one[0]], style.line(number)
+        there = np.flatnonzero(np.isfinite(values))
+        label = ", ".join(one)
+        if len(there) > 1:
+            rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
+            label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
+        panel.plot(sizes, values, label=label, **look)
+        ends.append((sizes[there[-1]], values[there[-1]], label, look["color"]))
+    said = [f"grey: {', '.join(others)}"] if others else []
+    lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
+    said += [f"no error: {', '.join(lacking)}"] if lacking else []
+    for name, there, flag in zip(names, known, flags):
+        without = sizes[~there & (flag > 0)]
+        if there.any() and len(without):
+            said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said), ""
 
 
 @style.styled
@@ -258,34 +308,56 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         choose(root.status != 0, material=material)
     if solved.any():
         root = root.isel(definition=np.flatnonzero(solved.any(["mesh_size", "load", "material"])))
-    names, loads = root.definition.values, root["load"].values
-    figsize = (2.1 + 1.35 * len(materials), 1.35 + 0.23 * len(names))
-    figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=figsize)
-    axes = axes[0]
-    for panel, material in zip(axes, materials):
-        here = root.deformation_error.sel(material=material).transpose("mesh_size", "definition", "load").values
-        error = np.full(here.shape[1:], np.nan)
-        for values in 100 * here[::-1]:  # the finest mesh that each was solved on stays
-            error = np.where(np.isfinite(values), values, error)
-        shade = np.log10(np.clip(np.abs(error), 0.1, 100))
-        image = panel.imshow(shade, cmap="YlOrBr", vmin=-1, vmax=2, aspect="auto")
-        for row, column in np.argwhere(np.isfinite(error)):
-            size = abs(error[row, column])
-            text = f"{error[row, column]:+.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}"
-            colour = "white" if shade[row, column] > 1.2 else "k"
-            panel.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
+    root = root.isel(load=np.flatnonzero((root.status != 0).any(["mesh_size", "definition", "material"])))
+    names, loads = root.definition.values.tolist(), root["load"].values.tolist()
+    left, bottom = 0.12 + max(map(labels.width, names)), 0.32 + max(map(labels.width, loads))
+    room = {wide: (wide - left - 0.62 - 0.08 * (len(materials) - 1)) / (len(loads) * len(materials))
+            for wide in (style.COLUMN, style.PAGE)}  # fmt: skip
+    wide = style.COLUMN if room[style.COLUMN] >= CELL_WIDTH else style.PAGE
+    figure, axes = style.panels(
+        ax, ncols=len(materials), sharey=True, figsize=(wide, 0.62 + bottom + 0.165 * len(names))
+    )
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
+    lines = labels.wrapped(f"{title}: deformation error [%] on the finest mesh solved", wide - 0.1, 8.5)
+    style.arrange(figure, axes, left=left, right=0.62, bottom=bottom, top=0.35 + 0.14 * labels.lines_of(lines),
+                  across=0.08, title=lines)  # fmt: skip
+    for panel, material in zip(axes[0], materials):
+        cells = root.sel(material=material)
+        image = _heat(panel, *(cells[name].transpose("mesh_size", "definition", "load").values
+                               for name in ("deformation_error", "status")))  # fmt: skip
         panel.set_xticks(range(len(loads)), loads)
-        panel.xaxis.set_tick_params(rotation=90, labelsize=7)
+        panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
         panel.set_yticks(range(len(names)), names)
-        panel.set_title(material, fontsize=8)
+        panel.set_title(material)
         panel.grid(False)
     if figure is not None:
         width, height = style.size(figure)
-        bar = figure.add_axes([1 - 0.55 / width, 0.85 / height, 0.1 / width, 1 - 1.4 / height])
+        bar = figure.add_axes([1 - 0.52 / width, bottom / height, 0.1 / width, 1 - (bottom + 0.63) / height])
         figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
-        title = f"{chosen['beam']}, {chosen['mesh_type']}: deformation error [%]"
-        style.arrange(figure, left=1.3, right=0.65, bottom=0.85, top=0.55, wspace=0.08, title=title)
-    return axes
+        figure.text(0.05 / width, 0.05 / height, "×: no result; –: not asked for", fontsize=style.SMALL, color="0.25")
+    return axes[0]
+
+
+CELL_WIDTH = 0.3
+"""Width that the number in a cell needs [inch]."""
+
+
+def _heat(panel, errors, flags):
+    """Draw errors by definition and load, each with its number: an image."""
+    error = np.full(errors.shape[1:], np.nan)
+    for values in 100 * errors[::-1]:  # the finest mesh that each was solved on stays
+        error = np.where(np.isfinite(values), values, error)
+    asked = (flags != 0).any(axis=0)
+    shade = np.log10(np.clip(np.abs(error), 0.1, 100))
+    image = panel.imshow(shade, cmap="YlOrBr", vmin=-1, vmax=2, aspect="auto")
+    for row, column in np.ndindex(error.shape):
+        size = abs(error[row, column])
+        text = f"{error[row, column]:+.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
+        if np.isnan(size):
+            text = "×" if asked[row, column] else "–"
+        colour = "white" if shade[row, column] > 1.2 else "0.5" if text == "–" else "k"
+        panel.text(column, row, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
+    return image
 
 
 def _spread(root, solved):

@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 
-from ...output import style
-from ...output.selection import cells, choose, group, labels_of
+from ...output import labels, style
+from ...output.dataset import STATUS
+from ...output.selection import cells, choose, group, labelled_beam, labels_of
+from ...problem.loads import LOADS
 from ..base import distinct
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
@@ -76,63 +78,127 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
 
 
 def _sensitivity(curves, root, selection, ax):
-    lowest, highest = np.nanmin(curves.stiffness.values), np.nanmax(curves.stiffness.values)
-    unit = 1e6 if highest >= 1e6 else 1.0
-    figure, ((axes,),) = style.panels(ax, figsize=(5.6, 3.5))
-    style.arrange(figure, left=0.56, right=0.14, bottom=0.4725, top=0.525)
-    unstable_shown = False
+    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
+    panel, (unit, written) = axes[0, 0], labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
+    place = {"left": 0.45, "right": 0.14, "bottom": 0.4, "top": 0.52}
+    style.arrange(figure, axes, **place)
+    ends, seen = [], set()
     for number, size in enumerate(curves.mesh_size.values):
         curve = curves.isel(mesh_size=number)
-        if not (curve.status.values != 0).any():
-            continue
-        look = style.line(number)
-        marker = look.pop("marker")
-        stiffness, error = curve.stiffness.values, 100 * np.abs(curve.deformation_error.values)
-        best, predicted = float(curve.best_stiffness), float(curve.predicted_stiffness)
-        stable = curve.status.values == 1
-        if np.isfinite(best):
-            # The curve's lowest point lies between two of its stiffnesses.
-            place = np.searchsorted(stiffness, best)
-            stable = np.insert(stable, place, True)
-            stiffness, error = np.insert(stiffness, place, best), np.insert(error, place, 0.0)
-        stiffness = stiffness / unit
-        axes.plot(stiffness, np.where(stable, error, np.nan), label=f"{1e3 * size:g} mm", **look)
-        if not stable.all():
-            unstable_shown = True
-            axes.plot(stiffness, np.where(stable, np.nan, error), color=look["color"], linewidth=0.7)
-        axes.plot(best / unit, 0, marker=marker, color=look["color"], clip_on=False, zorder=4)
-        axes.plot(
-            predicted / unit, 0, marker="|", markersize=13, markeredgewidth=1.6, color=look["color"], clip_on=False
-        )
-    title = ", ".join(_named(selection, "beam", "mesh_type", "material", "load"))
-    if root is not None:
-        for value in np.unique(root.paper_stiffness.values[np.isfinite(root.paper_stiffness.values)]):
-            axes.axvline(value / unit, color="0.45", linewidth=0.8, linestyle=(0, (2, 2)), zorder=1)
-            place = {"xy": (value / unit, 0.985), "xycoords": ("data", "axes fraction")}
-            axes.annotate(
-                "paper", **place, xytext=(2, 0), textcoords="offset points", va="top", color="0.35", fontsize=7.5
-            )
-        title += f"\n{_force(float(root.force))}, reference {1e3 * float(root.reference_displacement):.4g} mm"
-    axes.plot([], [], marker="o", color="0.3", linestyle="", label="minimum")
-    axes.plot([], [], marker="|", markersize=10, markeredgewidth=1.6, color="0.3", linestyle="", label="predicted")
-    if unstable_shown:
-        axes.plot([], [], color="0.3", linewidth=0.7, label="buckled: equilibrium unstable")
-    axes.set(xlim=(lowest / unit, highest / unit), ylim=(0, MOST_SHOWN), ylabel="|Deformation error| [%]")
-    axes.set_xlabel(f"Uniform spring stiffness [{'' if unit == 1 else '10⁶ '}N/m]")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.62, 1.0), ncols=2)
-    axes.set_title(title)
-    return axes
+        if (curve.status.values != 0).any():
+            end, found = _curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number))
+            ends, seen = [*ends, *end], seen | found
+    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit
+    errors = 100 * np.abs(curves.deformation_error.values)
+    highest = np.nanmax(errors, initial=0.0)
+    lowest_of_each = [np.nanmin(one) for one in errors.reshape(-1, errors.shape[-1]) if np.isfinite(one).any()]
+    top = MOST_SHOWN if max(lowest_of_each, default=0) < 0.8 * MOST_SHOWN else 1.1 * highest
+    panel.set(ylim=(0, min(top, 1.1 * highest) if highest else MOST_SHOWN), ylabel="|Deformation error| [%]")
+    panel.set_xlim(*((known.min(), known.max()) if len(known) else (0, 1)))
+    panel.set_xlabel(f"Uniform spring stiffness [{written}N/m]")
+    panel.set_title(_sensitivity_title(panel, root, selection), pad=12)
+    if root is not None and "paper_stiffness" in root:
+        _mark_printed(panel, root.paper_stiffness.values, unit)
+    labels.settle(figure, axes, place)
+    if not ends:
+        labels.say(panel, _why_no_curve(curves), bare=False)
+        return panel
+    # Names first, since they widen the panel. They begin below the key.
+    labels.name_lines(panel, ends)
+    _key(panel, seen)
+    return panel
+
+
+def _curve(panel, curve, unit, name, look):
+    """Draw one curve: ends for names, and what of it needs a word."""
+    marker, colour, seen = look["marker"], look["color"], set()
+    line = {"color": colour, "linestyle": look["linestyle"]}
+    stiffness, error = curve.stiffness.values, 100 * np.abs(curve.deformation_error.values)
+    best, predicted, flags = float(curve.best_stiffness), float(curve.predicted_stiffness), curve.status.values
+    if np.isfinite(best):
+        # The curve's lowest point lies between two of its stiffnesses.
+        place = np.searchsorted(stiffness, best)
+        flags = np.insert(flags, place, 1)
+        stiffness, error = np.insert(stiffness, place, best), np.insert(error, place, 0.0)
+        panel.plot(best / unit, 0, marker=marker, markersize=4.5, color=colour, clip_on=False, zorder=4)
+        seen.add("minimum")
+    if np.isfinite(predicted):
+        panel.plot(predicted / unit, 0, marker="|", markersize=11, markeredgewidth=1.2, color=colour, clip_on=False)
+        seen.add("predicted")
+    unstable = np.where(flags == 4, error, np.nan)
+    panel.plot(stiffness / unit, np.where(flags == 4, np.nan, error), label=name, **line)
+    if np.isfinite(unstable).any():
+        seen.add("unstable")
+        panel.plot(stiffness / unit, unstable, color=colour, linewidth=0.5)
+    known = np.flatnonzero(np.isfinite(error))
+    if not len(known):
+        return [], seen
+    seen |= {STATUS[flag] for flag in np.unique(flags[np.isnan(error)]) if flag > 1}
+    return [(stiffness[known[-1]] / unit, error[known[-1]], name, colour)], seen
+
+
+KEY = {
+    "minimum": ("minimum", {"marker": "o", "markersize": 4.5, "linestyle": ""}),
+    "predicted": ("predicted", {"marker": "|", "markersize": 9, "markeredgewidth": 1.2, "linestyle": ""}),
+    "unstable": ("thin: unstable", {"linewidth": 0.5}),
+    "not_converged": ("gap: not converged", {"linestyle": ""}),
+    "failed": ("gap: failed", {"linestyle": ""}),
+}
+"""What of a sensitivity figure is explained beside its curves, and how it looks."""
+
+
+def _key(panel, seen):
+    shown = [(text, look) for name, (text, look) in KEY.items() if name in seen]
+    handles = [panel.plot([], [], color="0.3", **look)[0] for _, look in shown]
+    if shown:
+        panel.legend(handles, [text for text, _ in shown], loc="upper center", bbox_to_anchor=(0.52, 1.02),
+                     handlelength=1.2, labelspacing=0.25, borderaxespad=0.2)  # fmt: skip
+
+
+def _sensitivity_title(panel, root, selection):
+    named = dict(selection)
+    if root is not None and "beam" in named:
+        named["beam"] = labelled_beam(root, named["beam"])
+    room = panel.get_window_extent().width / panel.figure.dpi
+    first = labels.wrapped(", ".join(_named(named, "beam", "mesh_type", "material", "load")), room, 8)
+    if root is None:
+        return first
+    reference = float(root.reference_displacement)
+    text = f"reference {1e3 * reference:.4g} mm".replace("-", "−") if np.isfinite(reference) else "no reference"
+    return f"{first}\n{_force(float(root.force))}, {text}"
+
+
+def _mark_printed(panel, printed, unit):
+    """Where the paper's stiffness lies; its name stands above the panel, where no curve is."""
+    low, high = panel.get_xlim()
+    values = np.unique(printed[np.isfinite(printed)])
+    values = values[(values > low * unit) & (values < high * unit)]
+    for value in values:
+        panel.axvline(value / unit, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1)
+    if len(values):
+        text = "the paper's " + ", ".join(f"{value / unit:g}" for value in values)
+        panel.annotate(text, (values[0] / unit, 1), xycoords=("data", "axes fraction"), xytext=(0, 2), va="bottom",
+                       textcoords="offset points", ha="center", color="0.25", fontsize=style.SMALL)  # fmt: skip
+
+
+def _why_no_curve(curves):
+    """Words in place of curves none of which has an error."""
+    flags = np.unique(curves.status.values[curves.status.values != 0])
+    if 1 in flags:
+        return "solved, but without a reference there is no error"
+    said = ", ".join(STATUS[flag].replace("_", " ") for flag in flags)
+    messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
+    return f"no stiffness has an error: {said}" + "".join(f"; {text}" for text in messages[:1])
 
 
 def _force(newtons):
-    return f"{newtons / 1e3:g} kN" if abs(newtons) >= 1e3 else f"{newtons:g} N"
+    text = f"{newtons / 1e3:g} kN" if abs(newtons) >= 1e3 else f"{newtons:g} N"
+    return text.replace("-", "−") if np.isfinite(newtons) else "no force"
 
 
 def _named(selection, *names):
     """Labels of a selection for a title."""
-    for name in names:
-        if name in selection:
-            yield f"{selection[name]} mm" if name == "beam" else selection[name]
+    return [str(selection[name]) for name in names if name in selection]
 
 
 # -- errors against mesh size ------------------------------------------------------------------------------------------
@@ -181,35 +247,97 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     """
     root = group(data, "/")
     root, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
-    figure, axes = style.panels(ax, ncols=len(beams), sharey=True, figsize=(1.2 + 2.2 * len(beams), 3.2))
-    axes = axes[0]
-    for panel, name in zip(axes, beams):
-        here = root.sel(beam=name)
-        sizes = 1e3 * here.mesh_size.values
-        for number, definition in enumerate(here.definition.values):
-            error = 100 * here.deformation_error.sel(definition=definition).values
-            if np.isfinite(error).any():
-                panel.plot(sizes, error, label=definition, **style.line(number))
+    shown = []
+    for name in beams:
+        asked = labels_of(root.status.sel(beam=name) != 0, "definition")
+        parts = np.array_split(asked, -(-len(asked) // MOST_LINES))
+        shown += [(name, part.tolist()) for part in parts]
+    columns = min(3, len(shown)) if len(shown) != 4 else 2
+    figure, axes, height = _small_multiples(ax, len(shown), columns)
+    flat = axes.ravel()[: len(shown)]
+    title = ", ".join(_named(selection, "mesh_type", "material", "load"))
+    place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
+    style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
+    drawn = []
+    for panel, (name, definitions) in zip(flat, shown):
+        drawn.append(_errors(panel, root.sel(beam=name), definitions, first=panel is flat[0]))
+        panel.set(title=labelled_beam(root, name), xlabel="Mesh size [mm]")
+    under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
+    if ax is None:
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("Deformation error [%]")
+    labels.settle(figure, axes, {**place, "bottom": 0.4 + under, "down": 0.7 + under, "across": 0.06})
+    for panel, (ends, said) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        if ends:
+            labels.note(panel, said)
+        else:
+            labels.say(panel, "no errors: " + said.replace("\n", "; "))
+    return flat
+
+
+MOST_LINES = 6
+"""Definitions in one panel; more of them take further rows of panels."""
+
+
+def _small_multiples(ax, count, columns):
+    """Figure, panels in rows, and the height of a figure without notes: one panel a column wide, more as a page."""
+    rows = -(-count // columns)
+    width, height = (style.COLUMN if columns == 1 else style.PAGE), 0.2 + rows * 2.1
+    if ax is not None and not hasattr(ax, "subplots"):
+        figure, axes = style.panels(ax, 1, count, figsize=(width, height))
+        return figure, axes, height
+    figure, axes = style.panels(ax, rows, columns, sharey=True, figsize=(width, height))
+    for panel in axes.ravel()[count:]:
+        panel.set_visible(False)
+    return figure, axes, height
+
+
+def _errors(panel, here, definitions, first):
+    """Draw errors of one beam over mesh size: ends of the lines for their names, and what a note says."""
+    here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
+    sizes, ends, said, statuses = 1e3 * here.mesh_size.values, [], [], set()
+    for number, definition in enumerate(definitions):
+        cell = here.sel(definition=definition)
+        error, flags = 100 * cell.deformation_error.values, cell.status.values
+        look, known = style.line(number), np.isfinite(error)
+        if known.any():
+            panel.plot(sizes, error, label=definition, **look)
+            last = np.flatnonzero(known)[-1]
+            ends.append((sizes[last], error[last], definition, look["color"]))
+        doubtful = known & (flags > 1)
+        if doubtful.any():
+            panel.plot(sizes[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
+                       markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
+            statuses |= {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}
+        said += _lacking(definition, sizes, flags, known)
+    if statuses:
+        said.insert(0, f"hollow: {', '.join(sorted(statuses))}")
+    if "paper_displacement" in here:
         printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
         if here.force < 0:  # printed without sign
             printed = -printed
         if np.isfinite(printed).any():
-            panel.plot(sizes, printed, "x", color="0.45", markersize=6, label="as printed")
-        panel.axhline(0, color="0.3", linewidth=0.8)
-        panel.set_xscale("log")
-        panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-        panel.minorticks_off()
-        panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
-        panel.set(title=f"{name} mm", xlabel="Mesh size [mm]")
-    axes[0].set_ylabel("Deformation error [%]")
-    if figure is None:
-        axes[0].legend()
-        return axes
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=len(labels))
-    title = ", ".join(_named(selection, "mesh_type", "material", "load"))
-    style.arrange(figure, left=0.62, right=0.1, bottom=0.78, top=0.55, wspace=0.1, title=title)
-    return axes
+            panel.plot(sizes, printed, "x", color="0.35", markersize=4.5, label="as printed")
+            said = ["×: as the paper prints", *said] if first else said
+    panel.set_xscale("log")
+    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    panel.minorticks_off()
+    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
+    panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said)
+
+
+def _lacking(definition, sizes, flags, known):
+    """Sizes on which a definition was asked for and has no error, and why: lines of a note."""
+    reasons = {}
+    for size, flag in zip(sizes[~known], flags[~known]):
+        if flag:
+            reason = "no reference" if flag == 1 else STATUS[flag].replace("_", " ")
+            reasons.setdefault(reason, []).append(f"{size:g}")
+    return [f"{definition}, {', '.join(found)} mm: {reason}" for reason, found in reasons.items()]
 
 
 def _by_beam(root, beam, mesh_type, material, load, kinematics):
@@ -225,15 +353,22 @@ def _by_beam(root, beam, mesh_type, material, load, kinematics):
 # -- deformed networks -------------------------------------------------------------------------------------------------
 
 DEFINITION = ("lattice", "calibrated", "paper")
-"""Whose network is shown: the first of these that the study has, else its first."""
+"""Whose network is shown: of those solved on most beams the first of these, else the first."""
 
 
 def deformed(tree):
     """Figures of deformed networks: one for each mesh type, material and load; see `sensitivity`."""
-    status = group(tree, "/").status.sel(kinematics="nonlinear")
-    names = group(tree, "fields").definition.values.tolist()
-    definition = next((name for name in DEFINITION if name in names), names[0])
+    status, fields = group(tree, "/").status.sel(kinematics="nonlinear"), group(tree, "fields")
+    names = fields.definition.values.tolist()
+    solved = status.sel(definition=names).isin((1, 2, 4)).any("mesh_size")
+    if "displacement_x" in fields:
+        moved = fields.displacement_x.isel(particle=0)
+        moved = moved.sel(kinematics="nonlinear") if "kinematics" in moved.dims else moved
+        solved = moved.notnull().any("mesh_size")
     for stem, selection in distinct("deformed", SCENE_LABELS, cells(status != 0, SCENE_LABELS)).items():
+        counts = dict(zip(names, solved.sel(selection).sum("beam").transpose("definition").values.tolist()))
+        best = [name for name in names if counts[name] == max(counts.values())]
+        definition = next((name for name in DEFINITION if name in best), best[0])
         yield stem, plot_deformed, selection | {"definition": definition}
 
 
@@ -269,26 +404,53 @@ def plot_deformed(
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_deformed(tree, mesh_type="structured", material="steel", load="traction", definition="paper")
     >>> axes[0].figure.get_suptitle()
-    'structured, steel, traction: network (paper) over reference (grey)'
+    'structured, steel, traction'
     """
     fields, root = group(data, "fields", alone=False), group(data, "/")
     kept = fields.definition.values.tolist()
     definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
-    _, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
+    cut, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
     fields = fields.sel({"definition": definition, "mesh_type": selection["mesh_type"]})
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
-    figure, axes = style.panels(ax, nrows=len(beams), figsize=(6.0, 0.5 + 1.6 * len(beams)))
-    axes = axes[:, 0]
+    extents = [_extent(fields.sel(beam=name)) for name in beams]
+    room = style.COLUMN - 0.42 - 0.08
+    heights = [float(np.clip(1.25 * room * high / wide, 0.45, 1.8)) for wide, high in extents]
+    figure, axes = style.panels(
+        ax, nrows=len(beams), figsize=(style.COLUMN, 0.8 + sum(heights) + 0.6 * (len(beams) - 1)), ratios=heights
+    )
+    title = ", ".join(_named(selection, "mesh_type", "material", "load"))
+    place = {"left": 0.45, "right": 0.08, "bottom": 0.38, "top": 0.58, "down": 0.6, "title": title}
+    style.arrange(figure, axes, **place)
+    grid, axes = axes, axes[:, 0]
     for panel, name in zip(axes, beams):
-        _deformed(panel, fields.sel(beam=name), selection, name)
-    labels = ", ".join(_named(selection, "mesh_type", "material", "load"))
-    title = f"{labels}: network ({definition}) over reference (grey)"
-    style.arrange(figure, left=0.51, right=0.06, bottom=0.42, top=0.55, hspace=0.75, title=title)
+        _deformed(
+            panel,
+            fields.sel(beam=name),
+            cut.sel(beam=name, definition=definition),
+            selection,
+            labelled_beam(root, name),
+        )
+        panel.apply_aspect()  # its limits
+    over = 0.13 * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
+    if ax is None:
+        figure.set_size_inches(style.COLUMN, style.size(figure)[1] + over * len(axes))
+    labels.settle(figure, grid, place | {"top": 0.58 + over, "down": 0.6 + over})
+    if figure is not None:
+        width, height = style.size(figure)
+        figure.text(0.05 / width, 1 - 0.2 / height, f"lines: network ({definition}); grey: reference; dashed: at rest",
+                    va="top", fontsize=style.SMALL, color="0.25")  # fmt: skip
     return axes
 
 
-def _deformed(panel, fields, selection, beam):
+def _extent(fields):
+    """Width and height of a body at rest."""
+    sides = [fields[f"outline_{axis}"].values for axis in "xy"]
+    found = [np.ptp(side[np.isfinite(side)]) if np.isfinite(side).any() else 0.0 for side in sides]
+    return found if min(found) > 0 else (5.0, 1.0)
+
+
+def _deformed(panel, fields, root, selection, beam):
     known = np.isfinite(fields.x.values).any(axis=fields.x.dims.index("particle"))
     fields = fields.isel(mesh_size=np.flatnonzero(known)[-1] if known.any() else 0)
     load = {"material": selection["material"], "load": selection["load"]}
@@ -300,22 +462,36 @@ def _deformed(panel, fields, selection, beam):
     )
     kept = np.isfinite(outline[:, 0])
     outline, there = outline[kept], there[kept]
-    largest = np.abs(there).max()
-    scale = _round(0.06 * np.ptp(outline[:, 0]) / largest) if largest > 0 else 1
-    panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=1.0)
-    panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.6", linewidth=0.6, linestyle=(0, (3, 3)))
-    known = np.isfinite(fields.spring_first.values)
+    shown, known = (there if np.isfinite(there).any() else moved), np.isfinite(fields.spring_first.values)
+    largest = np.nanmax(np.abs(shown), initial=0.0) if np.isfinite(shown).any() else 0.0
+    scale = _round(0.06 * np.ptp(outline[:, 0]) / largest) if largest > 0 and len(outline) else 1
+    lacking = []
+    if np.isfinite(there).any():
+        panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
+    else:
+        lacking.append("no reference")
+    if len(outline):
+        panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)))
     ends = np.stack([fields.spring_first.values[known], fields.spring_second.values[known]], axis=1).astype(int)
+    flag = int(root.status.sel(mesh_size=fields.mesh_size.values))
+    status = "not asked for" if flag == 0 else STATUS[flag].replace("_", " ")
+    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
+    text = f"{beam}, mesh {1e3 * float(fields.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
     if np.isfinite(moved).any():
         # One line with gaps: thousands of lines take ten times as long.
         springs = np.full((len(ends), 3, 2), np.nan)
         springs[:, :2] = (rest + scale * moved)[ends]
-        panel.plot(*springs.reshape(-1, 2).T, color="#14213d", linewidth=0.5)
+        panel.plot(*springs.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
+        lacking += [status] if flag not in (0, 1) else []
     else:
-        panel.text(0.5, 0.5, "not solved", transform=panel.transAxes, ha="center", va="center")
-    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
-    panel.set_title(f"{beam} mm, mesh {1e3 * float(fields.mesh_size):g} mm, displacements x {scale:g}")
+        labels.say(panel, f"no network: {status}" if flag != 1 else "no network stored", bare=False)
+    room = panel.get_window_extent().width / panel.figure.dpi
+    panel.set_title(labels.wrapped(", ".join([text, *lacking]), room, 8))
     panel.grid(False)
+
+
+NETWORK_LINE = 0.35
+"""Width of the lines of springs [pt]."""
 
 
 def _round(value):
@@ -326,19 +502,30 @@ def _round(value):
 
 # -- the pressed block -------------------------------------------------------------------------------------------------
 
-BLOCK_LOADS = ("traction", "compression", "pressure")
 ENERGIES = ("area", "delingette")
-POISSON_LAW = (4 / 3) / (9 / 8)
-"""Constrained modulus of a block held sideways at nu = 1/2 over that of a network, nu = 1/3 [1]."""
+BLOCK_SHOWN = ("uniform", "paper", "lattice", "patch", "area", "delingette")
+"""Definitions whose pressed faces are shown before others."""
+
+MOST_FACES = 5
+"""Networks in the panel of the pressed face."""
+
+
+def _pressing(names):
+    """The load under which a face is looked at: pressure, else the first that presses a face."""
+    pressed = [name for name in names if name in LOADS and LOADS[name].kind.pressed]
+    return "pressure" if "pressure" in pressed or not pressed else pressed[0]
 
 
 def block(tree):
-    """The figure of a pressed block: its last material, its last beam and its finest structured mesh.
+    """The figure of a pressed block: its last material and beam; its finest structured mesh, or of its first mesh type.
 
     See `sensitivity`.
     """
-    present = (group(tree, "/").status != 0).sel(load=["pressure"], mesh_type=["structured"])
-    selection = {"mesh_type": "structured"}
+    present = group(tree, "/").status != 0
+    present = present.sel(load=[_pressing(labels_of(present, "load"))])
+    types = labels_of(present, "mesh_type")
+    selection = {"mesh_type": "structured" if "structured" in types else types[0]}
+    present = present.sel(mesh_type=[selection["mesh_type"]])
     for name, place in (("material", -1), ("beam", -1), ("mesh_size", 0)):
         selection[name] = labels_of(present, name)[place]
         present = present.sel({name: [selection[name]]})
@@ -374,79 +561,158 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_block(tree, beam="200x40", mesh_type="structured", mesh_size=1e-3, material="rubber")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['One stiffness for three loads? (small strain)', 'The pressed face']
+    ['One stiffness for all loads? (small strain)', 'The pressed face']
     >>> axes[0].figure.get_suptitle()
     '200x40 mm, structured 1 mm, rubber'
     """
     faces, root = group(data, "block", alone=False), group(data, "/")
-    pressed = (root.status != 0).sel(load=["pressure"])
-    chosen = choose(pressed, beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
-    figure, ((left, right),) = style.panels(ax, ncols=2, figsize=(8.4, 4.2))
-    if "sensitivity" in data.children:
-        _stiffness(left, group(data, "sensitivity").sel(chosen), root.sel(chosen))
-    _profile(right, faces.sel(chosen), root.sel(chosen))
+    asked = root.status != 0
+    load = _pressing(labels_of(asked, "load"))
+    chosen = choose(asked.sel(load=[load]), beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
+    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 3.0))
     size = 1e3 * chosen["mesh_size"]
-    title = f"{chosen['beam']} mm, {chosen['mesh_type']} {size:g} mm, {chosen['material']}"
-    style.arrange(figure, left=0.588, right=0.084, bottom=1.134, top=0.588, wspace=0.2, title=title)
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']} {size:g} mm, {chosen['material']}"
+    place = {"left": 0.45, "right": 0.06, "top": 0.62, "across": 0.55, "title": title}
+    style.arrange(figure, axes, bottom=0.4, **place)
+    (left, right), here = axes[0], root.sel(chosen)
+    curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
+    drawn = [_stiffness(left, curves, here), _profile(right, faces.sel(chosen), here, load)]
+    under = labels.LINE * max(labels.lines_of(said) for _, said, _ in drawn)
+    if ax is None:
+        figure.set_size_inches(style.PAGE, 3.0 + under)
+    labels.settle(figure, axes, {**place, "bottom": 0.4 + under, "across": 0.15})
+    for panel, (ends, said, why) in zip((left, right), drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    if drawn[0][0]:
+        _marks(left, curves, here)
     return np.array([left, right])
 
 
 def _stiffness(panel, curves, root):
-    """Linear kinematics: the reference's own, so that only the law of stiffness is seen."""
-    curves = curves.sel(kinematics="linear")
-    membrane = float(root.material_young_modulus) * 1e-3
-    for number, load in enumerate(BLOCK_LOADS):
-        if load in curves["load"]:
-            curve = curves.sel(load=load)
-            # A linear network's displacement goes as 1/k.
-            stiffness = np.linspace(float(curve.stiffness.min()), float(curve.stiffness.max()), 600)
-            softness = curve.displacement.values[0] * curve.stiffness.values[0]
-            error = 100 * np.abs(softness / stiffness / float(root.reference_displacement.sel(load=load)) - 1)
-            look = style.line(number) | {"marker": ""}
-            panel.plot(stiffness, error, label=load, **look)
-    stated = float(root.paper_stiffness.max()) if np.isfinite(root.paper_stiffness).any() else np.nan
-    predicted = np.sqrt(3) / 2 * membrane
-    printed = root.stiffness.sel(definition="paper").values if "paper" in root.definition.values else np.array([np.nan])
-    known = printed[np.isfinite(printed)]
-    stated = known[0] if len(known) else stated
-    marks = {f"{stated:.0f}: the paper's, from traction": stated, f"{predicted:.0f}: √3/2 E t": predicted}
-    marks[f"{predicted * POISSON_LAW:.0f}: fits the block by a wrong ν"] = predicted * POISSON_LAW
-    for text, value in marks.items():
-        if np.isfinite(value):
-            panel.axvline(value, color="0.5", linewidth=0.8, linestyle=(0, (2, 2)), zorder=1)
-            panel.annotate(
-                text, (value, 0.97), xycoords=("data", "axes fraction"), xytext=(2, 0), textcoords="offset points",
-                rotation=90, va="top", fontsize=6.2, color="0.3",
-            )  # fmt: skip
+    """Linear kinematics: the reference's own, so that only the law of stiffness is seen.
+
+    Returns ends of lines for their names, a note, and what to say where no curve is there.
+    """
+    panel.set(xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
+    panel.set_title("One stiffness for all loads? (small strain)", pad=13)
+    if curves is None or "linear" not in curves.kinematics.values:
+        return [], "", "The study has no sensitivity curves in linear kinematics of this mesh and material."
+    curves, said, lines = curves.sel(kinematics="linear"), [], []
+    loads = labels_of(curves.status != 0, "load")
+    for load in loads:
+        curve, reference = curves.sel(load=load), float(root.reference_displacement.sel(load=load))
+        softness = (curve.displacement * curve.stiffness).values  # one number: linear networks give as 1/k
+        softness = softness[np.isfinite(softness)]
+        if not len(softness) or not np.isfinite(reference):
+            said.append(f"{load}: {'not solved' if not len(softness) else 'no reference'}")
+            continue
+        stiffness = np.linspace(np.nanmin(curve.stiffness.values), np.nanmax(curve.stiffness.values), 600)
+        lines.append((load, stiffness, 100 * np.abs(softness[0] / stiffness / reference - 1)))
+    if not lines:
+        return [], "", "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
+    middle, ends = np.sqrt(3) / 2 * _membrane(curves), []
+    low = max(0.7 * middle, min(x.min() for _, x, _ in lines))
+    high = min(1.5 * middle, max(x.max() for _, x, _ in lines))
+    highest = 0.0
+    for number, (load, x, error) in enumerate(lines):
+        look = style.line(number) | {"marker": ""}
+        within = (x >= low) & (x <= high)
+        panel.plot(x[within], error[within], label=load, **look)
+        highest = max(highest, error[within].max(initial=0.0))
+        ends.append((x[within][-1], error[within][-1], load, look["color"]))
     for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
-        errors = 100 * np.abs(
-            root.deformation_error.sel(definition=definition, kinematics="linear", load=list(BLOCK_LOADS))
-        )
-        look = style.line(3 + number) | {"marker": ""}
-        worst = float(errors.max())
-        panel.axhline(worst, label=f"{definition}, worst of the three ({worst:.2f} %)", **look)
-    panel.set(ylim=(0, 40), xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
-    panel.set_xlim(0.7 * predicted, 1.5 * predicted)
-    panel.set_title("One stiffness for three loads? (small strain)")
-    panel.legend(loc="upper center", fontsize=6.4, bbox_to_anchor=(0.5, -0.17), ncols=2)
+        cells = root.sel(definition=definition, kinematics="linear", load=loads)
+        errors = 100 * np.abs(cells.deformation_error.values)
+        known, flags = np.isfinite(errors), cells.status.values
+        lacking = [f"{load} {STATUS[flag].replace('_', ' ') if flag else 'not asked for'}"
+                   for load, flag, there in zip(loads, flags, known) if not there]  # fmt: skip
+        if lacking and (flags != 0).any():
+            said.append(f"{definition}: {', '.join(lacking)}")
+        if known.any():
+            look = style.line(len(lines) + number) | {"marker": ""}
+            worst = errors[known].max()
+            panel.plot([low, high], [worst, worst], label=definition, **look)
+            ends.append((high, worst, f"{definition}, worst: {worst:.2g} %", look["color"]))
+    panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said), ""
 
 
-def _profile(panel, block, root):
-    """The pressed face: networks with their full length law over references."""
-    x = block.face_position.values
-    pressed = block.sel(load="pressure")
+def _membrane(curves):
+    """E t of the study's sheet, by which its stiffnesses were chosen [N/m]."""
+    return np.nanmax((curves.stiffness / curves.stiffness_ratio).values, initial=0.0)
+
+
+def _marks(panel, curves, root):
+    """Stiffnesses by closed form and as stated, named above the panel, once it has its limits."""
+    marks, middle = {}, np.sqrt(3) / 2 * _membrane(curves)
+    if "paper" in root.definition.values:
+        stated = root.stiffness.sel(definition="paper").values
+        stated = stated[np.isfinite(stated)]
+        if len(stated):
+            printed = "paper_stiffness" in root and np.isfinite(root.paper_stiffness.values).any()
+            marks[f"{'the paper’s' if printed else 'as stated'}: {stated[0]:.4g}"] = stated[0]
+    if str(root.mesh_type.values) == "structured" and middle > 0:
+        marks[f"√3/2 E t: {middle:.4g}"] = middle
+        # Held sideways, a sheet's modulus is E / (1 - nu^2), and that of a network, whose nu is 1/3, 9/8 E.
+        held = middle / (1 - float(root.material_poisson_ratio) ** 2) / (9 / 8)
+        if abs(held / middle - 1) > 0.02:
+            marks[f"of a held block: {held:.4g}"] = held
+    low, high = panel.get_xlim()
+    shown = [(text, value) for text, value in marks.items() if low < value < high]
+    for _, value in shown:
+        panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1)
+    room = panel.get_window_extent().width / panel.figure.dpi
+    places = labels.spread([room * (value - low) / (high - low) for _, value in shown],
+                           [labels.width(text) + 0.1 for text, _ in shown], 0.0, room)  # fmt: skip
+    for (text, _), place in zip(shown, places):
+        panel.annotate(text, (place / room, 1), xycoords="axes fraction", xytext=(0, 2.5), va="bottom", ha="center",
+                       textcoords="offset points", color="0.25", fontsize=style.SMALL)  # fmt: skip
+
+
+def _profile(panel, block, root, load):
+    """The pressed face: networks with their full length law over references; returned as by `_stiffness`."""
+    x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
+    panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
+    panel.set_title("The pressed face", pad=13)
     for number, kind in enumerate(block.reference.values):
         profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
         if np.isfinite(profile).any():
-            shade = ("0.55", "0.3", "0.75")[number % 3]
-            panel.plot(x, profile, color=shade, linewidth=3.2, alpha=0.6, label=f"reference, {kind.replace('-', ' ')}")
-    for number, definition in enumerate(block.definition.values):
-        linear = definition in ENERGIES
-        profile = pressed.face_profile.sel(definition=definition, kinematics="linear" if linear else "nonlinear")
-        if np.isfinite(profile.values).any():
-            look = style.line(number) | {"marker": ""}
-            panel.plot(x, -1e3 * profile.values, label=f"{definition}, {'linear' if linear else 'nonlinear'}", **look)
-    panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
-    panel.set_title("The pressed face")
-    panel.set_ylim(2.0, None)
-    panel.legend(loc="upper center", fontsize=6.4, bbox_to_anchor=(0.5, -0.17), ncols=2)
+            shade = ("0.62", "0.8", "0.72")[number % 3]
+            name = f"reference, {str(kind).replace('-', ' ')}"
+            panel.plot(x, profile, color=shade, linewidth=3, label=name)
+            ends.append((x[-1], profile[-1], name, "0.35"))
+            highest.append(profile)
+    order = [name for name in BLOCK_SHOWN if name in block.definition.values]
+    order += [name for name in block.definition.values if name not in order]
+    asked = [name for name in order if (root.status.sel(load=load, definition=name) != 0).any()]
+    shown = []
+    for definition in asked:
+        profiles = pressed.face_profile.sel(definition=definition)
+        usual = ("linear", "nonlinear") if definition in ENERGIES else ("nonlinear", "linear")
+        solved = [one for one in usual if one in profiles.kinematics.values
+                  and np.isfinite(profiles.sel(kinematics=one).values).any()]  # fmt: skip
+        if solved:
+            shown.append((definition, solved[0], -1e3 * profiles.sel(kinematics=solved[0]).values))
+        else:
+            flags = root.status.sel(load=load, definition=definition).values
+            words = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])]
+            said.append(f"{definition}: {', '.join(words)}")
+    for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
+        look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
+        panel.plot(x, profile, label=name, **look)
+        ends.append((x[-1], profile[-1], name, look["color"]))
+        highest.append(profile)
+    if len(shown) > MOST_FACES:
+        said.append(f"in the dataset, too: {', '.join(name for name, _, _ in shown[MOST_FACES:])}")
+    room = panel.get_window_extent().width / panel.figure.dpi
+    text = "\n".join(labels.wrapped(one, room) for one in said)
+    if not shown and not ends:
+        return [], "", "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
+    low, high = min(map(np.nanmin, highest)), max(map(np.nanmax, highest))
+    panel.set_xlim(x.min() - 0.02, x.max() + 0.02)
+    panel.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low) if high > low else high + 1)
+    return ends, text, ""

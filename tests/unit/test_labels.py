@@ -1,0 +1,215 @@
+"""Texts, fonts and colours of figures: what a journal takes, and what a reader can tell apart."""
+
+import io
+from itertools import combinations
+
+import matplotlib
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from pypdf import PdfReader
+
+from springtune.output import labels, style
+from springtune.output.canvas import CHARACTERS, png_and_pdf
+from test_figures import EVERY_PLOT, closed, each  # noqa: F401  # a fixture of that file
+
+from synthetic import dataset
+
+
+@pytest.fixture(scope="module")
+def tree():
+    return dataset()
+
+
+# -- what a journal takes ----------------------------------------------------------------------------------------------
+
+
+def files(figure):
+    """Files of a figure, and the boxes of the texts drawn upright or sideways [pt]."""
+    drawn, draw = {}, Text.draw
+
+    def noted(self, renderer):
+        if self.get_visible() and self.get_text().strip() and self.get_rotation() % 90 == 0:
+            drawn[self] = self.get_window_extent(renderer)
+        draw(self, renderer)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Text, "draw", noted)
+        return png_and_pdf(figure), drawn
+
+
+def check_fonts(content):
+    """IEEE and ACM refuse Type 3 and fonts that are not in the file."""
+    (page,) = PdfReader(io.BytesIO(content)).pages
+    assert page["/Resources"]["/Font"]
+    for font in page["/Resources"]["/Font"].values():
+        assert font.get_object()["/Subtype"] == "/Type0"
+        (inner,) = (one.get_object() for one in font.get_object()["/DescendantFonts"])
+        assert inner["/Subtype"] == "/CIDFontType2"
+        assert len(inner["/FontDescriptor"].get_object()["/FontFile2"].get_object().get_data()) > 500
+
+
+def check_texts(figure, boxes):
+    """No text leaves the figure, none is smaller than journals take, and no two lie on each other."""
+    width, height = 72 * figure.get_size_inches()
+    for text, box in boxes.items():
+        said = repr(text.get_text())
+        assert text.get_fontsize() >= style.SMALL, said
+        assert box.x0 >= -1 and box.x1 <= width + 1 and box.y0 >= -1 and box.y1 <= height + 1, said
+    for one, other in combinations(boxes, 2):
+        a, b = boxes[one], boxes[other]
+        wide, high = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        # The box of a text is higher than its letters.
+        assert wide < 1 or high < 0.2 * min(a.height, b.height), (one.get_text(), other.get_text())
+
+
+@each
+def test_a_figure_is_what_a_journal_takes(tree, plot):
+    figure = np.ravel(plot(tree, **EVERY_PLOT[plot][0]))[0].figure
+    assert figure.get_size_inches()[0] in (style.COLUMN, style.PAGE)
+    made, boxes = files(figure)
+    check_fonts(made["pdf"])
+    check_texts(figure, boxes)
+
+
+def test_texts_of_a_pdf_can_be_searched_and_a_rare_character_is_there():
+    """Also one that no font was cut to before."""
+    assert "ж" not in CHARACTERS
+    figure = Figure(figsize=(3, 2))
+    figure.text(0.1, 0.5, "stiffness √3/2 ж")
+    content = png_and_pdf(figure)["pdf"]
+    assert PdfReader(io.BytesIO(content)).pages[0].extract_text().strip() == "stiffness √3/2 ж"
+
+
+# -- texts -------------------------------------------------------------------------------------------------------------
+
+
+finite = st.floats(-1.0, 2.0, allow_nan=False)
+
+
+@given(st.lists(finite, min_size=1, max_size=12))
+def test_spread_things_do_not_overlap_and_keep_their_order(wanted):
+    sizes = [0.05] * len(wanted)
+    places = labels.spread(wanted, sizes, 0.0, 1.0)
+    order = np.argsort(wanted, kind="stable")
+    assert (np.diff(places[order]) > 0.05 - 1e-9).all()
+    assert places.min() > 0.025 - 1e-9 and places.max() < 0.975 + 1e-9
+
+
+def test_what_has_room_stays_where_it_is():
+    assert labels.spread([0.9, 0.1, 0.5], [0.1, 0.1, 0.1], 0, 1) == pytest.approx([0.9, 0.1, 0.5])
+    # Two in one place go apart by the same way.
+    assert labels.spread([0.5, 0.5], [0.2, 0.2], 0, 1) == pytest.approx([0.4, 0.6])
+
+
+def test_lines_are_wrapped_at_spaces_and_one_word_is_left_whole():
+    text = labels.wrapped("one two three four", labels.width("one two three") + 1e-6)
+    assert text == "one two three\nfour"
+    assert labels.wrapped("unbreakable", 0.01) == "unbreakable"
+    assert [labels.lines_of(one) for one in ("", "a", "a\nb")] == [0, 1, 2]
+
+
+def test_names_widen_the_panel_and_leave_ticks_at_the_data():
+    with matplotlib.rc_context(style.SETTINGS):
+        panel = Figure(figsize=(3, 2)).subplots()
+        panel.set_xscale("log")
+        panel.plot([1, 2, 5], [1, 2, 3])
+        panel.set_xlim(1, 5)
+        labels.name_lines(panel, [(5, 3, "a name", "k"), (5, np.nan, "nowhere", "k")])
+    assert panel.get_xlim()[0] == 1 and panel.get_xlim()[1] > 5
+    assert panel.get_xticks().max() <= 5 and [text.get_text() for text in panel.texts] == ["a name"]
+
+
+def test_curves_that_are_one_line_to_the_eye_share_a_name():
+    curves = {"a": np.array([0.1, np.nan]), "b": np.array([0.1005, np.nan]), "c": np.array([0.1, 0.2])}
+    assert labels.alike(curves, 0.001) == [["a", "b"], ["c"]]
+
+
+# -- colours -----------------------------------------------------------------------------------------------------------
+
+# Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
+BLIND = {
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    "none": np.eye(3),
+}
+
+
+def lab(colour, sight):
+    """CIELAB of a colour as someone sees it."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    linear = np.clip(np.asarray(BLIND[sight]) @ linear, 0, 1)
+    white = [0.95047, 1.0, 1.08883]
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]]
+    xyz = np.asarray(to_xyz) @ linear / white
+    f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("sight", BLIND)
+def test_lines_are_told_apart_by_the_colour_blind(sight):
+    """A difference of 10 is seen at a glance; 2.3 is just noticeable."""
+    seen = [lab(look["color"], sight) for look in style.LINES]
+    nearest = min(np.linalg.norm(one - other) for one, other in combinations(seen, 2))
+    assert nearest > 10
+
+
+def test_lines_and_markers_are_told_apart_without_colours():
+    looks = [style.line(number) for number in range(3 * len(style.LINES))]
+    for part in ("linestyle", "marker"):
+        first = [str(look[part]) for look in looks[: len(style.LINES)]]
+        assert len(set(first)) == len(first)
+    assert len({(look["color"], look["marker"]) for look in looks}) == len(looks)
+
+
+# -- what is missing ---------------------------------------------------------------------------------------------------
+
+KEPT = ("beam_length", "beam_height", "trapezoid_x", "trapezoid_y", "x", "y", "outline_x", "outline_y", "spring_first",
+        "spring_second", "strain_load", "material_poisson_ratio", "material_young_modulus", "stiffness")  # fmt: skip
+
+
+def unsolved(group):
+    """A group whose every cell was asked for and did not converge."""
+    lost = {
+        name: np.nan * values for name, values in group.data_vars.items() if name not in KEPT and values.dtype == float
+    }
+    flags = {name: 0 * values + 3 for name, values in group.data_vars.items() if name.endswith("status")}
+    return group.assign(lost | flags)
+
+
+@pytest.fixture(scope="module")
+def nothing(tree):
+    """A study of which nothing was solved."""
+    return tree.map_over_datasets(lambda group: unsolved(group) if group.data_vars else group)
+
+
+@pytest.fixture(scope="module")
+def one_size(tree):
+    """A study of one mesh size."""
+    return tree.map_over_datasets(lambda group: group.isel(mesh_size=[1]) if "mesh_size" in group.dims else group)
+
+
+def says_something(panel):
+    """Whether a panel has marks, cells or words; frames, grids and marks at nothing are none."""
+    lines = [line for line in panel.get_lines() if np.isfinite(np.asarray(line.get_ydata(), dtype=float)).any()]
+    return bool(lines or panel.texts or panel.images or panel.collections or panel.patches)
+
+
+@each
+def test_where_nothing_was_solved_words_say_so(nothing, plot):
+    panels = np.ravel(plot(nothing, **EVERY_PLOT[plot][0]))
+    # Of a laid strip the trapezoid is there, with a note.
+    assert all(any(text.get_text().strip() for text in panel.texts) for panel in panels)
+
+
+@each
+def test_one_mesh_size_is_shown(one_size, plot):
+    selection = EVERY_PLOT[plot][0]
+    for panel in np.ravel(plot(one_size, **selection)):
+        assert says_something(panel)
