@@ -15,7 +15,7 @@ from ..output.tables import csv_text, decimals, number
 ANSWERED = ("solved", "unstable", "linear_only")
 """Statuses of networks that have a displacement."""
 
-UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N"}
+COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N"}
 """Units at the ends of the names of columns, as they are written."""
 
 
@@ -195,5 +195,5 @@ def _further(table: Mapping[str, Any]) -> dict[str, Any]:
 def _head(name: str) -> str:
     """A column's name with its unit in brackets."""
     words = name.split("_")
-    unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
+    unit = COLUMN_UNITS.get(words[-1], "") if len(words) > 1 else ""
     return f"{' '.join(words[:-1])} [{unit}]" if unit else " ".join(words)

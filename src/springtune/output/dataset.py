@@ -136,7 +136,7 @@ NO_NODE = np.int32(-1)
 CHUNK = 2**18
 """Bytes of a chunk of a compressed array [B], at most: what reading one cell of it reads."""
 
-SMALL = 2**13
+UNCOMPRESSED = 2**13
 """Bytes up to which an array is stored as it is [B]: compression would save less than it costs to look up."""
 
 
@@ -181,7 +181,7 @@ def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
     found: dict[str, object] = {"_FillValue": None} if name in data.coords else {}
     if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
         found = {"_FillValue": NO_NODE}
-    if array.dtype == object or array.nbytes <= SMALL:
+    if array.dtype == object or array.nbytes <= UNCOMPRESSED:
         return found
     return found | {"zlib": True, "complevel": 4, "chunksizes": _chunk(array.shape, array.dtype.itemsize)}
 

@@ -26,7 +26,7 @@ from ..output.dataset import STATUS
 from . import PaperError
 from .datasets import HASH_SHOWN, Dataset, chosen
 
-UNITS = {
+TEXT_UNITS = {
     "": ("1", 1.0), "%": ("1", 1e-2),
     "mm": ("m", 1e-3), "mm²": ("m2", 1e-6),
     "s": ("s", 1.0), "ms": ("s", 1e-3), "µs": ("s", 1e-6), "ns": ("s", 1e-9),
@@ -71,7 +71,7 @@ class Number(BaseModel):
     formula : str
         In place of a variable: of other numbers, in SI units.
     unit : str
-        Key of `UNITS`.
+        Key of `TEXT_UNITS`.
     digits, figures : int
         Digits after the point, or significant ones.
     sign : bool
@@ -96,7 +96,7 @@ class Number(BaseModel):
     absolute: bool = False
     cells: int | None = None
     formula: str = ""
-    unit: Literal[tuple(UNITS)] = ""  # type: ignore[valid-type]  # the keys
+    unit: Literal[tuple(TEXT_UNITS)] = ""  # type: ignore[valid-type]  # the keys
     digits: int | None = None
     figures: int | None = None
     sign: bool = False
@@ -107,7 +107,7 @@ class Number(BaseModel):
 
     def text(self, value: float) -> str:
         """A value, formatted, without its unit."""
-        value = value / UNITS[self.unit][1]
+        value = value / TEXT_UNITS[self.unit][1]
         if self.figures is not None:
             text = _significant(value, self.figures)
         else:
@@ -134,7 +134,7 @@ class Printed(BaseModel):
     printed : str
         As printed.
     unit : str
-        Key of `UNITS`.
+        Key of `TEXT_UNITS`.
     where : str
         Section, figure or sentence.
     """
@@ -142,7 +142,7 @@ class Printed(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     printed: str
-    unit: Literal[tuple(UNITS)] = ""  # type: ignore[valid-type]  # the keys
+    unit: Literal[tuple(TEXT_UNITS)] = ""  # type: ignore[valid-type]  # the keys
     where: str
 
 
@@ -212,7 +212,7 @@ def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: M
     found: dict[str, Any] = {}
     for name, entry in printed.items():
         one = checked(Printed, entry, name)
-        value = float(one.printed) * UNITS[one.unit][1]
+        value = float(one.printed) * TEXT_UNITS[one.unit][1]
         found[name] = {"text": one.printed.replace("-", "−"), "unit": one.unit, "value": value, "source": one.where}
     wrong = []
     for name, entry in declared.items():
@@ -335,7 +335,7 @@ def _group(number: Number, datasets: Mapping[str, Dataset], name: str) -> tuple[
     for wanted in filter(None, (variable, number.over, _flag(number.where)[0], *number.marks)):
         if wanted not in data.variables:
             raise PaperError(f"{name}: {one.path} has no variable '{wanted}' in /{group}; give one that it has")
-    shown, kept = UNITS[number.unit][0], data[variable].attrs.get("units", "")
+    shown, kept = TEXT_UNITS[number.unit][0], data[variable].attrs.get("units", "")
     if kept and kept != shown and not number.over and number.reduce != "count":
         raise PaperError(f"{name}: '{variable}' is in {kept}, which '{number.unit}' does not show; give another unit")
     return data, variable
