@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
@@ -26,6 +26,10 @@ paper: $(VENV)/.run
 test: $(VENV)/.test
 	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
+
+# The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
+test-browser: $(VENV)/.test
+	pytest tests/browser
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow

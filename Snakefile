@@ -9,6 +9,7 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/stages.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/outputs.smk"
+include: "workflow/rules/browse.smk"
 if "study" not in config:  # a study that is read for the paper has none of its own
 
     include: "workflow/rules/paper.smk"
@@ -26,6 +27,7 @@ rule all:
         DONE,
         rules.collect.output,
         OUTPUTS.values(),
+        rules.browse.output,
 
 
 onstart:

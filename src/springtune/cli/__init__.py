@@ -25,6 +25,7 @@ COMMANDS = {
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition and its stiffness for one mesh."),
+    "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
     "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),
@@ -63,6 +64,7 @@ class Commands(click.Group):
     epilog=examples(
         "springtune scenes config/paper.yaml",
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
+        "springtune browse results/paper",
         "snakemake --configfile config/paper.yaml",
     ),
     context_settings={"help_option_names": ["-h", "--help"]},

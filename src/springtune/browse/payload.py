@@ -1,0 +1,207 @@
+"""A dataset's tree as compressed binary arrays, small enough for a page.
+
+Numbers are float32 of which the digits that no plot and no table of the page shows are cleared. An array whose last
+dimension is long (a curve, a field) keeps its rows that hold anything, each as differences from point to point. Bytes
+are sorted by their place in a number, since those of one place are alike, and each group is deflated as a whole.
+`assets/payload.js` reads it.
+"""
+
+import zlib
+from collections.abc import Iterator
+from itertools import accumulate
+from typing import Any
+
+import h5netcdf
+import numpy as np
+
+LONG_DIMENSION = 16
+"""From so many labels on the last dimension is one of points along a line."""
+
+CLEARED_OF_CELLS, CLEARED_OF_LINES = 6, 9
+"""Bits of 23 that are cleared: 5 digits are left of a number, and 4 of a point on a line, finer than a pixel."""
+
+ABSENT = -1
+"""Place of a text that is not there."""
+
+ROOM = 3_200_000
+"""Bytes of all numbers together, so that the page stays below 5 MB with its library, in base64."""
+
+Packed = tuple[dict[str, Any], list[bytes]]
+"""A group's description, and the bytes of each of its variables."""
+
+
+def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]], list[bytes]]:
+    """Groups of a dataset, described and packed.
+
+    Parameters
+    ----------
+    file : h5netcdf.File
+        Read without xarray, whose import takes longer than all the rest of making a page.
+    room : int
+        Bytes that the numbers may take; where they take more, the largest variables are left out.
+
+    Returns
+    -------
+    groups : list of dict
+        Of each group: its path, attributes, dimensions with labels, variables with where their numbers are, and the
+        names of those left out.
+    contents : list of bytes
+        Numbers of each group, deflated.
+    """
+    found = list(_walk(file, {}))
+    contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
+    if sum(map(len, contents)) > room:
+        _lighten(found, room)
+        contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
+    for described, parts in found:
+        ends = list(accumulate(map(len, parts), initial=0))
+        for row, begin in zip(described["variables"], ends):
+            row["at"] = begin
+    return [described for described, _ in found], contents
+
+
+def _lighten(found: list[Packed], room: int) -> None:
+    """Leave out the largest variables until the rest has room; a group names what it lacks."""
+    sizes = [
+        (len(zlib.compress(part, 1)), number, row["name"])
+        for number, (described, parts) in enumerate(found)
+        for row, part in zip(described["variables"], parts)
+    ]
+    excess = sum(size for size, _, _ in sizes) - room
+    # Cells last: without them there is no table.
+    for size, number, name in sorted(sizes, key=lambda one: (one[1] == 0, -one[0])):
+        if excess <= 0:
+            break
+        described, parts = found[number]
+        place = [row["name"] for row in described["variables"]].index(name)
+        described["left_out"].append(name)
+        del described["variables"][place], parts[place]
+        excess -= size
+
+
+def _walk(group: h5netcdf.Group, above: dict[str, Any]) -> Iterator[Packed]:
+    """A group's description and its numbers, and those of the groups in it; `above` are labels that they share."""
+    # Each is asked for once: h5netcdf looks dimensions up anew whenever it is asked.
+    read = {name: (variable.dimensions, _attributes(variable)) for name, variable in group.variables.items()}
+    values = {name: _values(group.variables[name], attributes) for name, (_, attributes) in read.items()}
+    labels = above | {
+        name: {"labels": [_plain(one) for one in values[name].tolist()], **_words_on(attributes)}
+        for name, (dimensions, attributes) in read.items()
+        if dimensions == (name,)
+    }
+    if read or group.name == "/":
+        yield _described(group, read, values, labels)
+    for child in group.groups.values():
+        yield from _walk(child, labels)
+
+
+def _described(
+    group: h5netcdf.Group,
+    read: dict[str, tuple[tuple[str, ...], dict[str, Any]]],
+    values: dict[str, np.ndarray],
+    labels: dict[str, Any],
+) -> Packed:
+    variables: list[dict[str, Any]] = []
+    parts: list[bytes] = []
+    sizes: dict[str, int] = {}
+    for name, (dimensions, attributes) in read.items():
+        sizes |= zip(dimensions, values[name].shape)
+        if dimensions == (name,):
+            continue
+        row, content = _variable(values[name])
+        row |= {"name": name, "dims": list(dimensions)}
+        row |= _words_on(attributes)
+        if "flag_meanings" in attributes:
+            meanings = str(attributes["flag_meanings"]).split()
+            flags = np.ravel(attributes.get("flag_values", range(len(meanings)))).tolist()
+            row["flags"] = dict(zip(map(str, flags), meanings))
+        variables.append(row)
+        parts.append(content)
+    described = {
+        "path": group.name,
+        "attributes": {key: _plain(value) for key, value in _attributes(group).items()},
+        "dims": [{"name": name, "size": size, **labels.get(name, {})} for name, size in sizes.items()],
+        "variables": variables,
+        "left_out": [],
+    }
+    return described, parts
+
+
+def _attributes(holder: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
+    """Attributes, texts as texts: netCDF's own library writes those of one letter as bytes."""
+    found = dict(holder.attrs)
+    return {key: one.decode(errors="replace") if isinstance(one, bytes) else one for key, one in found.items()}
+
+
+def _words_on(attributes: dict[str, Any]) -> dict[str, str]:
+    return {key: str(attributes[key]) for key in ("units", "long_name", "comment") if key in attributes}
+
+
+def _values(variable: h5netcdf.Variable, attributes: dict[str, Any]) -> np.ndarray:
+    """Values of a variable as the conventions of netCDF say that they are to be read."""
+    values = np.asarray(variable[...])
+    fill = attributes.get("_FillValue")
+    if values.dtype.kind in "iuf" and fill is not None and np.isfinite(fill).all():
+        values = np.where(values == np.ravel(fill)[0], np.nan, values)
+    if values.dtype.kind in "iuf" and ("scale_factor" in attributes or "add_offset" in attributes):
+        values = values * float(attributes.get("scale_factor", 1)) + float(attributes.get("add_offset", 0))
+    return values
+
+
+def _plain(value: Any) -> Any:
+    """A label or an attribute as JSON has it; no NaN, which JSON has not."""
+    if isinstance(value, np.ndarray):
+        return [_plain(one) for one in value.tolist()]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if isinstance(value, bool | int | float | str) else str(value)
+
+
+def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
+    row: dict[str, Any] = {}
+    if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
+        numbers = values.real.astype(np.float32)
+        return _rows(row | {"type": "float"}, numbers, ~np.isnan(numbers))
+    if values.dtype.kind in "iub":
+        return _rows(row | {"type": "integer"}, values.astype(np.int32), values != 0)
+    texts = values.astype(str)
+    words, places = np.unique(texts, return_inverse=True)
+    places = places.reshape(texts.shape).astype(np.int32)
+    places[texts == ""] = ABSENT
+    return _rows(row | {"type": "text", "words": words.tolist()}, places, places != ABSENT)
+
+
+def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple[dict[str, Any], bytes]:
+    """Bytes of an array, and how they are to be read."""
+    long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
+    points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
+    numbers = values.reshape(-1, points)
+    parts = []
+    row["points"] = points
+    if long:
+        kept = present.reshape(-1, points).any(axis=1)
+        row["kept"] = int(kept.sum())
+        parts.append(np.packbits(kept, bitorder="little").tobytes())
+        numbers = numbers[kept]
+    if row["type"] == "float":
+        row["cleared"] = CLEARED_OF_LINES if points > 1 else CLEARED_OF_CELLS
+        bits = _rounded(numbers, row["cleared"])
+    else:
+        bits = np.ascontiguousarray(numbers)
+    if points > 1:
+        # Differences wrap around, there as here.
+        bits = np.diff(bits, axis=1, prepend=np.int32(0))
+    folded = (bits << 1) ^ (bits >> 31)
+    parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
+    return row, b"".join(parts)
+
+
+def _rounded(numbers: np.ndarray, cleared: int) -> np.ndarray:
+    """Bits of float32 numbers without the last ones, rounded; every NaN has the same."""
+    numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)
+    bits = numbers.view(np.int32).copy()
+    finite = np.isfinite(numbers)
+    bits[finite] += 1 << (cleared - 1)
+    return bits >> cleared

@@ -1,0 +1,37 @@
+"""Serve the page of a dataset on the loopback address."""
+
+from pathlib import Path
+
+import click
+
+from .examples import examples
+
+
+@click.command(
+    epilog=examples(
+        "springtune browse results/paper", "springtune browse results/paper/dataset.nc --port 8000 --no-open"
+    )
+)
+@click.argument("dataset", type=click.Path(path_type=Path))
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port; by default one that is free.")
+@click.option("--no-open", is_flag=True, help="Print the address, and open no browser.")
+def browse(dataset: Path, port: int, no_open: bool) -> None:
+    """Browse a study's results: serve the page of a dataset to this machine alone, until Ctrl-C.
+
+    DATASET is results/<study>/dataset.nc, or its folder. The address holds a token, anew each time.
+    """
+    from ..browse.server import Server  # here, so that --help does not wait for it
+
+    try:
+        server = Server(dataset, port)
+    except (OSError, ValueError) as error:
+        click.echo(str(error), err=True)
+        raise SystemExit(1) from None
+    try:
+        with server:
+            click.echo(f"{server.address}\nCtrl-C ends it.")
+            if not no_open:
+                click.launch(server.address)
+            server.serve_forever()
+    except KeyboardInterrupt:
+        click.echo()
