@@ -262,7 +262,7 @@ def test_second_run_has_nothing_to_do_and_reminds_of_holes(run, tree):
     code, output = run.snakemake("quick.yaml")
     assert code == 0 and "Nothing to be done" in output
     holes = int((tree["stability"].contrast_status > 1).sum())
-    assert holes and f"Not everything is solved: {holes} of " in output and "results/quick: dataset.nc" in output
+    assert holes and f"Not everything is solved: {holes} of " in output and "results/quick: index.html, dataset.nc" in output
 
 
 def test_report_has_the_results_with_captions_labels_and_run_times(run, tree):
@@ -275,7 +275,7 @@ def test_report_has_the_results_with_captions_labels_and_run_times(run, tree):
     results = run.folder / "results/quick"
     made = [path for path in results.glob("*/*") if path.parent.name in ("figures", "tables") and path.suffix != ".pdf"]
     held = [name.rpartition("/")[2] for name in names if name.startswith("report/data/")]
-    assert sorted(held) == sorted(["summary.txt", *(path.name for path in made)])
+    assert sorted(held) == sorted(["summary.txt", "index.html", *(path.name for path in made)])
     assert "Quick study, the smallest beam on two mesh sizes" in page and "Deformation error against mesh size" in page
     assert '"mesh type": "free"' in page and '"runtime"' in page
     assert "One of the results of this study" not in page, "an output without a caption of its own"

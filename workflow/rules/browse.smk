@@ -15,7 +15,9 @@ rule browse:
             }
         ),
     output:
-        RESULTS / "index.html",
+        report(
+            RESULTS / "index.html", caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}
+        ),
     params:
         # What the page links to; other jobs make it meanwhile.
         files=[

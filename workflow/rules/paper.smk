@@ -10,7 +10,7 @@ PAPER_SOURCE = Path(workflow.basedir, "workflow/paper")
 # Snakemake tells the targets after the Snakefile was read. Who wants neither the paper nor a job of a study that it reads
 # need not read these studies.
 WORDS = sys.argv[1:]
-PAPER_WANTED = any(word == "paper" or word.endswith("/paper.pdf") for word in WORDS)
+PAPER_WANTED = any(word == "paper" or Path(word).name == "paper.pdf" for word in WORDS)
 
 if PAPER_WANTED:
     try:  # now, and not when the studies are done
@@ -45,8 +45,8 @@ rule paper:
     output:
         report("results/paper/paper.pdf", caption="../report/paper.rst", category="paper", labels={"name": "paper"}),
     params:
-        source=str(PAPER_SOURCE),
-        folder="results/paper/paper",
+        source=lambda wildcards, input: str(Path(input.source[0]).parent),
+        folder=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     log:
         "results/paper/logs/paper.log",
     benchmark:

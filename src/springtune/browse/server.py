@@ -13,7 +13,7 @@ from .page import page
 
 HOST = "127.0.0.1"
 
-LISTED = {"figures": (".pdf", ".png"), "tables": (".csv", ".html", ".md")}
+SERVED = {"figures": (".pdf", ".png"), "tables": (".csv", ".html", ".md")}
 """Folders beside a dataset, and the endings of those of their files that are served."""
 
 ALONE = ("paper.pdf", "report.html")
@@ -129,7 +129,7 @@ class Handler(BaseHTTPRequestHandler):
 def _served(dataset: Path) -> dict[str, Path]:
     """Files by the names under which they are served."""
     found = {"dataset.nc": dataset}
-    for folder, endings in LISTED.items():
+    for folder, endings in SERVED.items():
         for path in sorted((dataset.parent / folder).glob("*")):
             if path.suffix in endings and path.is_file() and not path.is_symlink():
                 found[f"{folder}/{path.name}"] = path

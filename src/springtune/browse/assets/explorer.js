@@ -1,6 +1,6 @@
 // A view of any group: one of its variables over its dimensions, as lines, as a map and as numbers.
 
-const MOST_LINES = 120, MOST_ROWS = 300, MOST_COLUMNS = 60;
+const CROWD = 16, MOST_LINES = 120, MOST_ROWS = 300, MOST_COLUMNS = 60;
 
 class Explorer {
   constructor(page, group, view) {
@@ -215,6 +215,7 @@ class Explorer {
       ylabel: name(absolute ? `|${spoken(field.name)}|` : spoken(field.name), `${up}${yUnit}`),
     });
     const words = series.some((one) => one.hollow?.some((open, j) => open && Number.isFinite(one.y[j]))) ? ["○ hollow: not solved"] : [];
+    if (series.length > CROWD && !this.lit.size) words.push(`${series.length} lines: choose names to bring them out`);
     if (hidden) words.push(`and ${hidden} lines more: the table below has them all`);
     if (field.flags) words.push(Object.entries(field.flags).map(([key, word]) => `${key}: ${spoken(word)}`).join(", "));
     this.under.replaceChildren(legend(series, words, this.lit, (name) => {
