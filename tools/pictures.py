@@ -1,12 +1,15 @@
 """Copy the pictures of the pages from the studies that make them, as docs/figures.yaml has it; `make pictures`."""
 
-import shutil
 import subprocess
 from pathlib import Path
 
 import yaml
+from PIL import Image
 
 DOCS = Path(__file__).parents[1] / "docs"
+
+COLOURS = 128
+"""Of a picture in the repository, whose history keeps every version of it."""
 
 
 def main() -> None:
@@ -14,9 +17,11 @@ def main() -> None:
     pictures = yaml.safe_load((DOCS / "figures.yaml").read_text())
     for study in dict.fromkeys(picture["study"] for picture in pictures.values()):
         subprocess.run(["snakemake", "--configfile", f"config/{study}.yaml"], cwd=DOCS.parent, check=True)
-    for name, picture in pictures.items():
-        made = DOCS.parent / "results" / picture["study"] / "figures" / f"{picture['figure']}.png"
-        shutil.copyfile(made, DOCS / name)
+    for name, source in pictures.items():
+        made = DOCS.parent / "results" / source["study"] / "figures" / f"{source['figure']}.png"
+        with Image.open(made) as picture:
+            few = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+        few.save(DOCS / name, optimize=True)
 
 
 if __name__ == "__main__":

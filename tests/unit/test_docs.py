@@ -7,6 +7,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 import pytest
 import yaml
 
@@ -136,7 +137,8 @@ def repository(tmp_path_factory):
         mesh = st.make_mesh(st.Beam("60 mm", "12 mm"), "free", f"{size} mm")
         write_mesh(folder / f"config/meshes/plate_{size}mm.vtu", mesh)
     mine = dataset()
-    mine["status"].attrs["flag_meanings"] = " ".join(status.name.lower() for status in st.Status)
+    meanings = " ".join(map(str, st.Status))
+    mine["status"].attrs |= {"flag_values": np.arange(len(st.Status), dtype="int8"), "flag_meanings": meanings}
     mine["message"] = mine.status.astype(str).where(mine.status > 1, "")
     mine.attrs = {"springtune_version": st.__version__, "config": (REPOSITORY / "config/quick.yaml").read_text()}
     paper = mine.map_over_datasets(_of_the_paper)
