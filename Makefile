@@ -29,7 +29,7 @@ test: $(VENV)/.test
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
 test-browser: $(VENV)/.test
-	pytest tests/browser
+	pytest -m "not slow" tests/browser
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow

@@ -64,7 +64,6 @@ def fields():
     )  # fmt: skip
     ends = xr.DataArray([[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]], dims=("end", "spring"))
     shape = data.x.isel(particle=0, drop=True) * 0
-    data = data.assign(spring_first=shape + ends[0], spring_second=shape + ends[1])
     topology = {"cf_role": "mesh_topology", "topology_dimension": 2, "node_coordinates": "x y"}
     topology |= {"edge_node_connectivity": "spring_nodes", "face_node_connectivity": "cell_nodes"}
     corners = xr.DataArray([[0.0, 1.0, 2.0], [1.0, 3.0, 2.0]], dims=("cell", "cell_corner"))

@@ -124,7 +124,9 @@ def _of_the_paper(data):
     data = data.assign_coords(beam=["200x40", "200x30"]) if "beam" in data else data
     if "displacement_x" not in data:
         return data
-    return data.assign(x=data.x.where(data.mesh_size == data.mesh_size.max()), force=data.spring_first)
+    return data.assign(
+        x=data.x.where(data.mesh_size == data.mesh_size.max()), force=data.spring_nodes.isel(spring_end=0)
+    )
 
 
 @pytest.fixture(scope="module")

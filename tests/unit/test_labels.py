@@ -170,8 +170,8 @@ def test_lines_and_markers_are_told_apart_without_colours():
 
 # -- what is missing ---------------------------------------------------------------------------------------------------
 
-KEPT = ("beam_length", "beam_height", "trapezoid_x", "trapezoid_y", "x", "y", "outline_x", "outline_y", "spring_first",
-        "spring_second", "strain_load", "material_poisson_ratio", "material_young_modulus", "stiffness")  # fmt: skip
+KEPT = ("beam_length", "beam_height", "trapezoid_x", "trapezoid_y", "x", "y", "outline_x", "outline_y", "spring_nodes",
+        "strain_load", "material_poisson_ratio", "material_young_modulus", "stiffness")  # fmt: skip
 
 
 def unsolved(group):

@@ -52,34 +52,3 @@ def test_a_paper_without_its_numbers_says_which_and_studies_are_as_if_they_were_
         code, output = run.snakemake(f"{name}.yaml", "--keep-going", f"results/{name}/dataset.nc")
         assert code == 0 and "Nothing to be done" in output, output
     assert run.times("results/*/dataset.nc") == times
-
-
-def fonts(resources):
-    """Fonts of a page and of the figures on it: name, and whether it is embedded."""
-    for font in (resources.get("/Font") or {}).values():
-        font = font.get_object()
-        parts = [one.get_object() for one in font.get("/DescendantFonts", [font])]
-        files = ("/FontFile", "/FontFile2", "/FontFile3")
-        embedded = any(name in part.get("/FontDescriptor", {}) for part in parts for name in files)
-        yield font.get("/BaseFont"), embedded or font["/Subtype"] == "/Type3"
-    for one in (resources.get("/XObject") or {}).values():
-        if "/Resources" in one.get_object():
-            yield from fonts(one.get_object()["/Resources"].get_object())
-
-
-@pytest.mark.slow
-def test_the_paper_is_made_of_its_studies(run, repository, tmp_path):
-    pypdf = pytest.importorskip("pypdf")
-    run = type(run)(tmp_path)
-    code, output = run.snakemake(repository / "config/paper.yaml", "--keep-going", "paper")
-    assert code == 0, output
-    path = run.folder / "results/paper/paper.pdf"
-    content, reader = path.read_bytes(), pypdf.PdfReader(path)
-    assert 8 <= len(reader.pages) <= 12
-    found = [font for page in reader.pages for font in fonts(page["/Resources"].get_object())]
-    assert len(found) > 5 and all(embedded for _, embedded in found), found
-    code, output = run.snakemake(repository / "config/paper.yaml", "--keep-going", "paper")
-    assert code == 0 and "Nothing to be done" in output
-    path.unlink()
-    code, output = run.snakemake(repository / "config/paper.yaml", "--keep-going", "paper")
-    assert code == 0 and path.read_bytes() == content

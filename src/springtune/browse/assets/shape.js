@@ -26,7 +26,7 @@ class Shape {
     const root = this.page.groups["/"], group = this.group;
     if (!group) return { words: "This dataset has no displacement fields: the study does not ask for the output 'deformed'." };
     await group.load();
-    const f = group.fields, needed = ["x", "y", "spring_first", "spring_second", "displacement_x", "displacement_y"];
+    const f = group.fields, needed = ["x", "y", "spring_nodes", "displacement_x", "displacement_y"];
     if (!needed.every((name) => name in f)) return { words: group.left_out.length ? LEFT_OUT : "The group /fields has not the variables that a network is drawn from; its own view shows what there is." };
     const at = {};
     for (const name of Object.keys(places))
@@ -39,7 +39,7 @@ class Shape {
       return values.slice(0, end);
     };
     const dimOf = (field) => field.dims[field.dims.length - 1];
-    const particle = dimOf(f.x), spring = dimOf(f.spring_first);
+    const particle = dimOf(f.x), [spring, end] = f.spring_nodes.dims.slice(-2);
     const x = trimmed(f.x, particle, at), ux = trimmed(f.displacement_x, particle, at);
     if (!x.length || !ux.length) {
       const sizes = "mesh_size" in at ? group.dims.mesh_size.size : 0;
@@ -59,7 +59,7 @@ class Shape {
     }
     const own = (field) => Object.fromEntries(field.dims.filter((name) => name in at).map((name) => [name, at[name]]));
     const read = (field, along) => field.along(along, own(field)).slice(0, along === particle ? x.length : undefined);
-    const first = trimmed(f.spring_first, spring, at), second = trimmed(f.spring_second, spring, at);
+    const [first, second] = [0, 1].map((one) => trimmed(f.spring_nodes, spring, { ...at, [end]: one }));
     const data = { x, ux, y: read(f.y, particle), uy: read(f.displacement_y, particle), first, second };
     data.carried = this.carried(data, spring, at);
     const line = f.outline_x && dimOf(f.outline_x);

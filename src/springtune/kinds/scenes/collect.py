@@ -306,7 +306,6 @@ def _fields(study, folder, axes):
     for spec, mesh in meshes.items():
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
-        fields.put_rows({"spring_first": mesh.edges[:, 0], "spring_second": mesh.edges[:, 1]}, **labels)
         fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
     for one in study.references:
         points, displacements = outlines[one]

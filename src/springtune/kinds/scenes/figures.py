@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ...output import labels, style
-from ...output.dataset import STATUS
+from ...output.dataset import NO_NODE, STATUS
 from ...output.selection import cells, choose, group, labelled_beam, labels_of
 from ...problem.loads import LOADS
 from ..base import distinct
@@ -462,7 +462,7 @@ def _deformed(panel, fields, root, selection, beam):
     )
     kept = np.isfinite(outline[:, 0])
     outline, there = outline[kept], there[kept]
-    shown, known = (there if np.isfinite(there).any() else moved), np.isfinite(fields.spring_first.values)
+    shown = there if np.isfinite(there).any() else moved
     largest = np.nanmax(np.abs(shown), initial=0.0) if np.isfinite(shown).any() else 0.0
     scale = _round(0.06 * np.ptp(outline[:, 0]) / largest) if largest > 0 and len(outline) else 1
     lacking = []
@@ -472,7 +472,8 @@ def _deformed(panel, fields, root, selection, beam):
         lacking.append("no reference")
     if len(outline):
         panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)))
-    ends = np.stack([fields.spring_first.values[known], fields.spring_second.values[known]], axis=1).astype(int)
+    nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(NO_NODE).values.astype(int)
+    ends = nodes[(nodes != NO_NODE).all(axis=1)]
     flag = int(root.status.sel(mesh_size=fields.mesh_size.values))
     status = "not asked for" if flag == 0 else STATUS[flag].replace("_", " ")
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")

@@ -185,8 +185,6 @@ FIELDS = Group(
         "y": ((*MESH, "particle"), "m", "position at rest along y", np.nan),
         "spring_nodes": ((*MESH, "spring", "spring_end"), "1", "particles at the ends of a spring", NO_NODE),
         "cell_nodes": ((*MESH, "cell", "cell_corner"), "1", "particles at the corners of a cell", NO_NODE),
-        "spring_first": ((*MESH, "spring"), "1", "particle at the first end", np.nan),
-        "spring_second": ((*MESH, "spring"), "1", "particle at the second end", np.nan),
         "displacement_x": (FIELD, "m", "displacement along x, network", np.nan),
         "displacement_y": (FIELD, "m", "displacement along y, network", np.nan),
         "stiffness": (SPRING, "N/m", "stiffness of each spring", np.float32(np.nan)),
