@@ -8,6 +8,9 @@ from PIL import Image
 
 DOCS = Path(__file__).parents[1] / "docs"
 
+SHARE = 0.6
+"""Pixels of a side that are kept: a browser shows a column of 3.5 inches in 630 of them."""
+
 COLOURS = 128
 """Of a picture in the repository, whose history keeps every version of it."""
 
@@ -20,7 +23,12 @@ def main() -> None:
     for name, source in pictures.items():
         made = DOCS.parent / "results" / source["study"] / "figures" / f"{source['figure']}.png"
         with Image.open(made) as picture:
-            few = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+            size = [round(SHARE * side) for side in picture.size]
+            few = (
+                picture.convert("RGB")
+                .resize(size, Image.Resampling.LANCZOS)
+                .quantize(COLOURS, dither=Image.Dither.NONE)
+            )
         few.save(DOCS / name, optimize=True)
 
 
