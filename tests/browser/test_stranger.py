@@ -39,9 +39,9 @@ def clone(tmp_path):
     """The files that the repository has, without what was made of them."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=REPOSITORY, capture_output=True, text=True, check=True)
     for name in filter(None, listed.stdout.split("\0")):
-        if (REPOSITORY / name).is_file():
+        if (REPOSITORY / name).exists():
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(REPOSITORY / name, tmp_path / name)
+            shutil.copy(REPOSITORY / name, tmp_path / name, follow_symlinks=False)
     return tmp_path
 
 
