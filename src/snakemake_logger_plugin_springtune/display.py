@@ -42,6 +42,8 @@ class Job:
     def start(self) -> None:
         """It runs from now on."""
         self.begun, self.before = time.monotonic(), time.time()
+        # It may be run again after it failed.
+        self.ended, self.failed, self.waiting = 0.0, False, list(self.load.products)
 
     def made(self) -> float:
         """Share of its files that it has made since it began."""

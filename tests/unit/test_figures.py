@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from springtune.campaign import present
@@ -27,6 +28,7 @@ from springtune.kinds.benchmark.figures import (
 )
 from springtune.kinds.laying.figures import plot_laying
 from springtune.kinds.moduli.figures import definitions, plot_definitions_loads, plot_definitions_size, plot_moduli
+from springtune.kinds.scenes import figures
 from springtune.kinds.scenes.figures import NETWORK_LINE, plot_block, plot_deformed, plot_sensitivity, plot_size
 from springtune.kinds.stability.figures import (
     PLOTS,
@@ -371,3 +373,18 @@ def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
     assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}
     assert all(len(found) == 1 for found in kinds.values())
+
+
+def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
+    """Each says that it is linear; its files are those that the study declares."""
+    root, curves = (tree[name].to_dataset().sel(kinematics=["linear"]) for name in ("/", "sensitivity"))
+    linear = xr.DataTree.from_dict({"/": root, "/sensitivity": curves})
+    for name in ("sensitivity", "size"):
+        found = list(getattr(figures, name)(linear))
+        assert [stem for stem, _, _ in found] == [stem for stem, _, _ in getattr(figures, name)(tree)]
+        for _, plot, selection in found:
+            assert selection["kinematics"] == "linear"
+            drawn_on = np.ravel(plot(linear, **selection))[0].figure
+            said = [text.get_text() for text in drawn_on.findobj(Text)]
+            assert any("linear" in text for text in said), said
+            plt.close(drawn_on)

@@ -45,6 +45,7 @@ def refused(result, *said):
 def path(tmp_path_factory):
     """Dataset of 8 scenes of one beam: six solved, one failed, one not converged; and of two curves."""
     root = ROOT.empty(AXES)
+    root["reference_applies"].values[...] = 1
     place = {"beam": "200x40", "mesh_size": 5e-3}
     for name, value in (("status", 1), ("deformation_error", 0.01), ("displacement", 1e-3), ("solver", "Cholesky")):
         root[name].loc[place] = value
@@ -79,8 +80,8 @@ class TestInfo:
             "1 not_converged: last residual 2.5e-01",
             "1 failed: springs gone",
             "/sensitivity: 6 asked, 6 solved",
-            "lattice 4 1 % -20 % 200x40 free 5mm steel traction",
-            "patch 2 1 % +1 % 200x40 structured 5mm steel traction",
+            "lattice 4 1 % -20 % 200x40, free, 5 mm, steel, traction",
+            "patch 2 1 % +1 % 200x40, structured, 5 mm, steel, traction",
             "commit f00d+changes, 1 changed files in git_diff",
             "numpy 2.0",
             "on here",
@@ -123,6 +124,18 @@ class TestExport:
         assert first["particles"] == "100.0" and first["beam_length [m]"] == "0.2" and first["stiffness [N/m]"] == ""
         failed = next(row for row in rows if row["status"] == "failed")
         assert failed["displacement [m]"] == "" and failed["message"] == "springs gone"
+
+    def test_texts_and_single_numbers_are_exported_from_a_file(self, path, tmp_path):
+        """Xarray reads texts from a file as numpy's own, not as objects."""
+        assert run("export", path, "--variables", "message", "--to", tmp_path / "why.csv").exit_code == 0
+        rows = list(csv.DictReader((tmp_path / "why.csv").read_text().splitlines()))
+        assert "springs gone" in {row["message"] for row in rows}
+        tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "0"}), "/benchmark": xr.Dataset()})
+        tree["benchmark"]["explicit_steps"] = xr.DataArray(3.0, attrs={"units": "s-1"})
+        tree.to_netcdf(tmp_path / "one.nc")
+        choice = ("--group", "benchmark", "--variables", "explicit_steps")
+        assert run("export", tmp_path / "one.nc", "--to", tmp_path / "one.csv", *choice).exit_code == 0
+        assert (tmp_path / "one.csv").read_text().split() == ["explicit_steps", "[s-1]", "3.0"]
 
     def test_chosen_variables_of_a_group_and_labels_with_units(self, path, tmp_path):
         choice = ("--group", "sensitivity", "--variables", "displacement,best_stiffness")
@@ -243,6 +256,7 @@ class TestClean:
         Path("config/two.yaml").write_text(STUDY.replace("SIZE", "2.5 mm").replace("LOAD", "[traction, bending]"))
         files = ["dataset.nc", "browse.html", "meshes/b_right_5mm.vtu", "meshes/b_right_5mm.json", "logs/collect.log",
                  "solutions/b_right_5mm.h5", "figures/size_right_m_traction.png", "tables/index.html", "notes/mine.txt",
+                 "notes/mine.h5",
                  "tasks/bundles.json", "tasks/mesh_0.json", "done/mesh_0.json", "logs/snakemake.log"]  # fmt: skip
         stale = ["meshes/b_right_2.5mm.vtu", "meshes/b_right_2.5mm.json", "solutions/b_right_2.5mm.h5",
                  "figures/size_right_m_bending.png", "tables/table_9.csv", "references/0123456789.h5",

@@ -92,7 +92,7 @@ class TestText:
         root.put({"reference_applies": 0}, kinematics="linear", **place)
         root.put({"reference_message": "it turns by 1 rad"}, **place)
         text = summary.text({"/": root.data}, "A study")
-        assert "beyond small strain, so the error is not the network's alone: 4 of 5" in text
+        assert "beyond small strain, so the error is not the network's alone: 3 of 5" in text
         assert "100x20, steel, traction: it turns by 1 rad" in text and "worst" not in text
 
     def test_other_groups_are_counted_where_messages_are_of_their_cells(self, root):
@@ -199,6 +199,10 @@ class TestEnding:
         (folder / "logs" / f"{names[-1]}.log").write_text("why")
         text = summary.broken(study, folder, names, since)
         assert "two is not complete" in text and f"logs/{names[-1]}.log" in text and text.count(".log") == 1
+        (folder / "logs/collect.log").write_text("why, too")
+        assert "logs/collect.log" in summary.broken(study, folder, names, since)
+        besides = summary.beside(study, folder, names, since)
+        assert "new in two: " in besides and f"not complete: {names[-1]}" in besides and besides.count(".log") == 2
 
     def test_a_run_with_nothing_to_do_reminds_of_holes(self, tmp_path):
         assert summary.reminder(tmp_path) == ""

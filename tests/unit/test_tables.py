@@ -101,7 +101,7 @@ def test_moduli_of_another_box_than_the_beam_are_said():
 
 def test_summary_gives_the_range_over_all_meshes():
     found = tables(definitions.decision(compared()))["In short"]
-    rows = {row["a/H"]: row for row in found if row["use"] == "`area`"}
+    rows = {row["a/H"]: row for row in found if row["usual choice"] == "`area`"}
     assert list(rows) == ["to 0.05", "to 0.1", "to 0.25"]
     # 200x40 at 1 and 2 mm (-.25, -.5 %), 100x20 at 1 mm (.5 %); 100x20 at 2 mm; 5 mm on both.
     assert [row["meshes"] for row in rows.values()] == ["3", "1", "2"]
@@ -119,7 +119,7 @@ def test_a_range_never_hides_a_mesh_that_is_not_solved(spoiled):
         place["load"] = "shear"
     tree["deformation_error"].loc[place], tree["status"].loc[place] = np.nan, 5
     found = tables(definitions.decision(tree))["In short"]
-    rows = {row["a/H"]: row for row in found if row["use"] == "`area`"}
+    rows = {row["a/H"]: row for row in found if row["usual choice"] == "`area`"}
     assert "1 not solved" in rows["to 0.25"]["shear, ν = 0.3"]
     assert ("not solved" in rows["to 0.25"]["traction, ν = 0.3"]) == (spoiled == "mesh")
 
@@ -128,7 +128,9 @@ def test_a_load_that_was_not_asked_on_all_meshes_says_on_how_many():
     tree = compared()
     place = {"beam": "200x40", "mesh_type": "free", "load": "bending", "definition": "area"}
     tree["deformation_error"].loc[place], tree["status"].loc[place] = np.nan, 0
-    rows = {row["a/H"]: row for row in tables(definitions.decision(tree))["In short"] if row["use"] == "`area`"}
+    rows = {
+        row["a/H"]: row for row in tables(definitions.decision(tree))["In short"] if row["usual choice"] == "`area`"
+    }
     assert rows["to 0.05"]["bending, ν = 0.3"] == "+0.5 % (1 of 3)"
 
 
@@ -287,7 +289,7 @@ def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_pat
     assert "paper prints" not in html and "printed" not in html.split("</style>")[1] and "Table" not in html
     tables_page.write(scenes(printed=True), tmp_path)
     html, lines = lines_of(tmp_path)
-    assert "the paper prints" in html and "Table 7: traction" in html
+    assert "Paper, as printed" in html and "Table 7: traction" in html
     assert ["3.400", "3.60", "5.88"] in [line[3:6] for line in lines]
 
 

@@ -54,6 +54,8 @@ STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
 BUNDLES = plan.write_tasks(STUDY, RESULTS, workflow.cores or 1)
+READ = workflow.__dict__.setdefault("studies_read", [])  # the one that is run; for the paper, those that it reads besides
+READ.append((STUDY, RESULTS, [f"{stage}_{label}" for stage, labels in BUNDLES.items() for label in labels]))
 SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
 CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
 
@@ -93,8 +95,11 @@ def caption(name):
 
 def code(one):
     """Modules that an output is made by."""
-    pages = ["campaign.page", *(f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables)] if one.page else []
-    found = modules("campaign.present", *filter(None, (one.module, one.write)), *pages)
+    made = ["campaign.present", *(f"kinds.{name}.outputs" for name in KINDS), *filter(None, (one.module, one.write))]
+    if one.page:
+        made += ["campaign.page", *(f"kinds.{name}.kind" for name in KINDS)]
+        made += [f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
+    found = modules(*made)
     return [*found, PACKAGE / "output/page.html"] if one.page else list(found)
 
 
@@ -104,9 +109,18 @@ def tell_start():
 
     dag = workflow.dag
     jobs = [(dag.jobid(job), job.rule.name, job.threads, list(map(str, job.output))) for job in dag.needrun_jobs()]
-    found = workload.loads(STUDY, RESULTS, jobs)
+    found, names = {}, []
+    for study, results, _ in READ:
+        prefix = "" if study is STUDY else f"{study.name}_"
+        own = [
+            (number, rule.removeprefix(prefix), threads, outputs)
+            for number, rule, threads, outputs in jobs
+            if outputs and Path(outputs[0]).is_relative_to(results)
+        ]
+        names += [study.name] if own or study is STUDY else []
+        found |= workload.loads(study, results, own)
     cores = workflow.cores or min(workflow.nodes or 1, len(jobs) or 1)  # on a cluster, jobs side by side
-    text = f"{STUDY.name}: {workload.told(found, cores)}"
+    text = f"{', '.join(names)}: {workload.told(found, cores)}"
     logger.info(text, extra={"quietness": Quietness.PROGRESS, "loads": found, "cores": cores})
 
 
@@ -114,7 +128,7 @@ def tell_end(how):
     """Say what became of the study, see `springtune.campaign.summary`; `--quiet all` alone keeps it back."""
     from springtune.campaign import summary  # here: only a run needs it
 
-    names = [f"{stage}_{label}" for stage, labels in BUNDLES.items() for label in labels]
     since = workflow.start_time.timestamp()
-    text = getattr(summary, how)(STUDY, RESULTS, names, since)
+    text = getattr(summary, how)(*READ[0], since)
+    text += "".join(summary.beside(*one, since) for one in READ[1:])
     logger.info(text, extra={"ends": True})

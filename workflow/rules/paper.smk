@@ -23,11 +23,12 @@ if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in PAPER_STUDIE
     for name in PAPER_STUDIES:
         if name != STUDY.name:
             prefix = f"{name}_"
+            beside = CONFIG.with_name(f"{name}.yaml")
 
             module:
                 name: name
                 snakefile: "../../Snakefile"
-                config: {"study": str(CONFIG.with_name(f"{name}.yaml"))}
+                config: {"study": str(beside if beside.exists() else Path("config", beside.name))}
 
             use rule * from name exclude all as prefix*
 

@@ -4,9 +4,11 @@ import errno
 import mimetypes
 import os
 import secrets
+import sys
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from .page import page
@@ -16,7 +18,7 @@ HOST = "127.0.0.1"
 SERVED = {"figures": (".pdf", ".png"), "tables": (".csv", ".html", ".md")}
 """Folders beside a dataset, and the endings of those of their files that are served."""
 
-ALONE = ("paper.pdf", "report.html")
+ALONE = ("paper.pdf", "report.zip")
 """Files beside a dataset that are served."""
 
 POLICY = (
@@ -58,7 +60,9 @@ class Server(ThreadingHTTPServer):
         path = Path(dataset)
         path = path / "dataset.nc" if path.is_dir() else path
         self.served = _served(path)
-        self.text = page(path, [name for name in self.served if not name.endswith((".csv", ".nc", ".pdf"))]).encode()
+        self.text = page(
+            path, [name for name in self.served if name in ALONE or not name.endswith((".csv", ".nc", ".pdf"))]
+        ).encode()
         self.token = secrets.token_urlsafe(24)
         try:
             super().__init__((HOST, port), Handler)
@@ -75,6 +79,11 @@ class Server(ThreadingHTTPServer):
         self.socket.bind(self.server_address)
         self.server_address = self.socket.getsockname()
         self.server_name, self.server_port = HOST, int(self.server_address[1])
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Keep quiet about a browser that went away in the middle of a file; it reloads, or has seen enough."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -131,9 +140,14 @@ def _served(dataset: Path) -> dict[str, Path]:
     found = {"dataset.nc": dataset}
     for folder, endings in SERVED.items():
         for path in sorted((dataset.parent / folder).glob("*")):
-            if path.suffix in endings and path.is_file() and not path.is_symlink():
+            if path.suffix in endings and _is_own(path):
                 found[f"{folder}/{path.name}"] = path
     for name in ALONE:
-        if (dataset.parent / name).is_file():
+        if _is_own(dataset.parent / name):
             found[name] = dataset.parent / name
     return found
+
+
+def _is_own(path: Path) -> bool:
+    """Whether it is a file, and no link to one elsewhere."""
+    return path.is_file() and not path.is_symlink()

@@ -18,8 +18,8 @@ JOB_FILES = {"tasks": ".json", "done": ".json", "logs": ".log", "benchmarks": ".
 OUTPUT_FILES = {"figures": tuple(f".{ending}" for ending in FORMATS), "tables": (".csv", ".html", ".md")}
 """Folders of outputs, and how their files end."""
 
-STORED = ".h5"
-"""Ending of what stages store, see `springtune.jobs.store`."""
+STORED, STORES = ".h5", {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark"}
+"""Ending of what stages store, see `springtune.jobs.store`, and the folders where they do."""
 
 
 def orphans(study: "Study", folder: Path) -> list[Path]:
@@ -74,7 +74,7 @@ def _candidates(folder: Path) -> Iterator[Path]:
             stage, mark, _ = path.name.partition("_")
             made = path.suffix in OUTPUT_FILES.get(below.name, ())
             made |= below.name in JOB_FILES and bool(mark) and stage in names
-            made |= path.suffix == STORED
+            made |= below.name in STORES and path.suffix == STORED
             made |= below.name == "meshes" and path.suffix in (".vtu", ".json")
             if made or UNFINISHED in path.name:
                 yield path

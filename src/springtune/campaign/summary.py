@@ -145,7 +145,10 @@ def _worst(root: "xr.Dataset") -> Iterator[str]:
             found.append((error, _label(root.definition, number), _labels(root, others, map(int, place))))
     found.sort(key=lambda row: -abs(row[0]))
     if found:
-        yield from ("", f"worst deformation error of each definition, of the {int(counted.sum())} scenes that have one")
+        number = int(counted.sum())
+        scenes = "the one scene that has one" if number == 1 else f"the {number} scenes that have one"
+        head = "worst deformation error, (network - reference) / |reference|, of each definition"
+        yield from ("", f"{head}, of {scenes}; tension is positive")
         yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
     if len(found) > WORST:
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
@@ -157,7 +160,7 @@ def _unreferenced(root: "xr.Dataset") -> Iterator[str]:
     for scenes, what in (
         (requested & ~there, "without a reference, and so without an error"),
         (
-            requested & there & (root.reference_applies == 0),
+            root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0),
             "beyond small strain, so the error is not the network's alone",
         ),
     ):
@@ -205,11 +208,42 @@ def broken(study: "Study", folder: Path, names: Sequence[str], since: float) -> 
     -------
     str
     """
-    undone = [name for name in names if not (folder / "done" / f"{name}.json").exists()]
-    logs = [path for name in undone if _time(path := folder / "logs" / f"{name}.log") >= since]
+    _, logs = _undone(folder, names, since)
     lines = [f"{study.name} is not complete: a job failed or was stopped.", *(f"  its log: {path}" for path in logs)]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
+
+
+def beside(study: "Study", folder: Path, names: Sequence[str], since: float) -> str:
+    """What to say of a study that was run besides, for the paper.
+
+    Parameters
+    ----------
+    study, folder, names, since
+        As of `ending`.
+
+    Returns
+    -------
+    str
+        A line on what was computed, and of what is not made the logs.
+    """
+    undone, logs = _undone(folder, names, since)
+    lines = [f"new in {study.name}: {_computed(folder, names, since)}"]
+    lines += [f"  not complete: {', '.join(undone)}"] if undone else []
+    return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
+
+
+def _undone(folder: Path, names: Sequence[str], since: float) -> tuple[list[str], list[Path]]:
+    """Bundles that are not done, and logs of jobs that this run began and that made nothing."""
+    undone = [name for name in names if not (folder / "done" / f"{name}.json").exists()]
+    missing = set(undone)
+    if not (folder / "dataset.nc").exists():
+        missing.add("collect")
+    after = [path.stem for path in sorted((folder / "logs").glob("present_*.log"))] + ["browse", "paper"]
+    # A job after the stages has written its benchmark when it has made all that it is to make.
+    missing |= {name for name in after if _time(folder / "benchmarks" / f"{name}.tsv") < since}
+    logs = [folder / "logs" / f"{name}.log" for name in [*undone, *sorted(missing - set(undone))]]
+    return undone, [path for path in logs if _time(path) >= since]
 
 
 def reminder(folder: Path) -> str:

@@ -44,8 +44,8 @@ class Load:
     products: list[Path] = field(default_factory=list)
 
 
-def keys_of(content: Any) -> set[str]:
-    """Keys of the results that a task file asks for.
+def keys_of(content: Any) -> list[str]:
+    """Keys of the results that a task file asks for, one a task.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def keys_of(content: Any) -> set[str]:
 
     Returns
     -------
-    set of str
+    list of str
 
     Examples
     --------
@@ -63,9 +63,9 @@ def keys_of(content: Any) -> set[str]:
     """
     if isinstance(content, dict):
         if "key" in content:
-            return {content["key"]}
+            return [content["key"]]
         content = list(content.values())
-    return set().union(*map(keys_of, content)) if isinstance(content, list) else set()
+    return [key for part in content for key in keys_of(part)] if isinstance(content, list) else []
 
 
 def computed(done: Path) -> int | None:

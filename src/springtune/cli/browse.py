@@ -1,5 +1,6 @@
 """Serve the page of a dataset on the loopback address."""
 
+import tempfile
 from pathlib import Path
 
 import click
@@ -25,13 +26,17 @@ def browse(dataset: Path, port: int, no_open: bool) -> None:
     try:
         server = Server(dataset, port)
     except (OSError, ValueError) as error:
-        click.echo(str(error), err=True)
-        raise SystemExit(1) from None
+        raise click.ClickException(str(error)) from None
     try:
         with server:
             click.echo(f"{server.address}\nCtrl-C ends it.")
-            if not no_open:
-                click.launch(server.address)
-            server.serve_forever()
+            if no_open:
+                server.serve_forever()
+            # By way of a file that only its owner can read: what a browser is called with, all users of a machine see.
+            with tempfile.TemporaryDirectory(prefix="springtune-") as folder:
+                way = Path(folder, "browse.html")
+                way.write_text(f'<meta http-equiv="refresh" content="0; url={server.address}">')
+                click.launch(str(way))
+                server.serve_forever()
     except KeyboardInterrupt:
         click.echo()

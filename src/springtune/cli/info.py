@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from ..output.text import aligned
+from ..problem.status import Status
 from .examples import examples
 
 if TYPE_CHECKING:
@@ -112,7 +113,10 @@ def _errors(tree: "xr.DataTree") -> list[str]:
     root = tree.to_dataset()
     if "deformation_error" not in root or "definition" not in root.deformation_error.dims:
         return []
-    error = root.deformation_error
+    counted = root.status == Status.SOLVED
+    if "reference_applies" in root:
+        counted = counted & (root.reference_applies == 1)
+    error = root.deformation_error.where(counted).transpose(*root.deformation_error.dims)
     several = error.sizes.get("kinematics", 1) > 1
     rows: list[list[object]] = [
         ["  definition", *(["kinematics"] if several else []), "cells", "median", "worst", "at"]
@@ -127,12 +131,13 @@ def _errors(tree: "xr.DataTree") -> list[str]:
             sizes = np.abs(values[np.isfinite(values)])
             worst = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
             labels = [here[name].values[place] for name, place in zip(here.dims, worst)]
-            place = " ".join(label if isinstance(label, str) else f"{1e3 * label:g}mm" for label in labels)
+            place = ", ".join(label if isinstance(label, str) else f"{1e3 * label:g} mm" for label in labels)
             kind = [str(error.kinematics.values[number])] if several else []
             numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * values[worst]:+.3g} %"]
             rows.append([f"  {definition}", *kind, *numbers, place])
     right = range(1 + several, 4 + several)
-    return ["errors of the displacement, over the reference's", aligned(rows, 0, right)] if rows[1:] else []
+    head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
+    return [head, aligned(rows, 0, right)] if rows[1:] else []
 
 
 def _groups(tree: "xr.DataTree") -> list[str]:

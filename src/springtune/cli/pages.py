@@ -78,10 +78,11 @@ def _loaded(path: Path, group: str) -> "xr.DataTree":
 
     study = {"moduli": "definitions"}.get(group, group)
     remedy = f"run config/{study}.yaml"
-    if not path.is_file():
+    file = path / "dataset.nc" if path.is_dir() else path
+    if not file.is_file():
         raise click.ClickException(f"{path}: there is no such dataset; {remedy}")
     try:
-        with xr.open_datatree(path, engine="netcdf4") as tree:
+        with xr.open_datatree(file, engine="netcdf4") as tree:
             if group not in tree:
                 raise click.ClickException(f"{path}: has no group /{group}; {remedy}")
             return tree.load()

@@ -86,7 +86,9 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
     known = error[np.isfinite(error)]
     if len(known):  # a beam that buckled errs by thousands
-        panel.set_ylim(max(1.1 * known.min(), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN))
+        panel.set_ylim(
+            max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
+        )
     labels.settle(figure, axes, place)
     if not len(known):
         labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)

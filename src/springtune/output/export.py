@@ -100,7 +100,7 @@ def table(
         widest = status if status is not None else max(data.data_vars.values(), key=lambda array: array.ndim)
         dimensions = _ordered(data, set(map(str, widest.dims)))
         chosen = [array for array in data.data_vars.values() if set(array.dims) <= set(dimensions)]
-    places = np.nonzero(_asked(data, status, chosen, dimensions))
+    places = np.nonzero(_asked(data, status, chosen, dimensions)) if dimensions else ()
     columns = []
     for name, place in zip(dimensions, places):
         labels = data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[name]))
@@ -182,7 +182,7 @@ def _asked(
     asked = np.zeros(shape, dtype=bool)
     for array in (one for one in chosen if one.ndim == most):
         values = spread(array)
-        asked |= values.astype(str) != "" if values.dtype == object else ~np.isnan(values)
+        asked |= values.astype(str) != "" if values.dtype.kind in "OU" else ~np.isnan(values)
     if status is not None and set(status.dims) <= set(dimensions):
         asked &= spread(status) != 0
     return asked

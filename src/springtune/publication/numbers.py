@@ -31,7 +31,7 @@ TEXT_UNITS = {
     "mm": ("m", 1e-3), "mm²": ("m2", 1e-6),
     "s": ("s", 1.0), "ms": ("s", 1e-3), "µs": ("s", 1e-6), "ns": ("s", 1e-9),
     "N": ("N", 1.0), "kN": ("N", 1e3), "N/m": ("N/m", 1.0), "N/mm": ("N/m", 1e3), "×10⁶ N/m": ("N/m", 1e6),
-    "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9), "MB": ("B", 1e6),
+    "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9), "MB": ("byte", 1e6),
 }  # fmt: skip
 """Units that a paper shows: the dataset's unit, and how many of that."""
 

@@ -353,9 +353,9 @@ class Cells {
       cell.tip = `${spoken(status)}${Number.isFinite(value) && !field.flags ? `, ${written(field, value, 4)} ${unit}` : ""}`;
       if (field.flags) Object.assign(cell, category(field, value));
       else if (!Number.isFinite(value)) {
-        cell.missing = status === "not_requested" || status === "solved";
+        cell.missing = status === "not_requested";
         cell.colour = cell.missing ? "#8883" : ink("band");
-        cell.text = cell.missing ? "" : SIGNS[status];
+        cell.text = cell.missing ? "" : status === "solved" ? "no value" : SIGNS[status];
         cell.ink = ink("ink");
       } else {
         const rgb = diverge ? diverging(value / limit) : sequential(high > low ? (value - low) / (high - low) : 0.3);
@@ -370,7 +370,9 @@ class Cells {
       xlabel: titled({ ...columns, name: x }), ylabel: titled({ ...rows, name: y }),
       pick: (cell) => this.page.choose(cell.places), chosen: chosen.row >= 0 && chosen.column >= 0 ? chosen : null,
     });
-    const key = element("span", { class: "soft", text: ["hatched: not requested", "○ unstable", "✕ failed", "click a tile to choose it", without].filter(Boolean).join(" · ") });
+    const signs = Object.keys(SIGNS).filter((word) => !["solved", "not_requested"].includes(word) && cells.some((cell) => cell.status === word))
+      .map((word) => `${SIGNS[word]} ${spoken(word)}`);
+    const key = element("span", { class: "soft", text: [cells.some((cell) => cell.missing) && "hatched: not requested", ...signs, "click a tile to choose it", without].filter(Boolean).join(" · ") });
     this.parts["map-under"].replaceChildren(field.flags ? categories(field, key)
       : diverge ? colourScale(`≤ −${number(limit * scale, 2)} ${unit}`, "0 in the middle", `≥ +${number(limit * scale, 2)} ${unit}`, [key])
         : finite.length ? rampScale(`${number(low * scale, 3)} ${unit}`, `${number(high * scale, 3)} ${unit}`, key) : key);

@@ -78,6 +78,7 @@ class Chart {
 
   async make(settings, build) {
     const B = await library();
+    if (this.key !== JSON.stringify(settings)) return null; // something else is to be shown by now
     this.ranges = {
       x_range: new B.Range1d({ start: 1, end: 2 }), y_range: new B.Range1d({ start: 1, end: 2 }),
     };
@@ -233,7 +234,7 @@ class Lines extends Chart {
         for (const grid of fig.center.filter((one) => one.dimension === 0)) grid.ticker = fig.below[0].ticker;
       }
     });
-    if (this.fig !== made) return; // something else is shown by now
+    if (!made || this.fig !== made) return; // something else is shown by now
     const usable = (x, y) => Number.isFinite(x) && Number.isFinite(y) && (!logx || x > 0) && (!logy || y > 0);
     const lines = { xs: [], ys: [], color: [], dash: [], width: [] };
     const points = { x: [], y: [], fill: [], line: [], marker: [], size: [], name: [], tip: [] };
@@ -364,7 +365,7 @@ class Tiles extends Chart {
       fig.left[0].major_label_orientation = "horizontal";
       this.recolour = (text) => (ring.glyph.line_color = text);
     });
-    if (this.fig !== made) return;
+    if (!made || this.fig !== made) return;
     this.cells = cells;
     const fits = columns.length * 46 < this.holder.clientWidth && rows.length <= 30;
     this.sources.tiles.data = {

@@ -53,7 +53,7 @@ class Page {
       this.errors(root, end);
     }
     const links = document.getElementById("links");
-    const named = [["dataset.nc", "dataset.nc"], ["tables/index.html", "tables"], ["paper.pdf", "paper.pdf"], ["report.html", "report"]];
+    const named = [["dataset.nc", "dataset.nc"], ["tables/index.html", "tables"], ["paper.pdf", "paper.pdf"], ["report.zip", "report"]];
     for (const [path, text] of named)
       if (path === "dataset.nc" || this.files.includes(path)) links.append(element("a", { href: path, text }));
     for (const [view, text] of [["study", "config, provenance, figures"]]) links.append(element("a", { href: `#view=${view}`, text }));
@@ -64,8 +64,11 @@ class Page {
     if (!field || field.dims.join() !== status.dims.join()) return;
     const values = field.unpacked(), sizes = [];
     let worst = -1;
+    const applies = root.fields.reference_applies;
     for (let i = 0; i < values.length; i++) {
-      if (!Number.isFinite(values[i])) continue;
+      if (!Number.isFinite(values[i]) || status.meaning(status.valueAt(i)) !== "solved") continue;
+      const at = Object.fromEntries(status.dims.map((name) => [name, Math.floor(i / status.strides[name]) % root.dims[name].size]));
+      if (applies && applies.of(at) !== 1) continue;
       sizes.push(Math.abs(values[i]));
       if (worst < 0 || Math.abs(values[i]) > Math.abs(values[worst])) worst = i;
     }

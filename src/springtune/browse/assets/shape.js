@@ -173,8 +173,8 @@ class Shape {
       const bar = element("span", { class: "bar", style: `background: linear-gradient(to right, ${[-1, -0.5, 0, 0.5, 1].map(carriedColour).join(",")})` });
       this.under.replaceChildren(element("p", { class: "scale" }, element("span", { text: `−${number(limit, 3)} ${unit}` }), bar,
         element("span", { text: `+${number(limit, 3)} ${unit}` }),
-        element("span", { class: "soft", text: `${name}, tension positive · thin line: at rest${data.oux ? " · wide line: the reference" : " · this load has no reference"}` })),
-        element("p", { class: "soft small", text: "Below the whole load, displacements are in proportion to it." }));
+        element("span", { class: "soft", text: `${name}, tension positive · thin line: at rest${data.oux ? " · wide line: the reference" : " · the page has no reference of this load"}` })),
+        element("p", { class: "soft small", text: "The load's slider scales the displacements under the whole load: the dataset holds no path to it." }));
     }
   }
 }
@@ -199,7 +199,7 @@ class Outline extends Lines {
       fig.add_tools(new B.HoverTool({ renderers: [glyph], tooltips: [["", "@what"], ["", "@tip"]] }));
       this.recolour = (text) => (this.edges.glyph.line_color = text);
     });
-    if (this.fig !== made) return;
+    if (!made || this.fig !== made) return;
     this.sources.springs.data = { x0, y0, x1, y1, color: shares.map(carriedColour), tip: tips, what: tips.map(() => name) };
     this.sources.lines.data = {
       xs: outlines.map((one) => one.x), ys: outlines.map((one) => one.y),

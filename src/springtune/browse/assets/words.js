@@ -1,7 +1,7 @@
 // How values are written: units of engineers, percent, signs.
 
 const UNITS = {
-  m: [1e3, "mm"], m2: [1e6, "mm²"], Pa: [1e-6, "MPa"], B: [1e-6, "MB"], "B/s": [1e-9, "GB/s"], degree: [1, "°"],
+  m: [1e3, "mm"], m2: [1e6, "mm²"], Pa: [1e-6, "MPa"], byte: [1e-6, "MB"], "byte s-1": [1e-9, "GB/s"], degree: [1, "°"],
   "kg/m3": [1, "kg/m³"], "s-1": [1, "1/s"], "rad/s": [1, "rad/s"], "1": [1, ""],
 };
 const LEFT_OUT = "This is too large for the page; it is in dataset.nc alone.";
@@ -12,7 +12,7 @@ const SIGNS = {
 function unitOf(one) {
   if (one.flags || one.isText) return [1, ""];
   const units = one.units || "1";
-  if (units === "1" && /(^|_)(errors?|strain|elongation|swing)(_|$)/.test(one.name)) return [100, "%"];
+  if (units === "1" && /(^|_)(errors?(?!_rate)|strain|elongation|swing)(_|$)/.test(one.name)) return [100, "%"];
   return UNITS[units] || [1, units];
 }
 

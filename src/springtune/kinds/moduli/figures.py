@@ -202,7 +202,8 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
     types = labels_of(root.status != 0, "mesh_type")
     figure, axes, flat, height = _panels(ax, len(types), 1.95)
     title = f"{labelled_beam(root, chosen['beam'])}, {chosen['material']}, {chosen['load']}"
-    title = f"{title}: error of the displacement field in L2, fitted rate in brackets"
+    rates = ", fitted rate in brackets" if len(labels_of(root.status != 0, "mesh_size")) > 1 else ""
+    title = f"{title}: error of the displacement field in L2{rates}"
     _arrange(figure, axes, title)
     drawn = [_field_errors(panel, error.sel(mesh_type=name), root.status.sel(mesh_type=name))
              for panel, name in zip(flat, types)]  # fmt: skip
@@ -243,9 +244,9 @@ def _field_errors(panel, error, status):
     others = [name for one in together if one not in named for name in one]
     for name in others:
         panel.plot(sizes, curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
-    ends = []
-    for number, one in enumerate(named):
-        values, look = curves[one[0]], style.line(number)
+    ends, order = [], names.tolist()
+    for one in named:
+        values, look = curves[one[0]], style.line(order.index(one[0]))
         there = np.flatnonzero(np.isfinite(values))
         label = ", ".join(one)
         if len(there) > 1:
@@ -334,7 +335,9 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         width, height = style.size(figure)
         bar = figure.add_axes([1 - 0.52 / width, bottom / height, 0.1 / width, 1 - (bottom + 0.63) / height])
         figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
-        figure.text(0.05 / width, 0.05 / height, "×: no result; –: not asked for", fontsize=style.SMALL, color="0.25")
+        flags = root.status.values
+        said = ["×: no result"] * bool((flags > 1).any()) + ["–: not asked for"] * bool((flags == 0).any())
+        figure.text(0.05 / width, 0.05 / height, "; ".join(said), fontsize=style.SMALL, color="0.25")
     return axes[0]
 
 

@@ -105,7 +105,7 @@ def _advice(root):
                 situation = ""
     if not rows:
         return []
-    lines = [f"| what you have | use | mesh type | a/H | meshes | {' | '.join(heads)} |"]
+    lines = [f"| what you have | usual choice | mesh type | a/H | meshes | {' | '.join(heads)} |"]
     lines.append("|---|---|---|---|---:|" + "---:|" * len(heads))
     lines += [f"| {' | '.join(row)} |" for row in rows]
     meshes = "; ".join(

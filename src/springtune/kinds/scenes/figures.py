@@ -29,9 +29,18 @@ def sensitivity(tree):
     tuple
         Stem, function that plots, and selection.
     """
-    status = group(tree, "sensitivity").status.sel(kinematics="nonlinear")
-    for stem, selection in distinct("sensitivity", SENSITIVITY_LABELS, cells(status != 0, SENSITIVITY_LABELS)).items():
-        yield stem, plot_sensitivity, selection
+    yield from _each("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
+
+
+USUAL = "nonlinear"
+"""Kinematics that a figure is of; where a study asks for other ones alone it is of those, and says so."""
+
+
+def _each(name, plot, status, names):
+    """Figures of each selection that has cells, of the usual kinematics or, without them, of the first that it has."""
+    for stem, selection in distinct(name, names, cells(status != 0, names)).items():
+        there = labels_of((status != 0).sel(selection), "kinematics")
+        yield stem, plot, selection | {"kinematics": USUAL if USUAL in there else there[0]}
 
 
 @style.styled
@@ -198,7 +207,8 @@ def _force(newtons):
 
 def _named(selection, *names):
     """Labels of a selection for a title."""
-    return [str(selection[name]) for name in names if name in selection]
+    named = [str(selection[name]) for name in names if name in selection]
+    return named + [str(name) for name in [selection.get("kinematics", USUAL)] if name != USUAL]
 
 
 # -- errors against mesh size ------------------------------------------------------------------------------------------
@@ -206,9 +216,7 @@ def _named(selection, *names):
 
 def size(tree):
     """Figures of errors against mesh size: one for each mesh type, material and load; see `sensitivity`."""
-    status = group(tree, "/").status.sel(kinematics="nonlinear")
-    for stem, selection in distinct("size", SCENE_LABELS, cells(status != 0, SCENE_LABELS)).items():
-        yield stem, plot_size, selection
+    yield from _each("size", plot_size, group(tree, "/").status, SCENE_LABELS)
 
 
 @style.styled
@@ -260,8 +268,12 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
     drawn = []
     for panel, (name, definitions) in zip(flat, shown):
-        drawn.append(_errors(panel, root.sel(beam=name), definitions, first=panel is flat[0]))
-        panel.set(title=labelled_beam(root, name), xlabel="Mesh size [mm]")
+        looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
+        drawn.append(_errors(panel, root.sel(beam=name), {one: looks[one] for one in definitions}, panel is flat[0]))
+        parts = [one for beam, one in shown if beam == name]
+        part = f", {parts.index(definitions) + 1} of {len(parts)}" if len(parts) > 1 else ""
+        room = panel.get_window_extent().width / panel.figure.dpi
+        panel.set(title=labels.wrapped(labelled_beam(root, name) + part, room, 8), xlabel="Mesh size [mm]")
     under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
     if ax is None:
         figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
@@ -294,14 +306,14 @@ def _small_multiples(ax, count, columns):
     return figure, axes, height
 
 
-def _errors(panel, here, definitions, first):
-    """Draw errors of one beam over mesh size: ends of the lines for their names, and what a note says."""
+def _errors(panel, here, looks, first):
+    """Draw errors of one beam over mesh size, a look a definition: ends of lines for names, and what a note says."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes, ends, said, statuses = 1e3 * here.mesh_size.values, [], [], set()
-    for number, definition in enumerate(definitions):
+    for definition, look in looks.items():
         cell = here.sel(definition=definition)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
-        look, known = style.line(number), np.isfinite(error)
+        known = np.isfinite(error)
         if known.any():
             panel.plot(sizes, error, label=definition, **look)
             last = np.flatnonzero(known)[-1]
@@ -325,7 +337,8 @@ def _errors(panel, here, definitions, first):
     panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
     panel.minorticks_off()
     panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
-    panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
+    if ends:
+        panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
     room = panel.get_window_extent().width / panel.figure.dpi
     return ends, "\n".join(labels.wrapped(text, room) for text in said)
 
@@ -358,18 +371,17 @@ DEFINITION = ("lattice", "calibrated", "paper")
 
 def deformed(tree):
     """Figures of deformed networks: one for each mesh type, material and load; see `sensitivity`."""
-    status, fields = group(tree, "/").status.sel(kinematics="nonlinear"), group(tree, "fields")
+    status, fields = group(tree, "/").status, group(tree, "fields")
     names = fields.definition.values.tolist()
     solved = status.sel(definition=names).isin((1, 2, 4)).any("mesh_size")
     if "displacement_x" in fields:
-        moved = fields.displacement_x.isel(particle=0)
-        moved = moved.sel(kinematics="nonlinear") if "kinematics" in moved.dims else moved
-        solved = moved.notnull().any("mesh_size")
-    for stem, selection in distinct("deformed", SCENE_LABELS, cells(status != 0, SCENE_LABELS)).items():
-        counts = dict(zip(names, solved.sel(selection).sum("beam").transpose("definition").values.tolist()))
+        solved = fields.displacement_x.isel(particle=0).notnull().any("mesh_size")
+    for stem, plot, selection in _each("deformed", plot_deformed, status, SCENE_LABELS):
+        here = solved.sel({name: label for name, label in selection.items() if name in solved.dims})
+        counts = dict(zip(names, here.sum("beam").transpose("definition").values.tolist()))
         best = [name for name in names if counts[name] == max(counts.values())]
         definition = next((name for name in DEFINITION if name in best), best[0])
-        yield stem, plot_deformed, selection | {"definition": definition}
+        yield stem, plot, selection | {"definition": definition}
 
 
 @style.styled

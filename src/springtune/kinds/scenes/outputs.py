@@ -47,9 +47,8 @@ def _lack_of_pressure(study: "Study") -> str:
 
 def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]:
     for item in items:
-        if item.kinematics == "nonlinear":
-            labels = {"beam": item.mesh.beam.name, "mesh_type": item.mesh.mesh_type}
-            yield labels | {"material": item.material.name, "load": item.load}
+        labels = {"beam": item.mesh.beam.name, "mesh_type": item.mesh.mesh_type}
+        yield labels | {"material": item.material.name, "load": item.load}
 
 
 OUTPUTS = (

@@ -101,7 +101,8 @@ def _finite_strain(finite, root):
         )
     note = (
         "Networks of nonlinear kinematics against neo-Hookean finite elements. At finite strain an error holds the "
-        "difference of two material laws; where a slender beam turns and hardly stretches, it does not."
+        "difference of two material laws; where a slender beam turns and hardly stretches, it does not. Networks are "
+        "in plane stress: an error against plane strain holds that difference, too."
     )
     lacking = [text for text in np.unique(finite.reference_message.values.astype(str)) if text]
     note += "".join(f" No reference: {text}." for text in lacking)
@@ -116,7 +117,7 @@ def _block(block, root):
         cell = block.sel(place)
         reference = cell.isel(reference=0)
         rows.append(
-            {name: place[name] for name in ("material", "load", "mesh_type", "definition", "kinematics")}
+            {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
             | {
                 "mesh_size_mm": 1e3 * place["mesh_size"],
                 "network_mm": 1e3 * float(cell.face_displacement),
