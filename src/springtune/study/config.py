@@ -270,7 +270,8 @@ def study_model(kinds: Sequence[StudyKind]) -> type[StudyConfig]:
         Field(
             [output.name for output in outputs if output.usual],
             validate_default=False,
-            description=f"What is made from the dataset: {meanings}. Figures of scenes are of nonlinear kinematics where a grid has them, else of linear ones.",
+            description=f"What is made from the dataset: {meanings}. "
+            "Figures of scenes are of nonlinear kinematics where a grid has them, else of linear ones.",
         ),
     )
     study_fields["grids"] = (
