@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..jobs.keys import installed
+from ..output.reading import CHANGED
 from ..study.model import Study
 
 SOFTWARE = (
@@ -112,10 +113,6 @@ def _name(file: Path, root: Path) -> str:
 
 def _sha256(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
-CHANGED = "+changes"
-"""What a commit ends with where files of the checkout differ from it."""
 
 
 def git_commit(folder: Path) -> str:

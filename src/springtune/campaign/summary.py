@@ -4,7 +4,6 @@
 the run (`ending`, `broken`), without xarray.
 """
 
-import re
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..jobs import atomic
-from ..output.text import aligned
+from ..output.text import aligned, without_numbers
 from ..problem.status import Status
 from .workload import clock, computed, keys_of
 
@@ -121,7 +120,7 @@ def _named(cells: Cells) -> Iterator[str]:
     """Some of the cells with their reasons, of each reason one at first, and how many there are besides."""
     reasons: dict[str, Cells] = {}
     for cell in cells:
-        reasons.setdefault(re.sub(r"[\d.e+-]+", "#", cell[1]), []).append(cell)
+        reasons.setdefault(without_numbers(cell[1]), []).append(cell)
     order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
     shown = order if len(order) <= NAMED + 1 else order[:NAMED]
     for labels, message in shown:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..jobs import atomic, bundles
 from ..springs import DEFINITIONS
-from .plan import COSTS_FILE, stages, usual_costs
+from .plan import BUNDLES_FILE, COSTS_FILE, stages, usual_costs
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -116,7 +116,7 @@ def loads(study: "Study", folder: Path, jobs: Iterable[tuple[int, str, int, list
 def _of_bundles(study: "Study", folder: Path) -> dict[str, Load]:
     """Loads of all bundles of a study, by the stem of their files."""
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
-    notes = atomic.read_json(folder / "tasks/bundles.json")
+    notes = atomic.read_json(folder / BUNDLES_FILE)
     seconds = {
         (stage.name, label): sum(members[name][0] for name in names if name in members)
         for stage in stages()

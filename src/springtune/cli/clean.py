@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..output.text import bytes_text
 from .examples import examples
 
 if TYPE_CHECKING:
@@ -41,19 +42,19 @@ def clean(study: Path | None, remove: bool) -> None:
     for folder, paths in found.items():
         size = sum(path.stat().st_size for path in paths)
         total, count = total + size, count + len(paths)
-        click.echo(f"{folder}: {len(paths)} files, {_size(size)}" if paths else f"{folder}: nothing to remove")
+        click.echo(f"{folder}: {len(paths)} files, {bytes_text(size)}" if paths else f"{folder}: nothing to remove")
         by_folder = defaultdict(list)
         for path in paths:
             by_folder[path.parent].append(path)
         for parent, members in by_folder.items():
             for path in members[:LISTED]:
-                click.echo(f"  {path.relative_to(folder)}  {_size(path.stat().st_size)}")
+                click.echo(f"  {path.relative_to(folder)}  {bytes_text(path.stat().st_size)}")
             if len(members) > LISTED:
                 click.echo(f"  {parent.relative_to(folder)}: and {len(members) - LISTED} more")
     if not remove:
         if count:
             again = " ".join(["springtune clean", *([str(study)] if study else []), "--remove"])
-            click.echo(f"{count} files, {_size(total)}; `{again}` removes them")
+            click.echo(f"{count} files, {bytes_text(total)}; `{again}` removes them")
         return
     for folder, paths in found.items():
         for path in paths:
@@ -61,7 +62,7 @@ def clean(study: Path | None, remove: bool) -> None:
         for parent in {path.parent for path in paths} - {folder}:
             if not any(parent.iterdir()):
                 parent.rmdir()
-    click.echo(f"removed {count} files, {_size(total)}")
+    click.echo(f"removed {count} files, {bytes_text(total)}")
 
 
 def _studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
@@ -96,11 +97,3 @@ def _idle(folder: Path) -> None:
             f"{locks}: a run is under way, nothing is removed; wait for its end, or, if it was stopped, call "
             "`snakemake --unlock`"
         )
-
-
-def _size(number: float) -> str:
-    for unit in ("B", "kB", "MB"):
-        if number < 1000:
-            return f"{number:.3g} {unit}"
-        number /= 1000
-    return f"{number:.3g} GB"

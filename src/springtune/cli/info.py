@@ -1,7 +1,6 @@
 """What a dataset holds, and where it comes from."""
 
 import json
-import re
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from ..output.text import aligned
+from ..output.text import aligned, bytes_text, without_numbers
 from ..problem.status import Status
 from .examples import examples
 
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 REASONS = 5
 """Reasons of a status that are told."""
-
-NUMBER = re.compile(r"[0-9][0-9.]*(e[+-]?[0-9]+)?")
 
 
 @click.command(epilog=examples("springtune info results/paper"))
@@ -64,7 +61,7 @@ def info_text(tree: "xr.DataTree", path: Path) -> str:
 def _head(tree: "xr.DataTree", path: Path) -> list[str]:
     made = f", made {tree.attrs['created']}" if "created" in tree.attrs else ""
     study = tree.attrs.get("study", "unknown")
-    return [str(tree.attrs.get("title", study)), f"study {study}: {path}, {_size(path.stat().st_size)}{made}"]
+    return [str(tree.attrs.get("title", study)), f"study {study}: {path}, {bytes_text(path.stat().st_size)}{made}"]
 
 
 def _ends(node: "xr.DataTree") -> Iterator[str]:
@@ -94,7 +91,7 @@ def _reasons(status: str, texts: list[str]) -> Iterator[str]:
     """Lines on the reasons of a status: those that differ in numbers alone are one, told by its first."""
     alike = defaultdict(list)
     for text in texts:
-        alike[NUMBER.sub("#", text)].append(text)
+        alike[without_numbers(text)].append(text)
     kinds = sorted(alike.values(), key=len, reverse=True)
     for members in kinds[:REASONS]:
         such = "such as " if len(set(members)) > 1 else ""
@@ -174,7 +171,3 @@ def _json(text: str | None) -> dict[str, str]:
         return dict(json.loads(text or "{}"))
     except ValueError:
         return {}
-
-
-def _size(number: float) -> str:
-    return f"{number / 1e6:.3g} MB" if number >= 1e6 else f"{number / 1e3:.3g} kB"

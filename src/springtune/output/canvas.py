@@ -21,10 +21,7 @@ from matplotlib.typing import ColorType
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from .style import SETTINGS
-
-POINTS = 72
-"""Units of a PDF page in an inch."""
+from .style import POINTS, SETTINGS
 
 COMPRESSION = 1
 """Level of the PNG's compression: higher ones take twice the time for a tenth of the size."""

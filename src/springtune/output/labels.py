@@ -11,10 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-from .style import SMALL, arrange
-
-POINTS = 72
-"""Points in an inch."""
+from .style import POINTS, SMALL, arrange
 
 DARKER = 0.75
 """Share of the light of a line's colour that its name keeps, to be read on white."""

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 """Connectivities of `/fields`."""
 
+CHANGED = "+changes"
+"""What `git_commit` ends with where files of the checkout differed from the commit."""
+
 
 def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     """Open the dataset of a study.

@@ -19,6 +19,9 @@ COLUMN = 3.5
 PAGE = 7.16
 """Width of its page [inch]."""
 
+POINTS = 72
+"""Points in an inch, the units of a PDF page."""
+
 SMALL = 7.0
 """Size of the smallest text of a figure [pt], which journals still take at these widths."""
 
@@ -162,6 +165,42 @@ def panels(
     if given.size != nrows * ncols:
         raise ValueError(f"the plot has {nrows} x {ncols} panels, ax has {given.size} Axes")
     return None, given.reshape(nrows, ncols)
+
+
+def multiples(
+    ax: Figure | SubFigure | Axes | np.ndarray | None, count: int, columns: int, height: float, *, sharey: bool = False
+) -> tuple[Figure | SubFigure | None, np.ndarray, np.ndarray, float]:
+    """Panels of small multiples: one of them a column wide, more of them in rows of a page.
+
+    Parameters
+    ----------
+    ax : None, matplotlib Figure, Axes or array of Axes
+        As of `panels`; Axes that are given stand in one row.
+    count, columns : int
+        Panels, and how many stand in a row.
+    height : float
+        Of a row [inch].
+    sharey : bool, optional
+        Whether the panels of a figure share the axis of ordinates.
+
+    Returns
+    -------
+    figure, axes
+        As of `panels`.
+    used : (count,) ndarray of Axes
+        Those that are not left over in the last row.
+    height : float
+        Of the figure without notes [inch].
+    """
+    rows = -(-count // columns)
+    figsize = (COLUMN if columns == 1 else PAGE, 0.2 + height * rows)
+    if ax is not None and not isinstance(ax, Figure | SubFigure):
+        figure, axes = panels(ax, 1, count, figsize=figsize)
+    else:
+        figure, axes = panels(ax, rows, columns, sharey=sharey, figsize=figsize)
+    for panel in axes.flat[count:]:
+        panel.set_visible(False)
+    return figure, axes, axes.ravel()[:count], figsize[1]
 
 
 def size(figure: Figure | SubFigure) -> tuple[float, float]:

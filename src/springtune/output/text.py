@@ -1,5 +1,6 @@
 """Text for a terminal."""
 
+import re
 from collections.abc import Collection, Iterable
 
 
@@ -14,3 +15,20 @@ def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] 
         ]
         lines.append((" " * left + "  ".join(cells)).rstrip())
     return "\n".join(lines)
+
+
+def bytes_text(number: float) -> str:
+    """So many bytes, as people read them."""
+    for unit in ("B", "kB", "MB"):
+        if number < 1000:
+            return f"{number:.3g} {unit}"
+        number /= 1000
+    return f"{number:.3g} GB"
+
+
+NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
+
+
+def without_numbers(text: str) -> str:
+    """A message by which those are alike that differ in numbers alone."""
+    return NUMBER.sub("#", text)

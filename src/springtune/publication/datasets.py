@@ -46,7 +46,7 @@ class Dataset:
             "title": attributes["title"],
             "version": attributes["springtune_version"],
             "commit": attributes["git_commit"][:HASH_SHOWN] or "no commit",
-            "changed": attributes["git_commit"].endswith("+changes"),
+            "changed": attributes["git_commit"].endswith(reading.CHANGED),
             "created": attributes["created"][:10],
             "software": json.loads(attributes["software"]),
             "sha256": self.sha256[:HASH_SHOWN],

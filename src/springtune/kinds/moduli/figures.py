@@ -52,22 +52,8 @@ def _main(root, names, selection):
     return chosen
 
 
-def _panels(ax, count, height):
-    """Figure, or None, its panels in rows of two, those of them that are used, and the height without notes."""
-    columns = min(2, max(1, count))
-    rows = -(-count // columns)
-    width, height = (style.COLUMN if columns == 1 else style.PAGE), 0.2 + height * rows
-    if ax is not None and not hasattr(ax, "subplots"):
-        figure, axes = style.panels(ax, 1, count, figsize=(width, height))
-        return figure, axes, axes.ravel(), height
-    figure, axes = style.panels(ax, rows, columns, figsize=(width, height))
-    for panel in axes.flat[count:]:
-        panel.set_visible(False)
-    return figure, axes, axes.ravel()[:count], height
-
-
 def _arrange(figure, axes, title, ax=None, height=0.0, notes=()):
-    """Place panels of `_panels`, with room for notes below each; a figure of our own grows by that."""
+    """Place panels of `style.multiples`, with room for notes below each; a figure of our own grows by that."""
     under = labels.LINE * max(map(labels.lines_of, notes), default=0)
     if ax is None and notes:
         figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
@@ -118,7 +104,7 @@ def plot_moduli(data, ax=None):
     """
     moduli = group(data, "moduli")
     types = labels_of(moduli.status != 0, "mesh_type")
-    figure, axes, flat, height = _panels(ax, len(types), 1.95)
+    figure, axes, flat, height = style.multiples(ax, len(types), min(2, max(1, len(types))), 1.95)
     title = "Effective Poisson's ratio against the one asked for; grey: as asked"
     _arrange(figure, axes, title)
     drawn = [_moduli(panel, moduli.sel(mesh_type=mesh_type)) for panel, mesh_type in zip(flat, types)]
@@ -200,7 +186,7 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
     root = root.sel(chosen)
     error = root.field_error
     types = labels_of(root.status != 0, "mesh_type")
-    figure, axes, flat, height = _panels(ax, len(types), 1.95)
+    figure, axes, flat, height = style.multiples(ax, len(types), min(2, max(1, len(types))), 1.95)
     title = f"{labelled_beam(root, chosen['beam'])}, {chosen['material']}, {chosen['load']}"
     rates = ", fitted rate in brackets" if len(labels_of(root.status != 0, "mesh_size")) > 1 else ""
     title = f"{title}: error of the displacement field in L2{rates}"

@@ -261,8 +261,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         parts = np.array_split(asked, -(-len(asked) // MOST_LINES))
         shown += [(name, part.tolist()) for part in parts]
     columns = min(3, len(shown)) if len(shown) != 4 else 2
-    figure, axes, height = _small_multiples(ax, len(shown), columns)
-    flat = axes.ravel()[: len(shown)]
+    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
     title = ", ".join(_named(selection, "mesh_type", "material", "load"))
     place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
     style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
@@ -291,19 +290,6 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
 
 MOST_LINES = 6
 """Definitions in one panel; more of them take further rows of panels."""
-
-
-def _small_multiples(ax, count, columns):
-    """Figure, panels in rows, and the height of a figure without notes: one panel a column wide, more as a page."""
-    rows = -(-count // columns)
-    width, height = (style.COLUMN if columns == 1 else style.PAGE), 0.2 + rows * 2.1
-    if ax is not None and not hasattr(ax, "subplots"):
-        figure, axes = style.panels(ax, 1, count, figsize=(width, height))
-        return figure, axes, height
-    figure, axes = style.panels(ax, rows, columns, sharey=True, figsize=(width, height))
-    for panel in axes.ravel()[count:]:
-        panel.set_visible(False)
-    return figure, axes, height
 
 
 def _errors(panel, here, looks, first):
