@@ -388,3 +388,11 @@ def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
             said = [text.get_text() for text in drawn_on.findobj(Text)]
             assert any("linear" in text for text in said), said
             plt.close(drawn_on)
+
+
+def test_no_line_runs_through_the_key_of_a_sensitivity_figure(tree):
+    stem, plot, selection = next(iter(figures.sensitivity(tree)))
+    panel = plot(tree, **selection)
+    frame = panel.get_legend().get_frame()
+    assert frame.get_visible() and frame.get_alpha() == 1 and frame.get_facecolor()[:3] == (1, 1, 1)
+    plt.close(panel.figure)

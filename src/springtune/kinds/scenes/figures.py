@@ -161,7 +161,9 @@ def _key(panel, seen):
     handles = [panel.plot([], [], color="0.3", **look)[0] for _, look in shown]
     if shown:
         panel.legend(handles, [text for text, _ in shown], loc="upper center", bbox_to_anchor=(0.52, 1.02),
-                     handlelength=1.2, labelspacing=0.25, borderaxespad=0.2)  # fmt: skip
+                     handlelength=1.2, labelspacing=0.25, borderaxespad=0.2,
+                     # No line runs through its words, wherever the paper's stiffness lies.
+                     frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)  # fmt: skip
 
 
 def _sensitivity_title(panel, root, selection):
