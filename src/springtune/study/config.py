@@ -66,7 +66,7 @@ class Section(BaseModel):
             raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
         for key in value:
             if key not in names:
-                raise refuse(f"unknown key '{key}'; {nearest(key, names)}", key)
+                raise refuse(f"unknown key {show(key)}; {nearest(key, names)}", key)
         given = {key: content for key, content in value.items() if content is not None}
         for name, field in names.items():
             if field.is_required() and name not in given:

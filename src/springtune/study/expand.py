@@ -12,7 +12,7 @@ from ..problem.loads import KINEMATICS, LOADS
 from ..problem.materials import Material
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
-from .checks import check_files, mesh_type_names, stated_rows
+from .checks import check_cells, check_files, mesh_type_names, stated_rows
 from .config import StudyConfig
 from .messages import Problems
 from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, StudyKind
@@ -165,11 +165,12 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
         for scene in scenes
         if scene.definition == "calibrated"
     }
+    groups: dict[tuple[str, Material], list[tuple[MeshSpec, Material, str, float]]] = {}
+    for cell in cells:
+        groups.setdefault((cell[0].mesh_type, cell[1]), []).append(cell)
     curves: list[CurveSpec] = []
     for mesh_type, material, kinematics in needed:
-        found = [
-            CurveSpec(*cell, kinematics) for cell in cells if (cell[0].mesh_type, cell[1]) == (mesh_type, material)
-        ]
+        found = [CurveSpec(*cell, kinematics) for cell in groups.get((mesh_type, material), ())]
         if not found:
             problems.add(
                 ("definitions", "calibrated"),
@@ -195,6 +196,8 @@ def build(
     meshes = in_order(scene.mesh for scene in scenes)
     references = in_order(Reference(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes)
     check_files(meshes, scenes, references, problems)
+    problems.stop()
+    check_cells(config, meshes, scenes, curves, problems)
     problems.stop()
     parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}
     names = [output.name for kind in kinds for output in kind.outputs]
