@@ -5,8 +5,8 @@ from itertools import product
 
 from pydantic import Field
 
-from ...problem.geometry import Beam
 from ...mesh import MESH_TYPES
+from ...problem.geometry import Beam
 from ...springs import DEFINITIONS
 from ...study.checks import check_particles
 from ...study.config import Section
