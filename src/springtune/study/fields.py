@@ -113,8 +113,8 @@ LONGEST_NAME = 60
 
 NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{LONGEST_NAME - 1}}}")
 NAME_RULE = (
-    f"use at most {LONGEST_NAME} letters, digits, '.', '_' and '-', and no '.' in front: names become parts of file "
-    "names"
+    f"use letters, digits, '.', '_' and '-', at most {LONGEST_NAME} of them, and no '.' in front: names become "
+    "parts of file names"
 )
 
 Length = Annotated[float, quantity("length")]

@@ -17,8 +17,7 @@ DEEPEST = 20
 """Most levels of lists and mappings in each other."""
 
 _TAGS = frozenset(
-    f"tag:yaml.org,2002:{name}"
-    for name in ("bool", "float", "int", "map", "merge", "null", "seq", "str", "timestamp", "value")
+    f"tag:yaml.org,2002:{name}" for name in ("bool", "float", "int", "map", "merge", "null", "seq", "str", "timestamp")
 )
 """What a value may be; others, such as sets, would have to be asked for by name."""
 
@@ -146,10 +145,12 @@ def _check_size(root: yaml.Node, file: str) -> None:
 def _check_value(node: yaml.Node, file: str) -> None:
     """Refuse values that YAML itself, and so Snakemake, would not take."""
     line = node.start_mark.line + 1
+    if node.tag == "tag:yaml.org,2002:value":
+        raise StudyError(f"{file}:{line}: not YAML: '=' means nothing by itself; put it in quotes")
     if node.tag not in _TAGS:
         tag = node.tag.replace("tag:yaml.org,2002:", "!!")
         raise StudyError(f"{file}:{line}: a study has no tags such as '{tag}'; remove it")
-    if isinstance(node, yaml.ScalarNode) and node.tag != "tag:yaml.org,2002:str":
+    if isinstance(node, yaml.ScalarNode) and node.tag.endswith((":bool", ":float", ":int", ":timestamp")):
         try:
             _values.construct_object(node)
         except (ValueError, ArithmeticError, KeyError, IndexError):
