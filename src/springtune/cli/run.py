@@ -11,10 +11,10 @@ import click
 from .completion import studies_here
 from .examples import examples
 
-USUAL = "config/paper.yaml"
+USUAL_STUDY = "config/paper.yaml"
 """Study that is run where none is named."""
 
-HOLES = 3
+NOT_SOLVED = 3
 """Exit code of a strict run of which scenes are not solved."""
 
 WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
@@ -53,7 +53,7 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     if late:
         raise click.UsageError(f"name the study first: springtune run {late[0]} {options[0]}")
     checkout = _checkout()
-    path = Path(arguments[0]).absolute() if named else checkout / USUAL
+    path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
     shown = Path(arguments[0]) if named else path
     try:
         study = load_study(shown)
@@ -70,7 +70,7 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     holes = 0 if code else _unsolved(Path("results") / study.name / "dataset.nc")
     if holes:
         click.echo(f"--strict: {holes} scenes are not solved", err=True)
-    raise SystemExit(HOLES if holes else code)
+    raise SystemExit(NOT_SOLVED if holes else code)
 
 
 def _checkout() -> Path:

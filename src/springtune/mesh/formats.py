@@ -25,8 +25,11 @@ DIGITS = 1e-6
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
 
-MOST_POINTS = 1_000_000
+MOST_IN_FILE = 1_000_000
 """Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
+
+LONGEST_SAID = 120
+"""Most characters of what meshio says that are shown."""
 
 MOST_SEARCHED = 2000
 """So many ends of edges are looked at for one that hangs on another edge."""
@@ -125,11 +128,15 @@ def _content(path: str | Path) -> Any:
             warnings.simplefilter("ignore")
             return meshio.read(path)
     except (Exception, SystemExit) as error:
-        said = " ".join(f"{error}".split()) if not isinstance(error, SystemExit) else ""
-        why = f"{said[:200]}{'...' if len(said) > 200 else ''}" or (
-            "unknown format" if isinstance(error, SystemExit) else type(error).__name__
-        )
-        raise MeshError(f"{path}: meshio cannot read it: {why}; convert it to .vtu or .msh") from None
+        said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
+        said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
+        if not isinstance(error, SystemExit):
+            said = said or type(error).__name__
+        shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
+        why = f"it is damaged, or not what its name says{shown}; write it again"
+        if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
+            why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
+        raise MeshError(f"{path}: meshio cannot read it: {why}") from None
 
 
 def _coordinates(path: str | Path, content: Any) -> np.ndarray:
@@ -141,8 +148,8 @@ def _coordinates(path: str | Path, content: Any) -> np.ndarray:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         shape = " x ".join(map(str, points.shape))
         raise MeshError(f"{path}: coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
-    if len(points) > MOST_POINTS:
-        raise MeshError(f"{path}: {len(points)} points, and at most {MOST_POINTS} are read; write a coarser mesh")
+    if len(points) > MOST_IN_FILE:
+        raise MeshError(f"{path}: {len(points)} points, and at most {MOST_IN_FILE} are read; write a coarser mesh")
     return points
 
 

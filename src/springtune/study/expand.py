@@ -1,5 +1,6 @@
 """From the sections of a study to all that they ask for."""
 
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -7,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from ..mesh import MESH_TYPES
+from ..mesh.formats import LARGEST_FILE
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS, LOADS
 from ..problem.materials import Material
@@ -32,13 +34,26 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
         for number, row in enumerate(rows):
             path, label = folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
-            if not path.is_file():
-                problems.add((*where, "file"), f"'{path}' is not a file; give its path relative to the study's folder")
+            fault = _file_fault(path)
+            if fault:
+                problems.add((*where, "file"), f"'{path}' {fault}")
             if label in found:
                 problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")
             found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
+
+
+def _file_fault(path: Path) -> str:
+    """Why a mesh file cannot be what is meant, and the remedy; empty where it may be. Its content is not looked at."""
+    try:
+        if path.is_file():
+            if path.stat().st_size > LARGEST_FILE:
+                return f"is larger than {LARGEST_FILE // 1_000_000} MB, the most that is read; write a coarser mesh"
+            return "" if os.access(path, os.R_OK) else "may not be read; change its permissions"
+    except (OSError, ValueError):  # a name that no file can have
+        pass
+    return "is not a file; give its path relative to the study's folder"
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from ...problem.materials import Material
 from ...problem.status import Status
 from ...scene.moduli import MeshModuli
 from ...springs import DefinitionError
-from ..scenes.mesh import make
+from ..scenes.mesh import made
+from ..scenes.stored_mesh import REFUSED
 
 
 def run(tasks, done):
@@ -31,7 +32,12 @@ def run(tasks, done):
         missing = [one for one in patch["measurements"] if one["key"] not in present]
         if not missing:
             continue
-        mesh = make(patch["mesh"])
+        mesh, why = made(patch["mesh"])
+        if mesh is None:
+            store.add(path, {one["key"]: {"status": Status.FAILED, "message": why} for one in missing})
+            for _ in missing:
+                spent.add(REFUSED, 0, 0.0)
+            continue
         moduli = MeshModuli(mesh)
         results = {}
         for measurement in missing:

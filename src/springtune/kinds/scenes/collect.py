@@ -4,7 +4,6 @@ import numpy as np
 import xarray as xr
 
 from ...jobs import atomic, store
-from ...mesh import read_mesh
 from ...output.dataset import NO_NODE, Filler
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
@@ -13,7 +12,7 @@ from ...problem.status import Status
 from ...reference.field import outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
-from . import plan, stored_reference
+from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
 
@@ -110,9 +109,9 @@ def _calibration(folder):
 
 def _meshes(study, folder, root):
     for mesh in study.meshes:
-        notes = atomic.read_json(folder / "meshes" / f"{mesh.name}.json")
-        del notes["key"]
-        root.put(notes, **_mesh_labels(mesh))
+        notes = stored_mesh.notes(folder / "meshes", mesh.name)
+        if "message" not in notes:  # its scenes say why it could not be made
+            root.put({name: value for name, value in notes.items() if name != "key"}, **_mesh_labels(mesh))
 
 
 def _references(study, folder, root):
@@ -202,7 +201,7 @@ def _sensitivity(study, folder, displacements, axes):
             displacement = result["displacement"]
             reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
             status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
-            status = np.where(np.isnan(displacement), Status.NOT_CONVERGED, status)
+            status = np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status)
             curves.put(
                 {
                     "stiffness": stiffness,
@@ -289,15 +288,16 @@ def _face_reference(folder, one, kind):
 def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
     shown = plan.shown_meshes(study)
-    meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
+    kept = [mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", mesh.name)]
+    meshes = {mesh: stored_mesh.read(folder / "meshes", mesh.name) for mesh in kept}
     outlines = {one: _outline(folder, one) for one in study.references}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {
-        "particle": max(len(mesh.points) for mesh in meshes.values()),
-        "spring": max(len(mesh.edges) for mesh in meshes.values()),
+        "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
+        "spring": max((len(mesh.edges) for mesh in meshes.values()), default=1),
         "spring_end": 2,
-        "cell": max(len(corners) for corners in cells.values()),
-        "cell_corner": max(corners.shape[1] for corners in cells.values()),
+        "cell": max((len(corners) for corners in cells.values()), default=1),
+        "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
         "outline_point": max(len(points) for points, _ in outlines.values()),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}

@@ -1,4 +1,7 @@
-"""Stage `mesh`: one VTU file a mesh, with its quality figures in a JSON file beside it."""
+"""Stage `mesh`: one VTU file a mesh, with its quality figures in a JSON file beside it.
+
+A mesh that cannot be made has no VTU file, and its notes say why: it costs its own scenes and no others.
+"""
 
 import sys
 import time
@@ -7,6 +10,7 @@ from pathlib import Path
 from ...jobs import atomic
 from ...jobs.spent import Spent
 from ...mesh import MESH_TYPES, MeshError, quality, read_beam_mesh, write_mesh
+from . import stored_mesh
 
 
 def run(tasks, done):
@@ -23,22 +27,35 @@ def run(tasks, done):
     folder = Path(tasks["folder"])
     folder.mkdir(parents=True, exist_ok=True)
     for task in tasks["meshes"]:
-        path, notes = folder / f"{task['name']}.vtu", folder / f"{task['name']}.json"
-        if path.exists() and notes.exists() and atomic.read_json(notes)["key"] == task["key"]:
+        path, notes = stored_mesh.mesh_path(folder, task["name"]), stored_mesh.notes_path(folder, task["name"])
+        before = stored_mesh.notes(folder, task["name"])
+        if before.get("key") == task["key"] and (path.exists() or "message" in before):
             continue
         begin = time.perf_counter()
-        try:
-            mesh = make(task)
-        except MeshError as error:  # the user's file: the message says it all
-            raise SystemExit(str(error)) from None
+        mesh, why = made(task)
         seconds = time.perf_counter() - begin
         # The notes name the mesh they belong to, so they go first and come last.
         notes.unlink(missing_ok=True)
+        if mesh is None:
+            path.unlink(missing_ok=True)
+            atomic.write_json(notes, {"key": task["key"], "message": why})
+            spent.add(stored_mesh.REFUSED, 0, seconds)
+            continue
         write_mesh(path, mesh)
         figures = quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
         atomic.write_json(notes, {"key": task["key"], "mesh_seconds": seconds} | figures)
         spent.add("mesh", len(mesh.points), time.perf_counter() - begin)
     atomic.write_json(done, spent.summary())
+
+
+def made(source):
+    """Mesh of what `make` takes, and nothing; or none, and why it cannot be made."""
+    try:
+        return make(source), ""
+    except MeshError as error:  # the user's file: the message says it all
+        return None, f"mesh: {error}"
+    except MemoryError:
+        return None, "mesh: there is not enough memory to make it; give a larger mesh size"
 
 
 def make(source):

@@ -11,11 +11,12 @@ import numpy as np
 
 from ...jobs import atomic, store
 from ...jobs.spent import Spent
-from ...mesh import read_mesh
 from ...problem.loads import LOAD_KINDS
+from ...problem.status import Status
 from ...reference.limits import objection
 from ...scene.curve import ending, follow, meeting
 from ...scene.sheet import Sheet
+from . import stored_mesh
 from . import stored_reference as references
 
 
@@ -38,7 +39,13 @@ def run(tasks, done):
         missing = [curve for curve in family["curves"] if curve["key"] not in present]
         if not missing:
             continue
-        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        why = stored_mesh.refusal(tasks["meshes"], family["name"])
+        if why:
+            store.add(path, {curve["key"]: _without_mesh(curve, why) for curve in missing})
+            for _ in missing:
+                spent.add(stored_mesh.REFUSED, 0, 0.0)
+            continue
+        mesh = stored_mesh.read(tasks["meshes"], family["name"])
         results = {}
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
         for kind in {curve["kind"]: None for curve in missing}:
@@ -48,6 +55,21 @@ def run(tasks, done):
         for result in results.values():
             spent.add("curve", len(mesh.points), result["seconds"])
     atomic.write_json(done, spent.summary())
+
+
+def _without_mesh(curve, why):
+    """Result of a curve whose mesh could not be made."""
+    count = len(curve["stiffnesses"])
+    return {
+        "displacement": np.full(count, np.nan),
+        "stable": np.zeros(count, dtype=bool),
+        "status": Status.FAILED,
+        "message": why,
+        "best_stiffness": np.nan,
+        "best_status": Status.FAILED,
+        "best_message": why,
+        "seconds": 0.0,
+    }
 
 
 def _trace(sheet, kind, curves, folder):

@@ -9,7 +9,6 @@ import numpy as np
 from ...jobs import atomic, store
 from ...jobs.keys import hash_of
 from ...jobs.spent import Spent
-from ...mesh import read_mesh
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
@@ -17,6 +16,7 @@ from ...problem.status import Status
 from ...reference.field import field_error, interpolate
 from ...scene.sheet import Sheet, definition_of
 from ...springs import DEFINITIONS, DefinitionError
+from . import stored_mesh
 from . import stored_reference as references
 
 
@@ -45,7 +45,13 @@ def run(tasks, done):
         missing = {name: scene for name, scene in scenes.items() if name not in present}
         if not missing:
             continue
-        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        why = stored_mesh.refusal(tasks["meshes"], family["name"])
+        if why:
+            store.add(path, dict.fromkeys(missing, {"status": Status.FAILED, "message": why, "seconds": 0.0}))
+            for _ in missing:
+                spent.add(stored_mesh.REFUSED, 0, 0.0)
+            continue
+        mesh = stored_mesh.read(tasks["meshes"], family["name"])
         fields = References(tasks["references"], mesh)
         sheet = Sheet(mesh, family["thickness"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
