@@ -206,7 +206,9 @@ def broken(study: "Study", plan: Plan, since: float) -> str:
     str
     """
     _, logs = _undone(plan, since)
-    lines = [f"{study.name} is not complete: a job failed or was stopped.", *(f"  its log: {path}" for path in logs)]
+    lines = [f"{study.name} is not complete: a job failed or was stopped."]
+    for path in logs:
+        lines += [f"  {_last(path)}", f"    its log: {path}"]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
 
@@ -228,6 +230,12 @@ def beside(study: "Study", plan: Plan, since: float) -> str:
     lines = [f"new in {study.name}: {_computed(plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
     return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
+
+
+def _last(log: Path) -> str:
+    """What a job said last: why it failed."""
+    said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
+    return said[-1].strip() if said else "it said nothing"
 
 
 def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:

@@ -22,6 +22,7 @@ class Row(NamedTuple):
 STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
 
 COMMANDS = {
+    "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition and its stiffness for one mesh."),
@@ -63,9 +64,9 @@ class Commands(click.Group):
     cls=Commands,
     epilog=examples(
         "springtune scenes config/paper.yaml",
+        "springtune run config/paper.yaml",
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
         "springtune browse results/paper",
-        "snakemake --configfile config/paper.yaml",
     ),
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -73,7 +74,7 @@ class Commands(click.Group):
 def main() -> None:
     """Tune the stiffness of 2-D mass-spring models against finite elements.
 
-    Studies are run by Snakemake, see the last example. `springtune COMMAND --help` has examples of each command. A
+    Studies are run by Snakemake, which `springtune run` calls. `springtune COMMAND --help` has examples of each. A
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """

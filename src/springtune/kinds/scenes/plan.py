@@ -10,6 +10,7 @@ from ...jobs.keys import beam_key, hash_of, material_key, mesh_type_key, stage_k
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
+from . import stored_mesh
 
 
 def particles(mesh):
@@ -164,8 +165,7 @@ def _meshes(study, folder, meshes):
 
 
 def _mesh_products(content):
-    folder = Path(content["folder"])
-    return [folder / f"{mesh['name']}{ending}" for mesh in content["meshes"] for ending in (".vtu", ".json")]
+    return [path for mesh in content["meshes"] for path in stored_mesh.files(content["folder"], mesh["name"])]
 
 
 def _reference_members(study, costs):
