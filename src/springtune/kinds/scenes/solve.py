@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import atomic, store
-from ...jobs.keys import hash_of
+from ...jobs.hashing import hash_of
 from ...jobs.spent import Spent
 from ...mesh import read_mesh
 from ...problem.boundary import FACE_POSITIONS
