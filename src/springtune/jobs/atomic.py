@@ -44,6 +44,19 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
         raise
 
 
+def remove_unfinished(folder: str | Path) -> None:
+    """Remove what writers that were killed have left in a folder and those below.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Nobody else may be writing there.
+    """
+    for path in Path(folder).rglob(f"*{UNFINISHED}*"):
+        if path.is_file():
+            path.unlink(missing_ok=True)
+
+
 def write_bytes(path: str | Path, content: bytes) -> None:
     """Write a file; folders are made where they are missing.
 
