@@ -18,11 +18,12 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..mesh import MESH_TYPES
 from ..registry import Declared
 from ..springs import DEFINITIONS
+from . import sealed, syntax
 from .syntax import Import, Source, read
 
 PACKAGE = Path(__file__).parents[1]
@@ -34,8 +35,11 @@ CARRIED = {
 }
 """Packages that modules use and that no result depends on, and why."""
 
-DISTRIBUTIONS = {"netgen": "netgen-mesher", "skfem": "scikit-fem"}
-"""Distributions of packages whose names differ; others that do are looked up, which takes a third of a second."""
+CODE_FILE = "code.json"
+"""File beside the studies' folders: what was read of the package's source."""
+
+DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
+"""Distributions of packages whose names differ; of those that are not here it is looked up, in a third of a second."""
 
 
 class Closure(NamedTuple):
@@ -66,9 +70,38 @@ class Code:
 
     def __init__(self, package: Path = PACKAGE) -> None:
         self.package = package
+        self._known: dict[str, list[Any]] = {}
         self._sources: dict[Path, Source] = {}
         self._closures: dict[tuple[Path, frozenset[Path], bool], Closure] = {}
         self._taken: dict[Path, tuple[set[Path], set[tuple[str, str]]]] = {}
+
+    def recall(self, path: Path) -> None:
+        """Take what was read before of files with the same content, which costs as much as half a plan.
+
+        Parameters
+        ----------
+        path : Path
+            Note of `remember`; nothing is taken where there is none, or one of other code.
+        """
+        note = sealed.read(path)
+        if note is not None and note["reader"] == READER:
+            self._known = note["sources"]
+
+    def remember(self, path: Path) -> None:
+        """Write down what was read of files of the package, for `recall`.
+
+        Parameters
+        ----------
+        path : Path
+            It stays as it is where it has all that was read.
+        """
+        read_now = {
+            _mark(file.read_bytes()): [source.digest, sorted(source.imports), source.face]
+            for file, source in self._sources.items()
+            if self._has(file)
+        }
+        if not read_now.keys() <= self._known.keys():
+            sealed.write(path, {"reader": READER, "sources": read_now})
 
     def closure(self, start: Path, without: frozenset[Path] = frozenset(), carried: bool = True) -> Closure:
         """A file and all that it imports, directly or not.
@@ -134,7 +167,14 @@ class Code:
 
     def _source(self, path: Path) -> Source:
         if path not in self._sources:
-            self._sources[path] = read(path.read_bytes(), "" if self._has(path) else self.package.name)
+            content, ours = path.read_bytes(), self._has(path)
+            known = self._known.get(_mark(content)) if ours else None
+            if known:
+                digest, imports, face = known
+                names = None if face is None else {name: _import(one) for name, one in face.items()}
+                self._sources[path] = Source(digest, frozenset(map(_import, imports)), names)
+            else:
+                self._sources[path] = read(content, "" if ours else self.package.name)
         return self._sources[path]
 
     def _has(self, path: Path) -> bool:
@@ -186,6 +226,18 @@ class Code:
         root = beside if beside.is_dir() or _file(beside) else _own(parts[0])
         return root and root.joinpath(*parts[1:])
 
+
+def _import(parts: list[Any]) -> Import:
+    level, module, name = parts
+    return level, module, name
+
+
+def _mark(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+READER = _mark(Path(syntax.__file__).read_bytes())
+"""What reads source: what was read by another one is not taken."""
 
 OURS = Code()
 """The code of springtune."""
@@ -284,6 +336,7 @@ def _declared_closure(one: Declared, code: Code) -> Closure:
         return code.of_text(f"({made.co_code!r}, {made.co_names!r}, {constants!r})")
 
 
+@cache
 def distribution(package: str) -> str:
     """Distribution that has a package.
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
 
 
+@cache
 def installed(distribution: str) -> str:
     """Version of a distribution; "none" where it is an extra that is not there, or not wanted."""
     from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
