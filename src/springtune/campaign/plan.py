@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..jobs import bundles, sealed
-from ..jobs.keys import hash_of
+from ..jobs.hashing import hash_of
 from ..jobs.run_tasks import RECORDS, TASKS
 from ..kinds import kinds
 

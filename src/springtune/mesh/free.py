@@ -15,7 +15,7 @@ def _stretch(length: float, height: float, size: float) -> float:
     return length / max(1, math.ceil(length / size)) / (height / max(1, math.ceil(height / size)))
 
 
-@mesh_type("free", order=20, row_height=ROW_HEIGHT, packages=("netgen-mesher",), own_stretch=_stretch)
+@mesh_type("free", order=20, row_height=ROW_HEIGHT, own_stretch=_stretch)
 def free(length: float, height: float, size: float) -> Mesh:
     """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
 

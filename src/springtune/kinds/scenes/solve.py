@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import sealed, store
-from ...jobs.keys import hash_of
+from ...jobs.hashing import hash_of
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
