@@ -10,6 +10,7 @@ from snakemake.logging import logger
 from snakemake.settings.enums import Quietness
 
 from springtune.campaign import plan
+from springtune.jobs import atomic
 from springtune.jobs.dependencies import PACKAGE, modules
 from springtune.kinds import KINDS, kinds, load_study, outputs
 from springtune.kinds.base import FORMATS
@@ -107,6 +108,8 @@ def tell_start():
     """Say how much there is to do; the progress display reads what each job is expected to take."""
     from springtune.campaign import workload  # here: only a run needs it
 
+    for _, results, _ in READ:
+        atomic.sweep(results)
     dag = workflow.dag
     jobs = [(dag.jobid(job), job.rule.name, job.threads, list(map(str, job.output))) for job in dag.needrun_jobs()]
     found, names = {}, []

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 UNFINISHED = ".unfinished"
-"""Ending of the name of a file that is being written, after its own."""
+"""Ending of the name of a file that is being written, after its own and the number of the process that writes it."""
 
 
 @contextmanager
@@ -32,7 +32,7 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + UNFINISHED)
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}{UNFINISHED}")
     try:
         yield unfinished
         if synced:
@@ -42,6 +42,48 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
+
+
+def sweep(folder: str | Path) -> list[Path]:
+    """Remove what processes that were killed left behind: files that they were writing.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folders below it are swept, too; links to others are not followed.
+
+    Returns
+    -------
+    list of Path
+        What was removed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_text(Path(folder) / "note.txt.0.unfinished", "half of")
+    ...     [path.name for path in sweep(folder)]
+    ['note.txt.0.unfinished']
+    """
+    removed = []
+    for below, _, names in os.walk(folder):
+        for name in names:
+            if name.endswith(UNFINISHED) and not _is_written(name):
+                removed.append(Path(below, name))
+                removed[-1].unlink(missing_ok=True)
+    return sorted(removed)
+
+
+def _is_written(name: str) -> bool:
+    """Whether the process that writes an unfinished file lives."""
+    number = name.removesuffix(UNFINISHED).rpartition(".")[2]
+    try:
+        os.kill(int(number), 0)
+    except (ValueError, OverflowError, ProcessLookupError):
+        return False
+    except PermissionError:  # another user's
+        pass
+    return int(number) != 0
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
