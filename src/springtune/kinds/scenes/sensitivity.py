@@ -1,4 +1,8 @@
-"""Stage `sensitivity`: displacement against uniform stiffness, one equilibrium path for all loads of a mesh.
+"""Stage `sensitivity`: displacement against uniform stiffness.
+
+Loads of a mesh have their network, its factor at rest and the series about it in common. Each curve follows a path of
+its own from there: where a path takes its steps depends on the loads that it is asked for, and a result may not depend
+on which others are computed along with it.
 
 Here, where equilibria are at hand, the stiffness at which a curve meets its reference is solved for, too.
 """
@@ -41,33 +45,25 @@ def run(tasks, done):
         mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
         results = {}
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
-        for kind in {curve["kind"]: None for curve in missing}:
-            alike = [curve for curve in missing if curve["kind"] == kind]
-            results |= _trace(sheet, LOAD_KINDS[kind], alike, tasks["references"])
+        for curve in missing:
+            results[curve["key"]] = _traced(sheet, curve, tasks["references"])
         store.add(path, results)
         for result in results.values():
             spent.add("curve", len(mesh.points), result["seconds"])
     atomic.write_json(done, spent.summary())
 
 
-def _trace(sheet, kind, curves, folder):
-    """Results of the curves of a kind of load by key; those under loads of one sign lie on one path."""
-    results = {}
-    for kinematics, sign in {(curve["kinematics"], np.sign(curve["force"])): None for curve in curves}:
-        begin = time.perf_counter()
-        alike = [curve for curve in curves if (curve["kinematics"], np.sign(curve["force"])) == (kinematics, sign)]
-        loads = [curve["force"] / np.array(curve["stiffnesses"]) for curve in alike]
-        path = follow(sheet, kind, kinematics, np.concatenate(loads))
-        parts = np.cumsum([len(each) for each in loads])[:-1]
-        found = zip(alike, np.split(path.values, parts), np.split(path.stable, parts))
-        of_these = {curve["key"]: _result(path, curve, *values, folder) for curve, *values in found}
-        seconds = (time.perf_counter() - begin) / len(alike)
-        results |= {key: result | {"seconds": seconds} for key, result in of_these.items()}
-    return results
+def _traced(sheet, curve, folder):
+    """Result of a curve."""
+    begin = time.perf_counter()
+    loads = curve["force"] / np.array(curve["stiffnesses"])
+    path = follow(sheet, LOAD_KINDS[curve["kind"]], curve["kinematics"], loads)
+    return _result(path, curve, folder) | {"seconds": time.perf_counter() - begin}
 
 
-def _result(path, curve, displacement, stable, folder):
+def _result(path, curve, folder):
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
+    displacement, stable = path.values, path.stable
     reference = references.read(folder, curve["reference"])
     why = objection(reference, force, curve["kinematics"])
     wanted = force * reference.get("displacement", np.nan)
