@@ -27,11 +27,14 @@ rule all:
         DONE,
         rules.collect.output,
         OUTPUTS.values(),
-        str(RESULTS / "index.html"),  # plain: the report is to name the rule that made it
+        str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
+
+
+release()
 
 
 onstart:
-    tell_start()
+    begin()
 
 
 onsuccess:

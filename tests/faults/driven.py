@@ -74,6 +74,7 @@ class Run:
         """What a run does before its first job."""
         self.plan.write()
         remove_unfinished(FOLDER)
+        remove_unfinished(FOLDER.parent, below=False)
 
     def do(self, name):
         """A job, by the function that its rule calls."""

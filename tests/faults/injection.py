@@ -21,9 +21,8 @@ is killed, halfway through a write."""
 ROOM = {"open", "write", "library", "mkdir", "fsync"}
 """Operations that need room on a disk."""
 
-REAL = {
-    name: getattr(os, name) for name in ("fsync", "replace", "rename", "unlink", "remove", "mkdir", "rmdir", "utime")
-}
+NAMES = ("fsync", "replace", "rename", "unlink", "remove", "mkdir", "rmdir", "utime")
+REAL = {name: getattr(os, name) for name in NAMES}
 REAL_OPEN = builtins.open
 
 
@@ -145,7 +144,6 @@ class _Raw(io.FileIO):
         self._faults = faults
 
     def write(self, data):
-        self._faults.operation(
-            "write", self.name, lambda: super(_Raw, self).write(bytes(data)[: len(bytes(data)) // 2])
-        )
+        half = bytes(data)[: memoryview(data).nbytes // 2]
+        self._faults.operation("write", self.name, lambda: super(_Raw, self).write(half))
         return super().write(data)

@@ -17,7 +17,7 @@ from injection import FAULTS
 STEPS = ["begin", "reference_0", "mesh_0", "sensitivity_0", "calibrate_0", "solve_0", "moduli_0", "laying_0",
          "stability_0", "benchmark_traction", "collect", "present_scenes", "browse"]  # fmt: skip
 
-FEW = 17
+FEW = 25
 """Of so many operations the short form fails one, each with another fault than the one before."""
 
 LIMITS = (0.0, 0.01, 0.3, 0.6, 0.9, 0.999)

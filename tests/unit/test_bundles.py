@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.campaign.plan import usual_costs
-from springtune.jobs import atomic, bundles
+from springtune.jobs import bundles, sealed
 from springtune.jobs.spent import Spent
 from springtune.kinds.stability.names import EXPERIMENTS
 from springtune.springs import DEFINITIONS
@@ -58,7 +58,7 @@ def test_costs_follow_what_the_machine_measures(tmp_path):
     for _ in range(10):
         spent.add("reference", 0, 3 * USUAL["reference"][0])
         spent.add("a kind of no cost", 0, 1.0)
-    atomic.write_json(done, spent.summary())
+    sealed.write(done, spent.summary())
     bundles.remember(path, [done], USUAL)
     assert bundles.Costs(path, USUAL).of("reference") == pytest.approx(3 * USUAL["reference"][0])
     assert bundles.Costs(path, USUAL).start_up == spent.start_up + bundles.SPAWNED

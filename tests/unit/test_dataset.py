@@ -209,7 +209,7 @@ class TestInterruptedWrite:
         with st.open(tmp_path) as tree:
             assert len(np.unique(tree.displacement.values)) == 1 and tree.stiffness.notnull().all()
         assert {file.name for file in tmp_path.iterdir()} <= {"dataset.nc", f"dataset.nc.{process.pid}.unfinished"}
-        atomic.sweep(tmp_path)
+        atomic.remove_unfinished(tmp_path)
         assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
 
     def test_an_unfinished_file_is_no_dataset(self, tmp_path):
@@ -224,7 +224,8 @@ class TestInterruptedWrite:
             shutil.copy(unfinished, tmp_path / "cut.nc")
             with pytest.raises(ValueError, match="cannot be read"):
                 st.open(tmp_path / "cut.nc")
-        assert atomic.sweep(tmp_path) == [unfinished] and not unfinished.exists()
+        atomic.remove_unfinished(tmp_path)
+        assert not unfinished.exists()
 
     def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(self, tmp_path, writer):
         def limit():

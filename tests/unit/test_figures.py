@@ -332,13 +332,14 @@ def test_the_stage_draws_what_it_is_told(tree, tmp_path):
     chosen = {"beam": ["100x20"], "material": ["steel"], "load": ["traction"]}
     small, curves = tree.to_dataset().sel(chosen), tree["sensitivity"].to_dataset().sel(chosen)
     xr.DataTree.from_dict({"/": small, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
-    stems = present.run(path, tmp_path, "size", "sensitivity")
-    assert stems == [
+    stems = [
         "size_structured_steel_traction",
         "size_free_steel_traction",
         "sensitivity_100x20_structured_steel_traction",
         "sensitivity_100x20_free_steel_traction",
     ]
+    made = present.run(path, tmp_path, "size", "sensitivity")
+    assert made == [tmp_path / f"figures/{stem}.{ending}" for stem in stems for ending in FORMATS]
     files = sorted(path.name for path in (tmp_path / "figures").iterdir())
     assert files == sorted(f"{stem}.{ending}" for stem in stems for ending in FORMATS)
 

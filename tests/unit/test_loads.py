@@ -1,11 +1,10 @@
 """Kinds of load: their properties, and new ones that are added from outside."""
 
-import json
-
 import pytest
 
 from springtune.campaign import plan
 from springtune.jobs import store
+from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
 from springtune.kinds.scenes import mesh as mesh_stage
 from springtune.kinds.scenes import reference as reference_stage
@@ -109,10 +108,10 @@ grids:
     kinematics: linear
 """)
     study = load_study(study)
-    plan.write_tasks(study, tmp_path, 1)
+    jobs = plan.plan(study, tmp_path, 1).jobs
     for name, stage in (("mesh_0", mesh_stage), ("reference_0", reference_stage), ("solve_0", solve_stage)):
-        stage.run(tmp_path / "tasks" / f"{name}.json", tmp_path / "done" / f"{name}.json")
-    tasks = json.loads((tmp_path / "tasks" / "solve_0.json").read_text())
+        stage.run(jobs[name].content, Spent())
+    tasks = jobs["solve_0"].content
     (family,) = tasks["families"]
     (scene,) = family["scenes"]
     assert scene["kind"] == "lift"

@@ -309,6 +309,7 @@ def test_the_same_dataset_gives_the_same_bytes_and_another_one_others(tmp_path, 
     content = output.read_bytes()
     # Another process, another folder.
     command = [sys.executable, "-m", "springtune.publication.build", source, tmp_path / "other", tmp_path / "again.pdf"]
+    command += [tmp_path / "again.json", "digest"]
     done = subprocess.run([*command, path], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "again.pdf").read_bytes() == content

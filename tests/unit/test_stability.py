@@ -7,7 +7,7 @@ import pytest
 
 from springtune.jobs import dependencies as code
 from springtune.jobs import store
-from springtune.jobs.atomic import write_json
+from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
 from springtune.kinds.stability import experiments as stability
 from springtune.kinds.stability.names import AXES, EXPERIMENTS, ONCE
@@ -99,8 +99,7 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
              "material": {"name": "", "young_modulus": 1e6, "poisson_ratio": 0.3, "density": 1e3},
              "definition": "lattice", "mesh_type": "braced", "mesh_sizes": [5e-3]}  # fmt: skip
     tasks = {"folder": str(tmp_path), "experiments": [{"key": "one", "name": "slivers"} | setup]}
-    write_json(tmp_path / "tasks.json", tasks)
-    run(tmp_path / "tasks.json", tmp_path / "done.json")
+    run(tasks, Spent())
     assert store.read(tmp_path / "one.h5", ["one"])["one"]["failure"]
 
 

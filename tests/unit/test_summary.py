@@ -1,7 +1,6 @@
 """What a run says at its end and on its way: the summary of a study, what its jobs have to do, and the display."""
 
 import io
-import json
 import logging
 import os
 import re
@@ -17,6 +16,7 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
 from springtune.campaign import plan, summary, workload
+from springtune.jobs import records
 from springtune.kinds import load_study
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output.dataset import Filler
@@ -127,18 +127,19 @@ grids:
 
 @pytest.fixture
 def planned(tmp_path):
-    """A study whose tasks are written, its folder, and the stems of its bundles' files."""
+    """A study, its plan, and the names of its jobs."""
     (tmp_path / "two.yaml").write_text(STUDY)
     study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
-    labels = plan.write_tasks(study, folder, 2)
-    return study, folder, [f"{stage}_{label}" for stage, found in labels.items() for label in found]
+    made = plan.plan(study, folder, 2)
+    return study, made, list(made.jobs)
 
 
 class TestWorkload:
     def test_jobs_have_tasks_seconds_and_products(self, planned):
-        study, folder, names = planned
-        jobs = [(number, "any", 1, [str(folder / "done" / f"{name}.json")]) for number, name in enumerate(names)]
-        found = workload.loads(study, folder, [*jobs, (98, "present_x", 1, ["a.png", "a.pdf"]), (99, "all", 1, [])])
+        study, made, names = planned
+        folder = made.folder
+        jobs = [(number, "any", 1, [str(made.record(name))]) for number, name in enumerate(names)]
+        found = workload.loads(study, made, [*jobs, (98, "present_x", 1, ["a.png", "a.pdf"]), (99, "all", 1, [])])
         assert 99 not in found and found[98].part == workload.AFTER and found[98].tasks == 2
         tasks = {load.part: load.tasks for load in found.values()}
         assert tasks["Solving the networks"] == 4 and tasks["Meshing"] == 2
@@ -154,28 +155,28 @@ class TestWorkload:
 
     def test_tasks_computed_are_counted_without_their_definitions(self, tmp_path):
         path = tmp_path / "done.json"
-        path.write_text(json.dumps({"work": {"linear": [3, 1.0, 0.1], "nonlinear": [2, 1.0, 0.1], "patch": [5, 1, 1]}}))
+        work = {"linear": [3, 1.0, 0.1], "nonlinear": [2, 1.0, 0.1], "patch": [5, 1, 1]}
+        records.write(path, "digest", [], work=work)
         assert workload.computed(path) == 5
-        path.write_text(json.dumps({"cases": 1}))
+        path.write_text("cut")
         assert workload.computed(path) is None
 
 
 class TestEnding:
     def finish(self, planned, new):
         """Mark all bundles done, those of the stages in `new` now, the others before."""
-        study, folder, names = planned
+        study, made, names = planned
         since = time.time() - 100
         for name in names:
-            done = folder / "done" / f"{name}.json"
-            done.parent.mkdir(exist_ok=True)
-            count = len(workload.keys_of(json.loads((folder / "tasks" / f"{name}.json").read_text())))
-            done.write_text(json.dumps({"work": {"linear": [count, 1.0, 1.0]}}))
+            count = len(workload.keys_of(made.jobs[name].content))
+            records.write(made.record(name), "digest", [], work={"linear": [count, 1.0, 1.0]})
             moment = since + (50 if name.startswith(new) else -50)
-            os.utime(done, (moment, moment))
-        return summary.ending(study, folder, names, since), folder, since
+            os.utime(made.record(name), (moment, moment))
+        return summary.ending(study, made, since), made.folder, since
 
     def test_says_what_is_new_and_where_it_is(self, planned):
-        study, folder, names = planned
+        study, made, names = planned
+        folder = made.folder
         (folder / "figures").mkdir(parents=True)
         (folder / "dataset.nc").touch()
         (folder / summary.FILE).write_text("Told before\n")
@@ -185,23 +186,26 @@ class TestEnding:
         assert "new      nothing: all results were stored before" in self.finish(planned, "none")[0]
 
     def test_a_summary_older_than_the_results_is_not_shown(self, planned):
-        study, folder, names = planned
+        study, made, names = planned
+        folder = made.folder
+        folder.mkdir(parents=True)
         (folder / summary.FILE).write_text("Told before\n")
         os.utime(folder / summary.FILE, (0, 0))
         text, *_ = self.finish(planned, "solve")
         assert "Told before" not in text and "The dataset is older than these results." in text
 
     def test_what_broke_is_named(self, planned):
-        study, folder, names = planned
+        study, made, names = planned
+        folder = made.folder
         _, _, since = self.finish(planned, "solve")
-        (folder / "done" / f"{names[-1]}.json").unlink()
+        made.record(names[-1]).unlink()
         (folder / "logs").mkdir()
         (folder / "logs" / f"{names[-1]}.log").write_text("why")
-        text = summary.broken(study, folder, names, since)
+        text = summary.broken(study, made, since)
         assert "two is not complete" in text and f"logs/{names[-1]}.log" in text and text.count(".log") == 1
         (folder / "logs/collect.log").write_text("why, too")
-        assert "logs/collect.log" in summary.broken(study, folder, names, since)
-        besides = summary.beside(study, folder, names, since)
+        assert "logs/collect.log" in summary.broken(study, made, since)
+        besides = summary.beside(study, made, since)
         assert "new in two: " in besides and f"not complete: {names[-1]}" in besides and besides.count(".log") == 2
 
     def test_a_run_with_nothing_to_do_reminds_of_holes(self, tmp_path):

@@ -7,6 +7,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from springtune.cli import main
+from springtune.jobs import sealed
 from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.study import StudyError
@@ -210,14 +211,13 @@ def test_what_differs_by_a_scale_alone_has_one_reference(run):
 def test_more_cores_make_more_bundles_and_solve_nothing_again(run):
     run.write("spread.yaml", study("10 mm, 5 mm, 4 mm, 2 mm, 1 mm"))
     # Bundles follow costs: as if scenes were worth two jobs, and not worth three, whatever this machine measures.
-    costs = '{"kinds": {"nonlinear": [1.0, 30.0]}, "start_up": 0.25}'
-    (run.folder / "results").mkdir(exist_ok=True)
+    costs = {"kinds": {"nonlinear": [1.0, 30.0]}, "start_up": 0.25}
 
     def solved_on(cores):
-        run.write("results/costs.json", costs)
+        sealed.write(run.folder / "results/costs.json", costs)
         code, output = run.snakemake("spread.yaml", "--cores", cores, "--until", "solve")
         assert code == 0, output
-        assert (run.folder / "results/costs.json").read_text() == costs  # `collect` alone writes what jobs measured
+        assert sealed.read(run.folder / "results/costs.json") == costs  # `collect` alone writes what jobs measured
 
     solved_on("1")
     one, solved = run.times("results/spread/tasks/solve_*.json"), run.times("results/spread/solutions/*.h5")

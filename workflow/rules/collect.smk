@@ -1,25 +1,26 @@
+"""The dataset: everything that the stages stored, compared with its references."""
+
+
 rule collect:
     message:
         "Comparing, and collecting the dataset"
     input:
-        config=CONFIG,
         done=DONE,
-        printed=STUDY.printed_path or [],
-        code=modules(
-            "campaign.collect",
-            *(f"kinds.{name}.{part}" for name in KINDS for part in ("kind", "collect")),
-            *(made.collect for made in outputs().values() if made.collect and made.name in STUDY.outputs),
-        ),
+        again=looked_at(JOBS, due.COLLECT),
     output:
-        dataset=RESULTS / "dataset.nc",
+        dataset=RESULTS / due.DATASET,
         summary=report(
-            RESULTS / "summary.txt", caption="../report/summary.rst", category="summary", labels={"name": "summary"}
+            RESULTS / due.SUMMARY, caption="../report/summary.rst", category="summary", labels={"name": "summary"}
         ),
+        done=JOBS["collect"].record,
     params:
-        folder=lambda wildcards, output: str(Path(output.dataset).parent),
+        config=str(CONFIG),
+        folder=str(RESULTS),
+        digest=JOBS["collect"].digest,
     log:
         RESULTS / "logs/collect.log",
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.campaign.collect {input.config} {params.folder} {output.dataset} > {log} 2>&1"
+        "python -m springtune.campaign.collect {params.config} {params.folder} {output.dataset} {output.done} {params.digest}"
+        " > {log} 2>&1"

@@ -9,10 +9,10 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 from snakemake.settings.enums import Quietness
 
-from springtune.campaign import plan
-from springtune.jobs import atomic
-from springtune.jobs.dependencies import PACKAGE, modules
-from springtune.kinds import KINDS, kinds, load_study, outputs
+from springtune.campaign import due, locks
+from springtune.campaign.plan import plan, stages
+from springtune.jobs.atomic import remove_unfinished
+from springtune.kinds import load_study
 from springtune.kinds.base import FORMATS
 from springtune.study import StudyError
 
@@ -54,31 +54,33 @@ CONFIG = chosen_config()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
-BUNDLES = plan.write_tasks(STUDY, RESULTS, workflow.cores or 1)
+PLAN = plan(STUDY, RESULTS, workflow.cores or 1)
+JOBS = due.jobs(STUDY, PLAN)
 READ = workflow.__dict__.setdefault("studies_read", [])  # the one that is run; for the paper, those that it reads besides
-READ.append((STUDY, RESULTS, [f"{stage}_{label}" for stage, labels in BUNDLES.items() for label in labels]))
+READ.append((STUDY, PLAN))
 SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
 CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
 
+HANDLERS = workflow.logger_manager.get_log_handlers()
 if "study" not in config:
-    for handler in workflow.logger_manager.get_log_handlers():
+    for handler in HANDLERS:
         handler.results = RESULTS  # whose summary to show where nothing is to be done
 
 
 def done(stage):
     """What all jobs of a stage make when they are done."""
-    return [RESULTS / "done" / f"{stage}_{label}.json" for label in BUNDLES[stage]]
+    return [PLAN.record(job.name) for job in PLAN.jobs.values() if job.stage.name == stage]
 
 
 def files(one):
     """Figures and tables of an output."""
-    figures = [
-        shown(one, path, selection) if ending == SHOWN else path
-        for stem, selection in one.figures(STUDY).items()
-        for ending in FORMATS
-        for path in [RESULTS / "figures" / f"{stem}.{ending}"]
+    of_figures = one.figures(STUDY)
+    paths = [RESULTS / file for file in due.output_files(one, STUDY)]
+    chosen = [of_figures.get(path.stem, {}) if path.parent.name == "figures" else {} for path in paths]
+    return [
+        path if path.parent.name == "figures" and path.suffix != f".{SHOWN}" else shown(one, path, selection)
+        for path, selection in zip(paths, chosen)
     ]
-    return figures + [shown(one, RESULTS / "tables" / name, {}) for name in plan.table_files(one, STUDY)]
 
 
 def shown(one, path, selection):
@@ -94,34 +96,66 @@ def caption(name):
     return f"../report/{name if name in CAPTIONS else 'output'}.rst"
 
 
-def code(one):
-    """Modules that an output is made by."""
-    made = ["campaign.present", *(f"kinds.{name}.outputs" for name in KINDS), *filter(None, (one.module, one.write))]
-    if one.page:
-        made += ["campaign.page", *(f"kinds.{name}.kind" for name in KINDS)]
-        made += [f"kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
-    found = modules(*made)
-    return [*found, PACKAGE / "output/page.html"] if one.page else list(found)
+def looked_at(found, name):
+    """Input of a job that is none: a function, which Snakemake calls when it needs the job.
+
+    A job that has not done what is asked for, or whose files are not as it made them, is forced to run. Snakemake
+    judges by times and by notes of its own in a folder that may be gone; records know better.
+    """
+
+    def look(wildcards):
+        job = found[name.format(**dict(wildcards))]
+        if workflow.is_main_process and str(job.record) not in workflow.dag.forcefiles:
+            why = due.fault(job, found)
+            if why:
+                workflow.dag.forcefiles.add(str(job.record))
+            if due.is_damage(why):
+                logger.warning(f"{why}; it is made again")
+        return []
+
+    return look
+
+
+def begin():
+    """What happens when jobs are about to run, and not when the Snakefile is read."""
+    locks.begin([one.folder for _, one in READ])
+    for _, one in READ:
+        one.write()
+        remove_unfinished(one.folder)
+        remove_unfinished(one.folder.parent, below=False)  # of what studies share
+    tell_start()
+
+
+def release():
+    """Remove the lock of a run that was killed; who only looks leaves it where it is."""
+    looking = any(handler.common_settings.dryrun for handler in HANDLERS if hasattr(handler, "common_settings"))
+    if looking or not workflow.is_main_process:
+        return
+    try:
+        removed = locks.release(RESULTS)
+    except locks.LockedError as error:
+        print(error, file=sys.stderr)
+        sys.exit(1)
+    if removed:
+        logger.warning(removed)
 
 
 def tell_start():
     """Say how much there is to do; the progress display reads what each job is expected to take."""
     from springtune.campaign import workload  # here: only a run needs it
 
-    for _, results, _ in READ:
-        atomic.sweep(results)
     dag = workflow.dag
     jobs = [(dag.jobid(job), job.rule.name, job.threads, list(map(str, job.output))) for job in dag.needrun_jobs()]
     found, names = {}, []
-    for study, results, _ in READ:
+    for study, one in READ:
         prefix = "" if study is STUDY else f"{study.name}_"
         own = [
             (number, rule.removeprefix(prefix), threads, outputs)
             for number, rule, threads, outputs in jobs
-            if outputs and Path(outputs[0]).is_relative_to(results)
+            if outputs and Path(outputs[0]).is_relative_to(one.folder)
         ]
         names += [study.name] if own or study is STUDY else []
-        found |= workload.loads(study, results, own)
+        found |= workload.loads(study, one, own)
     cores = workflow.cores or min(workflow.nodes or 1, len(jobs) or 1)  # on a cluster, jobs side by side
     text = f"{', '.join(names)}: {workload.told(found, cores)}"
     logger.info(text, extra={"quietness": Quietness.PROGRESS, "loads": found, "cores": cores})
@@ -131,6 +165,7 @@ def tell_end(how):
     """Say what became of the study, see `springtune.campaign.summary`; `--quiet all` alone keeps it back."""
     from springtune.campaign import summary  # here: only a run needs it
 
+    locks.end()
     since = workflow.start_time.timestamp()
     text = getattr(summary, how)(*READ[0], since)
     text += "".join(summary.beside(*one, since) for one in READ[1:])

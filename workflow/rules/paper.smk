@@ -3,7 +3,6 @@
 from springtune.publication import PaperError
 from springtune.publication.build import check_typst
 
-PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark")
 PAPER_SOURCE = Path(workflow.basedir, "workflow/paper")
 
 
@@ -13,14 +12,15 @@ WORDS = sys.argv[1:]
 PAPER_WANTED = any(word == "paper" or Path(word).name == "paper.pdf" for word in WORDS)
 
 if PAPER_WANTED:
+    PAPER = due.paper_job(PAPER_SOURCE, Path("results"), Path("results/paper"))
     try:  # now, and not when the studies are done
         check_typst()
     except PaperError as error:
         print(error, file=sys.stderr)
         sys.exit(1)
 
-if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in PAPER_STUDIES)) for word in WORDS):
-    for name in PAPER_STUDIES:
+if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in due.PAPER_STUDIES)) for word in WORDS):
+    for name in due.PAPER_STUDIES:
         if name != STUDY.name:
             prefix = f"{name}_"
             beside = CONFIG.with_name(f"{name}.yaml")
@@ -37,20 +37,21 @@ rule paper:
     message:
         "Setting the paper from the datasets of its studies"
     input:
-        datasets=[Path("results") / name / "dataset.nc" for name in PAPER_STUDIES],
-        source=[path for path in sorted(PAPER_SOURCE.iterdir()) if path.is_file()],
-        # A function, so that only who wants the paper looks for them.
-        code=lambda wildcards: modules(
-            "publication.build", *(one.module for one in outputs().values() if one.module)
-        ),
+        datasets=[Path("results") / name / "dataset.nc" for name in due.PAPER_STUDIES],
+        again=looked_at({due.PAPER: PAPER}, due.PAPER) if PAPER_WANTED else [],
     output:
-        report("results/paper/paper.pdf", caption="../report/paper.rst", category="paper", labels={"name": "paper"}),
+        paper=report(
+            "results/paper/paper.pdf", caption="../report/paper.rst", category="paper", labels={"name": "paper"}
+        ),
+        done="results/paper/done/paper.json",
     params:
-        source=lambda wildcards, input: str(Path(input.source[0]).parent),
-        folder=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+        source=str(PAPER_SOURCE),
+        folder="results/paper/paper",
+        digest=PAPER.digest if PAPER_WANTED else "none",
     log:
         "results/paper/logs/paper.log",
     benchmark:
         "results/paper/benchmarks/paper.tsv"
     shell:
-        "python -m springtune.publication.build {params.source} {params.folder} {output} {input.datasets} > {log} 2>&1"
+        "python -m springtune.publication.build {params.source} {params.folder} {output.paper} {output.done} {params.digest}"
+        " {input.datasets} > {log} 2>&1"

@@ -2,7 +2,7 @@
 
 import re
 
-for stage in plan.stages():
+for stage in stages():
 
     rule:
         name:
@@ -10,23 +10,24 @@ for stage in plan.stages():
         message:
             f"{stage.message}, bundle {{wildcards.bundle}}"
         input:
-            tasks=RESULTS / "tasks" / f"{stage.name}_{{bundle}}.json",
             same=[RESULTS / "done" / f"{other}_{{bundle}}.json" for other in stage.same],
             every=[path for other in stage.every for path in done(other)],
-            code=modules(stage.module, definitions=stage.definitions, mesh_types=stage.mesh_types),
+            again=looked_at(JOBS, f"{stage.name}_{{bundle}}"),
         output:
             RESULTS / "done" / f"{stage.name}_{{bundle}}.json",
         wildcard_constraints:
-            bundle="|".join(map(re.escape, BUNDLES[stage.name])) or "none",
+            bundle="|".join(map(re.escape, PLAN.labels(stage.name))) or "none",
         params:
-            module=f"springtune.{stage.module}",
+            # The note is written when a run begins, so that a plan is made without.
+            tasks=str(RESULTS / "tasks" / f"{stage.name}_{{bundle}}.json"),
+            digest=lambda wildcards, output: JOBS[Path(output[0]).stem].digest,
         threads: workflow.cores if stage.alone else 1
         log:
             RESULTS / "logs" / f"{stage.name}_{{bundle}}.log",
         benchmark:
             RESULTS / "benchmarks" / f"{stage.name}_{{bundle}}.tsv"
         shell:
-            "python -m {params.module} {input.tasks} {output} > {log} 2>&1"
+            "python -m springtune.jobs.run_tasks {params.tasks} {output} {params.digest} > {log} 2>&1"
 
 
-DONE = [path for stage in plan.stages() for path in done(stage.name)]
+DONE = [path for stage in stages() for path in done(stage.name)]

@@ -1,25 +1,31 @@
 """The page to browse a study's results with."""
 
 import sys
-from pathlib import Path
 
 from ..browse.page import page
+from ..jobs import records
 from ..jobs.atomic import write_text
 
 
-def run(dataset: str | Path, output: str | Path, *files: str) -> None:
-    """Write the page of a dataset.
+def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
+    """Write the page of a dataset, and the record of it.
 
     Parameters
     ----------
-    dataset : str or Path
-    output : str or Path
+    dataset : str
+    output : str
         HTML file to write.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
     *files : str
         What else is made of the dataset, from its folder on.
     """
+    read = records.checksum(dataset)
     write_text(output, page(dataset, files))
+    records.write(record, digest, [output], read=read)
 
 
 if __name__ == "__main__":
-    run(*sys.argv[1:])
+    main(*sys.argv[1:])

@@ -3,17 +3,22 @@
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from ..jobs import atomic, bundles
+from ..jobs import atomic, bundles, records
+from ..jobs.run_tasks import RECORDS, mended
 from ..kinds import kinds, load_study, outputs
 from ..output import dataset
 from . import provenance, summary
 from .plan import COSTS_FILE, usual_costs
 
+if TYPE_CHECKING:
+    from ..study.model import Study
 
-def run(config: str | Path, folder: str | Path, output: str | Path) -> None:
+
+def run(config: str | Path, folder: str | Path, output: str | Path) -> list[Path]:
     """Build the dataset of a study from its stored results.
 
     Parameters
@@ -23,9 +28,42 @@ def run(config: str | Path, folder: str | Path, output: str | Path) -> None:
     folder : str or Path
         Where the study's results are.
     output : str or Path
-        NetCDF file to write.
+        NetCDF file to write; the summary goes beside it.
+
+    Returns
+    -------
+    list of Path
+        Both.
     """
     study, folder = load_study(config), Path(folder)
+    groups = mended(lambda: _groups(study, folder), folder)
+    try:
+        dataset.write(output, groups, provenance.attributes(study, config))
+    except OSError as error:  # the message says it all
+        raise SystemExit(str(error)) from None
+    told = Path(output).with_name(summary.FILE)
+    atomic.write_text(told, summary.text(groups, study.title))
+    bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
+    return [Path(output), told]
+
+
+def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
+    """Build a dataset and write the record of it.
+
+    Parameters
+    ----------
+    config, folder, output
+        As of `run`.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
+    """
+    records.write(record, digest, run(config, folder, output))
+
+
+def _groups(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+    """Groups of the dataset of a study."""
     groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:
@@ -33,13 +71,8 @@ def run(config: str | Path, folder: str | Path, output: str | Path) -> None:
     for made in outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= import_module(f"springtune.{made.collect}").groups(study, folder)
-    try:
-        dataset.write(output, groups, provenance.attributes(study, config))
-    except OSError as error:  # the message says it all
-        raise SystemExit(str(error)) from None
-    atomic.write_text(Path(output).with_name(summary.FILE), summary.text(groups, study.title))
-    bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob("done/*_*.json")), usual_costs())
+    return groups
 
 
 if __name__ == "__main__":
-    run(*sys.argv[1:])
+    main(*sys.argv[1:])

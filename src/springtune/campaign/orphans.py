@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..jobs.atomic import UNFINISHED
-from ..kinds import outputs
+from ..jobs.damage import ASIDE
 from ..kinds.base import FORMATS
-from . import plan
+from . import due, plan
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -36,36 +36,19 @@ def orphans(study: "Study", folder: Path) -> list[Path]:
     list of Path
         Sorted; none of them outside of the folder. Whatever else lies there is not looked at.
     """
-    contents = plan.task_contents(study, folder)
-    kept = {folder / name for name in _outputs(study)} | {folder / plan.BUNDLES_FILE}
-    jobs: set[str] = set()
-    for stage in plan.stages():
-        for label, content in contents[stage.name].items():
-            jobs.add(f"{stage.name}_{label}")
-            kept |= {Path(path) for path in stage.products(content)}
+    planned = plan.plan(study, folder, 1)
+    jobs = due.jobs(study, planned)
+    kept = {folder / plan.BUNDLES_FILE} | {Path(path) for job in jobs.values() for path in job.products}
     found = {path for path in _candidates(folder) if path not in kept}
-    found -= {folder / name / f"{job}{ending}" for name, ending in JOB_FILES.items() for job in jobs | _present(study)}
+    found -= {folder / name / f"{job}{ending}" for name, ending in JOB_FILES.items() for job in jobs}
     return sorted(found)
-
-
-def _outputs(study: "Study") -> Iterator[str]:
-    """Figures and tables of a study, from its folder on."""
-    for output in outputs().values():
-        if output.name in study.outputs:
-            yield from (f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS)
-            yield from (f"tables/{name}" for name in plan.table_files(output, study))
-
-
-def _present(study: "Study") -> set[str]:
-    """Names of the jobs of a study's outputs."""
-    return {f"present_{output.made_by}" for output in outputs().values() if output.name in study.outputs}
 
 
 def _candidates(folder: Path) -> Iterator[Path]:
     """Files of the kinds that runs make, in a study's folder and those directly in it that are no links elsewhere."""
-    names = {stage.name for stage in plan.stages()} | {"present"}
+    names = {stage.name for stage in plan.stages()} | {due.PRESENT}
     for path in _files(folder):
-        if UNFINISHED in path.name:
+        if _is_left(path):
             yield path
     for below in sorted(folder.iterdir()):
         if below.is_symlink() or not below.is_dir():
@@ -76,8 +59,13 @@ def _candidates(folder: Path) -> Iterator[Path]:
             made |= below.name in JOB_FILES and bool(mark) and stage in names
             made |= below.name in STORES and path.suffix == STORED
             made |= below.name == "meshes" and path.suffix in (".vtu", ".json")
-            if made or UNFINISHED in path.name:
+            if made or _is_left(path):
                 yield path
+
+
+def _is_left(path: Path) -> bool:
+    """Whether a file was being written, or was set aside."""
+    return UNFINISHED in path.name or path.name.endswith(ASIDE)
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -1,15 +1,17 @@
-"""From a study to the tasks of its stages: what each Snakemake job is to do, written to files that it can watch.
+"""From a study to the tasks of its stages: what each Snakemake job is to do.
 
-Scenes are put together in bundles of meshes of about equal cost, since one process a scene would be all start-up. The
-file of a bundle changes only when its tasks do, so Snakemake reruns a job only when it has something to look at; a job
-then computes only results that are not stored yet.
+Scenes are put together in bundles of meshes of about equal cost, since one process a scene would be all start-up. A
+plan is made whenever the Snakefile is read, and written when a run begins: reading changes nothing.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..jobs import atomic, bundles
+from ..jobs import bundles, sealed
+from ..jobs.keys import hash_of
+from ..jobs.run_tasks import RECORDS, TASKS
 from ..kinds import kinds
 
 if TYPE_CHECKING:
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 COSTS_FILE = "costs.json"
 """File beside the studies' folders: what tasks cost on this machine."""
 
-BUNDLES_FILE = "tasks/bundles.json"
+BUNDLES_FILE = f"{TASKS}/bundles.json"
 """File in a study's folder: what each bundle holds."""
 
 
@@ -55,64 +57,96 @@ def usual_costs() -> dict[str, tuple[float, float]]:
     return {name: cost for kind in kinds() for name, cost in kind.costs.items()}
 
 
-def write_tasks(study: "Study", folder: Path, cores: int) -> dict[str, list[str]]:
-    """Write the task files of a study under ``folder/tasks``, those whose content changed.
+@dataclass(frozen=True)
+class Tasks:
+    """What a job of a stage is to do.
+
+    Attributes
+    ----------
+    stage : Stage
+    label : str
+        Of the bundle.
+    content : dict
+        Tasks, as the stage's module takes them.
+    digest : str
+        Of all that the job depends on.
+    products : tuple of str
+        Files that it makes.
+    """
+
+    stage: "Stage"
+    label: str
+    content: dict[str, Any]
+    digest: str
+    products: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Stem of its files."""
+        return f"{self.stage.name}_{self.label}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the jobs of a study's stages are to do.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the study's results go.
+    bundles : dict
+        What each bundle holds, by stage and label, and the cores that they are made for.
+    jobs : dict of str to Tasks
+        By name, in the order of stages.
+    """
+
+    folder: Path
+    bundles: dict[str, Any]
+    jobs: dict[str, Tasks]
+
+    def labels(self, stage: str) -> list[str]:
+        """Labels of the bundles of a stage."""
+        return [job.label for job in self.jobs.values() if job.stage.name == stage]
+
+    def tasks(self, name: str) -> Path:
+        """File of what a job is to do."""
+        return self.folder / TASKS / f"{name}.json"
+
+    def record(self, name: str) -> Path:
+        """File of what a job has done."""
+        return self.folder / RECORDS / f"{name}.json"
+
+    def write(self) -> None:
+        """Write what jobs and later plans read; a file that says so already stays."""
+        notes = {self.folder / BUNDLES_FILE: self.bundles}
+        for name, job in self.jobs.items():
+            notes[self.tasks(name)] = {
+                "digest": job.digest,
+                "module": job.stage.module,
+                "products": list(job.products),
+                "content": job.content,
+            }
+        for path, content in notes.items():
+            if sealed.read(path) != content:
+                sealed.write(path, content)
+
+
+def plan(study: "Study", folder: Path, cores: int) -> Plan:
+    """Plan the jobs of a study's stages; nothing is written.
 
     Parameters
     ----------
     study : Study
     folder : Path
-        Where the study's results go.
+        Where its results go.
     cores : int
         Bundles are made at least for so many cores.
 
     Returns
     -------
-    dict of str to list of str
-        Labels of the bundles by stage.
+    Plan
     """
-    known, found, wanted = _planned(study, folder, cores)
-    if found != known:
-        atomic.write_json(folder / BUNDLES_FILE, found)
-    for stage in stages():
-        for label, content in wanted[stage.name].items():
-            _write(folder, f"{stage.name}_{label}", content, stage.products(content))
-    return {name: list(contents) for name, contents in wanted.items()}
-
-
-def task_contents(study: "Study", folder: Path) -> dict[str, dict[str, dict[str, Any]]]:
-    """Contents of the task files of a study as its next run has them; nothing is written.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where the study's results are.
-
-    Returns
-    -------
-    dict of str to dict
-        By stage and label of the bundle.
-    """
-    return _planned(study, folder, 1)[2]
-
-
-def _write(folder: Path, name: str, content: dict[str, Any], products: Iterable[Path]) -> None:
-    path = folder / "tasks" / f"{name}.json"
-    if not path.exists() or atomic.read_json(path) != content:
-        atomic.write_json(path, content)
-    done = folder / "done" / f"{name}.json"
-    # Snakemake guards what is declared; results are not, so a missing one makes the job run again.
-    if done.exists() and not all(file.exists() for file in products):
-        done.unlink()
-
-
-def _planned(
-    study: "Study", folder: Path, cores: int
-) -> tuple[dict[str, Any], dict[str, Any], dict[str, dict[str, dict[str, Any]]]]:
-    """Bundles as they are noted and as they shall be, and contents of the tasks by stage and label."""
-    notes = folder / BUNDLES_FILE
-    known: dict[str, Any] = atomic.read_json(notes) if notes.exists() else {"cores": 0}
+    known: dict[str, Any] = sealed.read(folder / BUNDLES_FILE) or {"cores": 0}
     # More cores want more bundles; what is solved stays solved, whichever bundle it is in.
     before: dict[str, Any] = known if known["cores"] >= cores else {"cores": cores}
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
@@ -129,8 +163,15 @@ def _planned(
             kept = before.get(stage.name, {})
             found[stage.name] = bundles.share_out(seconds, cores, costs.start_up, kept) if members else {}
         shared[stage.name] = {label: [members[name][1] for name in names] for label, names in found[stage.name].items()}
-    wanted: dict[str, dict[str, dict[str, Any]]] = {}
-    for stage in stages():
-        each = {label: stage.content(study, folder, one) for label, one in shared[stage.like or stage.name].items()}
-        wanted[stage.name] = {label: content for label, content in each.items() if content}
-    return known, found | {"cores": before["cores"]}, wanted
+    jobs = {
+        job.name: job for stage in stages() for job in _jobs(stage, study, folder, shared[stage.like or stage.name])
+    }
+    return Plan(folder, found | {"cores": before["cores"]}, jobs)
+
+
+def _jobs(stage: "Stage", study: "Study", folder: Path, shared: dict[str, list[Any]]) -> Iterator[Tasks]:
+    for label, one in shared.items():
+        content = stage.content(study, folder, one)
+        if content:
+            digest = hash_of(stage.module, content)
+            yield Tasks(stage, label, content, digest, tuple(map(str, stage.products(content))))

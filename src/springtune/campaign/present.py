@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from ..jobs import atomic
+from ..jobs import atomic, records
 from ..kinds import outputs
 
 if TYPE_CHECKING:
     from ..kinds.base import Output
 
 
-def run(dataset: str | Path, folder: str | Path, *names: str) -> list[str]:
+def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     """Draw the figures of outputs into ``folder/figures`` and write their tables into ``folder/tables``.
 
     Parameters
@@ -28,25 +28,42 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[str]:
 
     Returns
     -------
-    list of str
-        Stems of the figures and names of the tables written.
+    list of Path
+        Files written.
     """
     with xr.open_datatree(dataset, engine="netcdf4") as tree:
         tree.load()
-    made: list[str] = []
+    made: list[Path] = []
+    figures, tables = Path(folder) / "figures", Path(folder) / "tables"
     for output in (outputs()[name] for name in names):
         if output.plot:
-            made += _draw(output, tree, Path(folder) / "figures")
+            made += _draw(output, tree, figures)
         if output.page:
             from . import page  # here: few jobs write the page
 
-            made += page.write(tree, Path(folder) / "tables")
+            made += [tables / name for name in page.write(tree, tables)]
         elif output.write:
-            made += import_module(f"springtune.{output.write}").write(tree, Path(folder) / "tables")
+            made += [tables / name for name in import_module(f"springtune.{output.write}").write(tree, tables)]
     return made
 
 
-def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[str]:
+def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
+    """Make outputs and write the record of it.
+
+    Parameters
+    ----------
+    dataset, folder, *names
+        As of `run`.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
+    """
+    read = records.checksum(dataset)
+    records.write(record, digest, run(dataset, folder, *names), read=read)
+
+
+def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     # Here, since what only writes tables does without.
     import matplotlib.pyplot as plt
     import numpy as np
@@ -58,8 +75,8 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[str]:
         figure = np.ravel(plot(tree, **selection))[0].figure
         for ending, content in png_and_pdf(figure).items():
             atomic.write_bytes(folder / f"{stem}.{ending}", content)
+            yield folder / f"{stem}.{ending}"
         plt.close(figure)
-        yield stem
 
 
 if __name__ == "__main__":
@@ -68,4 +85,4 @@ if __name__ == "__main__":
     os.environ["MPLBACKEND"] = "Agg"
     # What figures leave behind is less than looking for it costs.
     gc.disable()
-    run(*sys.argv[1:])
+    main(*sys.argv[1:])

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..jobs import atomic
 from ..output.text import aligned, without_numbers
 from ..problem.status import Status
+from .plan import Plan
 from .workload import clock, computed, keys_of
 
 if TYPE_CHECKING:
@@ -172,16 +172,14 @@ def _unreferenced(root: "xr.Dataset") -> Iterator[str]:
         yield from ("", f"scenes {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
 
 
-def ending(study: "Study", folder: Path, names: Sequence[str], since: float) -> str:
+def ending(study: "Study", plan: Plan, since: float) -> str:
     """What to say at the end of a run that finished.
 
     Parameters
     ----------
     study : Study
-    folder : Path
-        Where its results are.
-    names : sequence of str
-        Stems of the files of its bundles.
+    plan : Plan
+        Of its stages.
     since : float
         When the run began, seconds since the epoch.
 
@@ -190,35 +188,35 @@ def ending(study: "Study", folder: Path, names: Sequence[str], since: float) -> 
     str
         The stored text, what was computed by this run, what it took and where the results are.
     """
-    new, took = _computed(folder, names, since), clock(time.time() - since)
-    rows = [["new", new], ["took", took], ["results", _places(folder)]]
-    return f"\n{_stored(study, folder, names)}\n{aligned(rows, 0)}\n"
+    new, took = _computed(plan, since), clock(time.time() - since)
+    rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
+    return f"\n{_stored(study, plan)}\n{aligned(rows, 0)}\n"
 
 
-def broken(study: "Study", folder: Path, names: Sequence[str], since: float) -> str:
+def broken(study: "Study", plan: Plan, since: float) -> str:
     """What to say at the end of a run of which a job failed.
 
     Parameters
     ----------
-    study, folder, names, since
+    study, plan, since
         As of `ending`.
 
     Returns
     -------
     str
     """
-    _, logs = _undone(folder, names, since)
+    _, logs = _undone(plan, since)
     lines = [f"{study.name} is not complete: a job failed or was stopped.", *(f"  its log: {path}" for path in logs)]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
 
 
-def beside(study: "Study", folder: Path, names: Sequence[str], since: float) -> str:
+def beside(study: "Study", plan: Plan, since: float) -> str:
     """What to say of a study that was run besides, for the paper.
 
     Parameters
     ----------
-    study, folder, names, since
+    study, plan, since
         As of `ending`.
 
     Returns
@@ -226,15 +224,16 @@ def beside(study: "Study", folder: Path, names: Sequence[str], since: float) -> 
     str
         A line on what was computed, and of what is not made the logs.
     """
-    undone, logs = _undone(folder, names, since)
-    lines = [f"new in {study.name}: {_computed(folder, names, since)}"]
+    undone, logs = _undone(plan, since)
+    lines = [f"new in {study.name}: {_computed(plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
     return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
 
 
-def _undone(folder: Path, names: Sequence[str], since: float) -> tuple[list[str], list[Path]]:
+def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
     """Bundles that are not done, and logs of jobs that this run began and that made nothing."""
-    undone = [name for name in names if not (folder / "done" / f"{name}.json").exists()]
+    folder = plan.folder
+    undone = [name for name in plan.jobs if not plan.record(name).exists()]
     missing = set(undone)
     if not (folder / "dataset.nc").exists():
         missing.add("collect")
@@ -271,26 +270,26 @@ def _time(path: Path) -> float:
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 
-def _stored(study: "Study", folder: Path, names: Sequence[str]) -> str:
+def _stored(study: "Study", plan: Plan) -> str:
     """The text beside the dataset, if it is of what the stages made."""
-    path = folder / FILE
+    path = plan.folder / FILE
     if not path.exists():
         return f"{study.title}\n\nThere is no dataset yet.\n"
-    if any(_time(folder / "done" / f"{name}.json") > _time(path) for name in names):
+    if any(_time(plan.record(name)) > _time(path) for name in plan.jobs):
         return f"{study.title}\n\nThe dataset is older than these results.\n"
     return path.read_text()
 
 
-def _computed(folder: Path, names: Sequence[str], since: float) -> str:
+def _computed(plan: Plan, since: float) -> str:
     """What a run computed, stage by stage, and what was there before."""
     new: dict[str, int] = {}
     asked: dict[str, int] = {}
-    for name in names:
-        done, stage = folder / "done" / f"{name}.json", name.rpartition("_")[0]
-        number = computed(done) if done.exists() else None
+    for name, job in plan.jobs.items():
+        record, stage = plan.record(name), job.stage.name
+        number = computed(record)
         if number is not None:
-            asked[stage] = asked.get(stage, 0) + len(keys_of(atomic.read_json(folder / "tasks" / f"{name}.json")))
-            new[stage] = new.get(stage, 0) + (number if _time(done) >= since else 0)
+            asked[stage] = asked.get(stage, 0) + len(keys_of(job.content))
+            new[stage] = new.get(stage, 0) + (number if _time(record) >= since else 0)
     told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if not told:
         return "nothing: all results were stored before"

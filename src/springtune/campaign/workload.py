@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..jobs import atomic, bundles
+from ..jobs import bundles, sealed
 from ..springs import DEFINITIONS
-from .plan import BUNDLES_FILE, COSTS_FILE, stages, usual_costs
+from .plan import COSTS_FILE, Plan, stages, usual_costs
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -74,25 +74,25 @@ def computed(done: Path) -> int | None:
     Parameters
     ----------
     done : Path
-        What it wrote at its end, see `springtune.jobs.spent.Spent.summary`.
+        Its record, with a `springtune.jobs.spent.Spent.summary`.
 
     Returns
     -------
     int or None
     """
-    work = atomic.read_json(done).get("work")
+    work = (sealed.read(done) or {}).get("work")
     # What definitions cost is told beside the task that they are part of.
     return None if work is None else sum(row[0] for name, row in work.items() if name not in DEFINITIONS)
 
 
-def loads(study: "Study", folder: Path, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Load]:
+def loads(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Load]:
     """What each job of a run has to do.
 
     Parameters
     ----------
     study : Study
-    folder : Path
-        Where its results go.
+    plan : Plan
+        Of its stages.
     jobs : iterable of tuple
         Of each job its number, the name of its rule, its threads and its outputs.
 
@@ -101,39 +101,35 @@ def loads(study: "Study", folder: Path, jobs: Iterable[tuple[int, str, int, list
     dict of int to Load
         By number, in the order of stages; without jobs that only name targets.
     """
-    of_bundles = _of_bundles(study, folder)
+    folder = plan.folder
+    of_bundles = _of_bundles(study, plan)
     order = {stem: place for place, stem in enumerate(of_bundles)}
     found = []
     for number, rule, threads, outputs in jobs:
         if outputs:
-            stem = Path(outputs[0]).stem if Path(outputs[0]).parent == folder / "done" else ""
+            stem = Path(outputs[0]).stem if Path(outputs[0]) == plan.record(Path(outputs[0]).stem) else ""
             load = of_bundles.get(stem) or _presented(folder, rule, outputs)
             load.threads = threads
             found.append((order.get(stem, len(order)), number, load))
     return {number: load for _, number, load in sorted(found, key=lambda row: row[:2])}
 
 
-def _of_bundles(study: "Study", folder: Path) -> dict[str, Load]:
+def _of_bundles(study: "Study", plan: Plan) -> dict[str, Load]:
     """Loads of all bundles of a study, by the stem of their files."""
-    costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
-    notes = atomic.read_json(folder / BUNDLES_FILE)
+    costs = bundles.Costs(plan.folder.parent / COSTS_FILE, usual_costs())
     seconds = {
         (stage.name, label): sum(members[name][0] for name in names if name in members)
         for stage in stages()
         if stage.members is not None
         for members in [stage.members(study, costs)]
-        for label, names in notes.get(stage.name, {}).items()
+        for label, names in plan.bundles.get(stage.name, {}).items()
     }
     found: dict[str, Load] = {}
     parts: dict[tuple[str, str], list[Load]] = {}
-    for stage in stages():
-        for label in notes.get(stage.like or stage.name, {}):
-            path = folder / "tasks" / f"{stage.name}_{label}.json"
-            if path.exists():
-                content = atomic.read_json(path)
-                products = list(stage.products(content))
-                found[path.stem] = Load(stage.message, max(1, len(keys_of(content))), 0.0, 1, products)
-                parts.setdefault((stage.like or stage.name, label), []).append(found[path.stem])
+    for name, job in plan.jobs.items():
+        products = [Path(path) for path in job.products]
+        found[name] = Load(job.stage.message, max(1, len(keys_of(job.content))), 0.0, 1, products)
+        parts.setdefault((job.stage.like or job.stage.name, job.label), []).append(found[name])
     # Stages that share bundles share their seconds, too, as they share their tasks: what each takes is not told apart.
     for place, sharing in parts.items():
         tasks = sum(load.tasks for load in sharing)

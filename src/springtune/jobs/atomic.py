@@ -44,34 +44,27 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
         raise
 
 
-def sweep(folder: str | Path) -> list[Path]:
-    """Remove what processes that were killed left behind: files that they were writing.
+def remove_unfinished(folder: str | Path, below: bool = True) -> None:
+    """Remove what writers that were killed have left in a folder; what a process that lives is writing stays.
 
     Parameters
     ----------
     folder : str or Path
-        Folders below it are swept, too; links to others are not followed.
-
-    Returns
-    -------
-    list of Path
-        What was removed.
+    below : bool, optional
+        Whether to look into folders below it, too.
 
     Examples
     --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_text(Path(folder) / "note.txt.0.unfinished", "half of")
-    ...     [path.name for path in sweep(folder)]
-    ['note.txt.0.unfinished']
+    ...     remove_unfinished(folder)
+    ...     list(Path(folder).iterdir())
+    []
     """
-    removed = []
-    for below, _, names in os.walk(folder):
-        for name in names:
-            if name.endswith(UNFINISHED) and not _is_written(name):
-                removed.append(Path(below, name))
-                removed[-1].unlink(missing_ok=True)
-    return sorted(removed)
+    for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED}"):
+        if path.is_file() and not _is_written(path.name):
+            path.unlink(missing_ok=True)
 
 
 def _is_written(name: str) -> bool:

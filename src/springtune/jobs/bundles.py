@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from math import ceil
 from pathlib import Path
 
-from . import atomic
+from . import sealed
 
 Usual = Mapping[str, tuple[float, float]]
 """Seconds of a task by its name: in any case, and per unit."""
@@ -48,7 +48,7 @@ class Costs:
 
     def __init__(self, path: Path, usual: Usual) -> None:
         self.usual = usual
-        known = atomic.read_json(path) if path.exists() else {}
+        known = sealed.read(path) or {}  # as good as new where it is damaged
         self.ratios = {
             kind: seconds / expected for kind, (expected, seconds) in known.get("kinds", {}).items() if expected
         }
@@ -83,15 +83,16 @@ def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
     Parameters
     ----------
     path : Path
-        JSON file: sums of usual and of measured seconds by kind, and a job's imports.
+        Note: sums of usual and of measured seconds by kind, and a job's imports.
     done : iterable of Path
-        Files of jobs that hold a `Spent.summary`; those older than the file at `path` are in it already.
+        Records of jobs, with a `Spent.summary`; those older than the file at `path` are in it already.
     usual : dict of str to tuple
         As of `Costs`.
     """
-    known = atomic.read_json(path) if path.exists() else {"kinds": {}}
-    since = path.stat().st_mtime if path.exists() else 0.0
-    notes = [atomic.read_json(file) for file in done if file.stat().st_mtime > since]
+    known = sealed.read(path)
+    since = path.stat().st_mtime if known else 0.0
+    known = known or {"kinds": {}}
+    notes = [note for note in (sealed.read(file) for file in done if file.stat().st_mtime > since) if note]
     sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
     for note in notes:
         for kind, (count, units, seconds) in note.get("work", {}).items():
@@ -105,7 +106,7 @@ def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
     starts = sorted(note["start_up"] for note in notes if note.get("work"))
     if starts:
         known["start_up"] = starts[len(starts) // 2]
-        atomic.write_json(path, known)
+        sealed.write(path, known)
 
 
 def share_out(

@@ -3,10 +3,13 @@
 Scalars and texts of all results are one JSON text, since a group with attributes for each would cost more than solving
 it; arrays are datasets. A stage computes only the results that the file does not hold. What an earlier grid asked for
 stays, so going back to it computes nothing. Nothing but the dataset is meant for users.
+
+A file begins with a checksum of what follows, in a user block that HDF5 passes over. It is compared whenever a file is
+read, before HDF5 sees it.
 """
 
+import hashlib
 import json
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,12 +17,46 @@ from typing import Any
 import h5py
 import numpy as np
 
+from . import atomic
+from .damage import DamagedError, set_aside
+
 SCALARS = "scalars"
 """Dataset of what is not an array."""
 
+MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
+"""What a file begins with."""
+
+USER_BLOCK = 512
+"""Length of the block before HDF5's own [bytes]."""
+
+OLD = b"\x89HDF"
+"""What files began with before they had a checksum."""
+
+
+def _checked(path: str | Path) -> None:
+    """Compare a file with its checksum.
+
+    Raises
+    ------
+    DamagedError
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise DamagedError(path, error.strerror or "cannot be read") from None
+    if not content:
+        raise DamagedError(path, "it is empty")
+    if content[:USER_BLOCK] != _user_block(content[USER_BLOCK:]):
+        whole = content.startswith(MAGIC)
+        raise DamagedError(path, "its checksum is not that of its content" if whole else "it is no file of results")
+
+
+def _user_block(image: bytes) -> bytes:
+    return (MAGIC + hashlib.sha256(image).hexdigest().encode()).ljust(USER_BLOCK, b"\0")
+
 
 def stored(path: str | Path) -> set[str]:
-    """Keys of the results in a file; an unreadable file holds none.
+    """Keys of the results in a file; a damaged one is set aside and holds none.
 
     Parameters
     ----------
@@ -29,11 +66,18 @@ def stored(path: str | Path) -> set[str]:
     -------
     set of str
     """
-    try:
-        with h5py.File(path) as file:
-            return set(_scalars(file))
-    except (OSError, KeyError, ValueError):
+    if not Path(path).exists():
         return set()
+    try:
+        _checked(path)
+    except DamagedError as error:
+        with open(path, "rb") as file:
+            old = file.read(len(OLD)) == OLD
+        if not old:
+            set_aside(error)
+        return set()
+    with h5py.File(path) as file:
+        return set(_scalars(file))
 
 
 def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
@@ -56,9 +100,19 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
     -------
     dict of str to dict
         Results by key: scalars, texts and the arrays asked for.
+
+    Raises
+    ------
+    DamagedError
+        If the file is not there, is not what was written or lacks one of the results.
     """
+    _checked(path)
     with h5py.File(path) as file:
         scalars = _scalars(file)
+        names = list(names)
+        lacking = [name for name in names if name not in scalars]
+        if lacking:
+            raise DamagedError(path, f"it lacks {len(lacking)} of {len(names)} results", whole=True)
         results = {name: scalars[name] for name in names}
         for name, result in results.items() if fields else ():
             if name in file:
@@ -80,6 +134,11 @@ def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[s
     -------
     dict
         Scalars, texts and the arrays asked for.
+
+    Raises
+    ------
+    DamagedError
+        As `read`.
     """
     return read(Path(folder) / f"{key}.h5", [key], fields)[key]
 
@@ -125,19 +184,15 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     """
     if not results:
         return
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + ".unfinished")
     scalars: dict[str, dict[str, Any]] = {}
-    with h5py.File(unfinished, "w") as file:
-        try:
+    # In memory: what is on the disk is written at once, checksum and all.
+    with h5py.File("results", "w", driver="core", backing_store=False) as file:
+        if stored(path):
             with h5py.File(path) as before:
                 scalars = {name: kept for name, kept in _scalars(before).items() if name not in results}
                 for name in before:
                     if name in scalars:
                         before.copy(name, file)
-        except (OSError, KeyError, ValueError):
-            pass  # there is none yet, or it cannot be read
         for name, result in results.items():
             scalars[name] = {}
             for label, value in result.items():
@@ -146,4 +201,6 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
                 else:
                     scalars[name][label] = value.item() if isinstance(value, np.generic) else value
         file[SCALARS] = json.dumps(scalars)
-    os.replace(unfinished, path)
+        file.flush()
+        image = file.id.get_file_image()
+    atomic.write_bytes(path, _user_block(image) + image)

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..jobs import atomic
+from ..jobs import atomic, records
 from . import PaperError
 
 if TYPE_CHECKING:
@@ -58,6 +58,23 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
     }
     atomic.write_json(folder / "numbers.json", content)
     atomic.write_bytes(output, typeset(source, folder))
+
+
+def main(source: str, folder: str, output: str, record: str, digest: str, *paths: str) -> None:
+    """Build a paper and write the record of it.
+
+    Parameters
+    ----------
+    source, folder, output, *paths
+        As of `run`.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
+    """
+    checksums = [records.checksum(path) for path in paths]
+    run(source, folder, output, *paths)
+    records.write(record, digest, [output], read=checksums)
 
 
 def typeset(source: Path, folder: Path) -> bytes:
@@ -131,6 +148,6 @@ def _labels(datasets: Mapping[str, "Dataset"]) -> list[str]:
 if __name__ == "__main__":
     os.environ["MPLBACKEND"] = "Agg"
     try:
-        run(*sys.argv[1:])
+        main(*sys.argv[1:])
     except PaperError as problem:
         sys.exit(str(problem))

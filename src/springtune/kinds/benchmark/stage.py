@@ -1,8 +1,8 @@
 """Stage `benchmark`: run time against error."""
 
-import sys
+import time
 
-from ...jobs import atomic, store
+from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.materials import Material
 from . import measure as benchmark
@@ -11,23 +11,21 @@ CURVE_SIZE = 1e-3
 """Mesh size of the curves and of the explicit steps whose cost is measured, on the first scene's beam [m]."""
 
 
-def run(tasks, done):
+def run(tasks, spent):
     """Time the scenes that are not stored yet.
 
     Parameters
     ----------
-    tasks : str or Path
-        JSON file: ``folder`` and ``cases``, each with ``key``, ``curves`` and what
+    tasks : dict
+        ``folder`` and ``cases``, each with ``key``, ``curves`` and what
         `springtune.kinds.benchmark.measure.run` takes.
-    done : str or Path
-        JSON file to write: how many were timed.
+    spent : Spent
+        What tasks cost is added to it.
     """
-    tasks = atomic.read_json(tasks)
-    count = 0
     for path, task in store.missing(tasks["folder"], tasks["cases"]):
+        begin = time.perf_counter()
         store.add(path, {task["key"]: _case(task)})
-        count += 1
-    atomic.write_json(done, {"cases": count})
+        spent.add("benchmark", 0, time.perf_counter() - begin)
 
 
 def _case(task):
@@ -40,7 +38,3 @@ def _case(task):
         found |= benchmark.curves(scene, size) | benchmark.explicit(scene, size)
         found |= benchmark.solvers(scene, task["mesh_sizes"], task["most_thorough"])
     return found | {"message": found["message"].tolist()}
-
-
-if __name__ == "__main__":
-    run(*sys.argv[1:])

@@ -1,11 +1,9 @@
 """Stage `moduli`: effective moduli of definitions on patches, for E = 1 and t = 1."""
 
-import sys
 import time
 from pathlib import Path
 
-from ...jobs import atomic, store
-from ...jobs.spent import Spent
+from ...jobs import store
 from ...problem.materials import Material
 from ...problem.status import Status
 from ...scene.moduli import MeshModuli
@@ -13,18 +11,17 @@ from ...springs import DefinitionError
 from ..scenes.mesh import make
 
 
-def run(tasks, done):
+def run(tasks, spent):
     """Measure the moduli that are not stored yet.
 
     Parameters
     ----------
-    tasks : str or Path
-        JSON file: ``folder`` and ``patches``, each with ``name``, ``mesh`` (what the stage `mesh` takes) and
+    tasks : dict
+        ``folder`` and ``patches``, each with ``name``, ``mesh`` (what the stage `mesh` takes) and
         ``measurements``, each of these with ``key, definition, poisson_ratio``.
-    done : str or Path
-        JSON file to write: what was spent.
+    spent : Spent
+        What tasks cost is added to it.
     """
-    tasks, spent = atomic.read_json(tasks), Spent()
     for patch in tasks["patches"]:
         path = Path(tasks["folder"]) / f"{patch['name']}.h5"
         present = store.stored(path)
@@ -42,7 +39,6 @@ def run(tasks, done):
             spent.add("moduli", len(mesh.points), seconds - of_definition)
             spent.add(measurement["definition"], len(mesh.points), of_definition)
         store.add(path, results)
-    atomic.write_json(done, spent.summary())
 
 
 def _measured(moduli, measurement):
@@ -61,7 +57,3 @@ def _measured(moduli, measurement):
         "definition_evaluations": found.springs.evaluations,
         "spring_ratio": found.springs.spring_ratio,
     }
-
-
-if __name__ == "__main__":
-    run(*sys.argv[1:])

@@ -3,8 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from ...jobs import atomic, store
-from ...mesh import read_mesh
+from ...jobs import sealed, store
 from ...output.dataset import NO_NODE, Filler
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
@@ -13,7 +12,7 @@ from ...problem.status import Status
 from ...reference.field import outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
-from . import plan, stored_reference
+from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
 
@@ -102,17 +101,15 @@ def _mesh_labels(mesh):
     return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
 
 
-def _calibration(folder):
+def _calibration(study, folder):
     """Calibrated stiffnesses by group; none where no scene is calibrated."""
-    path = plan.calibration_path(folder)
-    return atomic.read_json(path) if path.exists() else {}
+    return sealed.demand(plan.calibration_path(folder)) if plan.calibrated(study) else {}
 
 
 def _meshes(study, folder, root):
     for mesh in study.meshes:
-        notes = atomic.read_json(folder / "meshes" / f"{mesh.name}.json")
-        del notes["key"]
-        root.put(notes, **_mesh_labels(mesh))
+        notes = stored_mesh.read_notes(folder / "meshes", mesh.name)
+        root.put({label: value for label, value in notes.items() if label in root.data}, **_mesh_labels(mesh))
 
 
 def _references(study, folder, root):
@@ -149,7 +146,7 @@ def _reference(folder, one, fields=()):
 
 def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
-    calibration = _calibration(folder)
+    calibration = _calibration(study, folder)
     arrays = ["face_profile"] * (block is not None)
     arrays += ["displacements", "spring_stiffnesses", "spring_forces"] * (fields is not None)
     for mesh, scenes in plan.by_mesh(study.scenes).items():
@@ -289,7 +286,7 @@ def _face_reference(folder, one, kind):
 def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
     shown = plan.shown_meshes(study)
-    meshes = {mesh: read_mesh(folder / "meshes" / f"{mesh.name}.vtu") for mesh in study.meshes if mesh in shown}
+    meshes = {mesh: stored_mesh.read(folder / "meshes", mesh.name) for mesh in study.meshes if mesh in shown}
     outlines = {one: _outline(folder, one) for one in study.references}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {

@@ -251,7 +251,7 @@ def _solve(study, folder, meshes):
         for mesh in meshes
     ]
     return {
-        "calibration": str(calibration_path(folder)) if _calibrated(study) else None,
+        "calibration": str(calibration_path(folder)) if calibrated(study) else None,
         "folder": str(folder / "solutions"),
         "meshes": str(folder / "meshes"),
         "references": str(folder / "references"),
@@ -283,19 +283,20 @@ def _family_products(content):
     return [Path(content["folder"]) / f"{family['name']}.h5" for family in content["families"]]
 
 
-def _calibrated(study):
+def calibrated(study):
+    """Scenes whose stiffness is calibrated."""
     return [scene for scene in study.scenes if scene.definition == "calibrated"]
 
 
 def calibration_path(folder):
     """Where the calibrated stiffnesses of a study are."""
-    return folder / "done" / "calibrate_0.json"
+    return folder / "calibration.json"
 
 
 def _calibrate_members(study, costs):
     """Groups of scenes that share a calibrated stiffness, in one job."""
     groups = {}
-    for scene in _calibrated(study):
+    for scene in calibrated(study):
         groups[calibration_name(scene)] = scene.mesh.mesh_type, scene.material, scene.kinematics
     return {"all": (0.0, sorted(groups.items()))} if groups else {}
 
@@ -304,13 +305,13 @@ def _calibrate(study, folder, members):
     tasks = []
     for name, (mesh_type, material, kinematics) in (pair for groups in members for pair in groups):
         curves = [
-            {"mesh": curve.mesh.name, "key": curve_key(study, curve), "load": curve.load, "force": curve.force}
+            {"mesh": curve.mesh.name, "curve": curve_key(study, curve), "load": curve.load, "force": curve.force}
             for curve in study.curves
             if (curve.mesh.beam.name, curve.load) == study.calibration
             and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
         ]
         tasks.append({"name": name, "members": curves})
-    return {"curves": str(folder / "curves"), "groups": tasks}
+    return {"file": str(calibration_path(folder)), "curves": str(folder / "curves"), "groups": tasks}
 
 
 STAGES = (
@@ -338,7 +339,7 @@ STAGES = (
         "kinds.scenes.calibrate",
         "Calibrating the uniform stiffness",
         _calibrate,
-        lambda content: [],
+        lambda content: [Path(content["file"])],
         _calibrate_members,
         every=("sensitivity",),
     ),

@@ -1,29 +1,26 @@
 """Stage `reference`: one finite-element solution a unit problem, and one a scene at finite strain."""
 
-import sys
 import time
 
-from ...jobs import atomic, store
-from ...jobs.spent import Spent
+from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
 from ...reference.small_strain import solve_unit
 
 
-def run(tasks, done):
+def run(tasks, spent):
     """Solve the references of a bundle that are not there yet.
 
     Parameters
     ----------
-    tasks : str or Path
-        JSON file: ``folder``, ``references``, each with ``key`` and ``problem``, what
+    tasks : dict
+        ``folder``, ``references``, each with ``key`` and ``problem``, what
         `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
         with ``key, beam, material, force, load, plane, follower``, where ``load`` is the name of the kind.
-    done : str or Path
-        JSON file to write: what was spent.
+    spent : Spent
+        What tasks cost is added to it.
     """
-    tasks, spent = atomic.read_json(tasks), Spent()
     for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
         for path, task in store.missing(tasks["folder"], tasks[section]):
             begin = time.perf_counter()
@@ -31,7 +28,6 @@ def run(tasks, done):
             result["seconds"] = time.perf_counter() - begin
             store.add(path, {task["key"]: result})
             spent.add(kind, 0, result["seconds"])
-    atomic.write_json(done, spent.summary())
 
 
 def _unit(task):
@@ -57,7 +53,3 @@ def _finite(task):
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
-
-
-if __name__ == "__main__":
-    run(*sys.argv[1:])

@@ -7,42 +7,39 @@ on which others are computed along with it.
 Here, where equilibria are at hand, the stiffness at which a curve meets its reference is solved for, too.
 """
 
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from ...jobs import atomic, store
-from ...jobs.spent import Spent
-from ...mesh import read_mesh
+from ...jobs import store
 from ...problem.loads import LOAD_KINDS
 from ...reference.limits import objection
 from ...scene.curve import ending, follow, meeting
 from ...scene.sheet import Sheet
+from . import stored_mesh
 from . import stored_reference as references
 
 
-def run(tasks, done):
+def run(tasks, spent):
     """Trace the curves of a bundle that are not stored yet.
 
     Parameters
     ----------
-    tasks : str or Path
-        JSON file: ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name`` and
+    tasks : dict
+        ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name`` and
         ``curves``, and each of these with ``key, kind, force, kinematics, stiffnesses, reference`` (see
         `springtune.kinds.scenes.stored_reference.read`).
-    done : str or Path
-        JSON file to write: what was spent.
+    spent : Spent
+        What tasks cost is added to it.
     """
-    tasks, spent = atomic.read_json(tasks), Spent()
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
         missing = [curve for curve in family["curves"] if curve["key"] not in present]
         if not missing:
             continue
-        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        mesh = stored_mesh.read(tasks["meshes"], family["name"])
         results = {}
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
         for curve in missing:
@@ -50,7 +47,6 @@ def run(tasks, done):
         store.add(path, results)
         for result in results.values():
             spent.add("curve", len(mesh.points), result["seconds"])
-    atomic.write_json(done, spent.summary())
 
 
 def _traced(sheet, curve, folder):
@@ -76,7 +72,3 @@ def _result(path, curve, folder):
         "best_status": best.status,
         "best_message": best.message,
     }
-
-
-if __name__ == "__main__":
-    run(*sys.argv[1:])

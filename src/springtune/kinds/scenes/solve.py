@@ -1,15 +1,12 @@
 """Stage `solve`: the mass-spring network of every scene, all scenes of a mesh together."""
 
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from ...jobs import atomic, store
+from ...jobs import sealed, store
 from ...jobs.keys import hash_of
-from ...jobs.spent import Spent
-from ...mesh import read_mesh
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
@@ -17,27 +14,27 @@ from ...problem.status import Status
 from ...reference.field import field_error, interpolate
 from ...scene.sheet import Sheet, definition_of
 from ...springs import DEFINITIONS, DefinitionError
+from . import stored_mesh
 from . import stored_reference as references
 
 
-def run(tasks, done):
+def run(tasks, spent):
     """Solve the scenes of a bundle that are not stored yet.
 
     A scene that fails is stored with its status and message; it never stops the others.
 
     Parameters
     ----------
-    tasks : str or Path
-        JSON file: ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
+    tasks : dict
+        ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
         or nothing) and ``families``, each with ``name, thickness, keep_fields`` and ``scenes``, and each of these with
         ``key, material, kind`` (the load's, by name), ``follower, force, definition, kinematics``, ``reference`` (see
         `springtune.kinds.scenes.stored_reference.read`), ``stiffness`` where it is told, and ``thickness_ratio`` and
         ``calibration``, the name of a group, where it is calibrated.
-    done : str or Path
-        JSON file to write: what was spent.
+    spent : Spent
+        What tasks cost is added to it.
     """
-    tasks, spent = atomic.read_json(tasks), Spent()
-    calibration = atomic.read_json(tasks["calibration"]) if tasks["calibration"] else {}
+    calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
@@ -45,7 +42,7 @@ def run(tasks, done):
         missing = {name: scene for name, scene in scenes.items() if name not in present}
         if not missing:
             continue
-        mesh = read_mesh(Path(tasks["meshes"]) / f"{family['name']}.vtu")
+        mesh = stored_mesh.read(tasks["meshes"], family["name"])
         fields = References(tasks["references"], mesh)
         sheet = Sheet(mesh, family["thickness"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
@@ -57,7 +54,6 @@ def run(tasks, done):
             spent.add(scene["kinematics"], len(mesh.points), result["seconds"])
             spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
         store.add(path, results)
-    atomic.write_json(done, spent.summary())
 
 
 def _stored_key(scene, calibration):
@@ -186,7 +182,3 @@ def _face(sheet, kind, displacements):
     order = np.argsort(x)
     profile = np.interp(FACE_POSITIONS * np.ptp(x), x[order], moved[order])
     return {"face_mean": float((weights * displacements).sum()), "face_profile": profile}
-
-
-if __name__ == "__main__":
-    run(*sys.argv[1:])

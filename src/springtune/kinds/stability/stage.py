@@ -1,36 +1,32 @@
 """Stage `stability`: experiments on numerical stability."""
 
-import sys
 import time
 
 import numpy as np
 
-from ...jobs import atomic, store
-from ...jobs.spent import Spent
+from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.materials import Material
 from . import experiments as stability
 
 
-def run(tasks, done):
+def run(tasks, spent):
     """Do the experiments that are not stored yet.
 
     An experiment that fails is stored with its message; it never stops the others.
 
     Parameters
     ----------
-    tasks : str or Path
-        JSON file: ``folder`` and ``experiments``, each with ``key``, ``name`` and what
+    tasks : dict
+        ``folder`` and ``experiments``, each with ``key``, ``name`` and what
         `springtune.kinds.stability.experiments.Setup` takes.
-    done : str or Path
-        JSON file to write: what was spent.
+    spent : Spent
+        What tasks cost is added to it.
     """
-    tasks, spent = atomic.read_json(tasks), Spent()
     for path, task in store.missing(tasks["folder"], tasks["experiments"]):
         result = _experiment(task)
         store.add(path, {task["key"]: result})
         spent.add(task["name"], 0, result.get("seconds", 0.0))
-    atomic.write_json(done, spent.summary())
 
 
 def _experiment(task):
@@ -48,7 +44,3 @@ def _experiment(task):
     texts = {name: values.tolist() for name, values in found.items() if values.dtype.kind == "O"}
     arrays = {name: values for name, values in found.items() if name not in texts}
     return arrays | texts | {"seconds": time.perf_counter() - begin}
-
-
-if __name__ == "__main__":
-    run(*sys.argv[1:])

@@ -1,0 +1,150 @@
+"""Who runs what in a folder, and locks that a run which was killed has left.
+
+Snakemake locks the files of a run by lists of them, and does not say by whom. So a run notes its process beside them;
+a lock is stale when that process is gone.
+"""
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from ..jobs import sealed
+
+LOCKS, RUNS = Path(".snakemake/locks"), Path(".snakemake/springtune")
+"""Snakemake's locks, and notes of processes, from the folder on that a run is called in."""
+
+SAME_START = 2.0
+"""Seconds by which two readings of a process's start may differ, since the clock may be set."""
+
+
+class LockedError(Exception):
+    """Another process computes a study; the message names it and the remedy."""
+
+
+def begin(folders: Iterable[Path]) -> None:
+    """Note that this process computes studies.
+
+    Parameters
+    ----------
+    folders : iterable of Path
+        Where their results go.
+    """
+    import psutil
+
+    process = psutil.Process()
+    note = {
+        "host": platform.node(),
+        "pid": process.pid,
+        "start": process.create_time(),
+        "command": " ".join(sys.argv),
+        "folders": [str(folder) for folder in folders],
+    }
+    sealed.write(_note(), note)
+
+
+def end() -> None:
+    """Note that this process is at its end."""
+    _note().unlink(missing_ok=True)
+
+
+def _note() -> Path:
+    return RUNS / f"{platform.node()}_{os.getpid()}.json"
+
+
+def release(folder: Path) -> str:
+    """Remove locks on a study that a process which is gone has left.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are.
+
+    Returns
+    -------
+    str
+        What was removed; empty where there was nothing.
+
+    Raises
+    ------
+    LockedError
+        If the process is alive, or on another machine.
+    """
+    locks = [path for path in _files(LOCKS, "*.lock") if _is_on(path, folder)]
+    if not locks:
+        return ""
+    for path, note in _notes():
+        if str(folder) not in note["folders"]:
+            continue
+        if note["host"] != platform.node():
+            raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
+        if _is_alive(note):
+            raise LockedError(_told(folder, note, "on this machine"))
+        path.unlink(missing_ok=True)
+    # A run that was killed before it noted anything.
+    other = _running_here()
+    if other is not None:
+        raise LockedError(
+            f"{folder}: process {other} computes in this folder; wait for its end, or stop it: kill {other}"
+        )
+    for path in locks:
+        path.unlink(missing_ok=True)
+    return f"{folder}: the run before was killed and left its lock; the lock is removed"
+
+
+def _told(folder: Path, note: dict[str, Any], where: str) -> str:
+    since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(note["start"]))
+    remedy = f"wait for its end, or stop it: kill {note['pid']}"
+    if note["host"] != platform.node():
+        remedy = f"wait for its end; if it is gone: snakemake --unlock, and remove {RUNS}"
+    return f"{folder}: process {note['pid']} {where} computes it since {since} ({note['command']}); {remedy}"
+
+
+def _files(folder: Path, pattern: str) -> list[Path]:
+    return sorted(folder.glob(pattern)) if folder.is_dir() else []
+
+
+def _is_on(lock: Path, folder: Path) -> bool:
+    try:
+        return any(Path(line).is_relative_to(folder) for line in lock.read_text(errors="replace").splitlines())
+    except OSError:
+        return False
+
+
+def _notes() -> Iterator[tuple[Path, dict[str, Any]]]:
+    for path in _files(RUNS, "*.json"):
+        note = sealed.read(path)
+        if note is not None:
+            yield path, note
+
+
+def _is_alive(note: dict[str, Any]) -> bool:
+    import psutil
+
+    try:
+        process = psutil.Process(note["pid"])
+        same = abs(process.create_time() - note["start"]) < SAME_START
+        return same and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def _running_here() -> int | None:
+    """Another process of Snakemake in this folder that computes."""
+    import psutil
+
+    own = psutil.Process()
+    family = {own.pid, *(process.pid for process in own.parents())}
+    for process in psutil.process_iter():
+        try:
+            if process.pid in family or process.status() == psutil.STATUS_ZOMBIE or process.cwd() != str(Path.cwd()):
+                continue
+            words = process.cmdline()
+        except psutil.Error:
+            continue
+        if any(Path(word).name == "snakemake" for word in words[:3]) and not {"-n", "--dry-run", "--dryrun"} & {*words}:
+            return process.pid
+    return None

@@ -1,0 +1,42 @@
+"""Stored files that are not what was written."""
+
+import sys
+from pathlib import Path
+
+ASIDE = ".damaged"
+"""Ending of the name of a file that is not what was written, after its own."""
+
+
+class DamagedError(Exception):
+    """A stored file is not what was written, or is not there.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    why : str
+        What is wrong with it.
+    whole : bool, optional
+        Whether what it holds is sound, if not what is asked for.
+    """
+
+    def __init__(self, path: str | Path, why: str, whole: bool = False) -> None:
+        super().__init__(f"{path}: {why}")
+        self.path, self.whole = Path(path), whole
+
+
+def set_aside(error: DamagedError) -> None:
+    """Give a damaged file another name and say so; what it held is computed again.
+
+    One that is whole keeps its name: it gets what it lacks.
+
+    Parameters
+    ----------
+    error : DamagedError
+    """
+    told = "computed again"
+    if error.path.exists() and not error.whole:
+        aside = error.path.with_name(error.path.name + ASIDE)
+        error.path.replace(aside)
+        told = f"set aside as {aside.name}, and computed again"
+    print(f"{error}; {told}", file=sys.stderr)

@@ -1,0 +1,89 @@
+"""Records: what a job did, and size, time and checksum of all that it made.
+
+A run plans by them, whatever else it finds: a job is done if its record says that it did what is asked for now, and if
+what it made is still what it was.
+"""
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from . import sealed
+
+
+def checksum(path: str | Path) -> str:
+    """SHA-256 of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    str
+    """
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write(path: str | Path, digest: str, products: Iterable[str | Path], **more: Any) -> None:
+    """Write the record of a job that is done.
+
+    Parameters
+    ----------
+    path : str or Path
+    digest : str
+        Of all that it was to do.
+    products : iterable of str or Path
+        Files that it made.
+    **more
+        What else is to be told of it.
+    """
+    made = {}
+    for product in map(Path, products):
+        state = product.stat()
+        made[str(product)] = [state.st_size, state.st_mtime_ns, checksum(product)]
+    sealed.write(path, {"digest": digest, "products": made} | more)
+
+
+def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> str:
+    """Why a job is to run.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its record.
+    digest : str
+        Of what it is to do.
+    products : iterable of str or Path
+        Files that it is to make.
+    wholly : bool, optional
+        Whether to compare the checksum of each of them, not only of those whose size or time is another.
+
+    Returns
+    -------
+    str
+        Empty where it has done what is asked for, and what it made is there as it was.
+    """
+    path = Path(path)
+    if not path.exists():
+        return "not done yet"
+    record = sealed.read(path)
+    if record is None:
+        return f"{path} is damaged"
+    if record["digest"] != digest:
+        return "something else is asked for"
+    for product in map(Path, products):
+        try:
+            state = product.stat()
+        except OSError:
+            return f"{product} is missing"
+        if str(product) not in record["products"]:
+            return f"{product} is not among what was made"
+        size, time, content = record["products"][str(product)]
+        if (wholly or state.st_mtime_ns != time or state.st_size != size) and (
+            state.st_size != size or checksum(product) != content
+        ):
+            return f"{product} is damaged"
+    return ""
