@@ -64,9 +64,13 @@ def write_mesh(path: str | Path, mesh: Mesh) -> None:
 
     points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
     cells = [(name, mesh.cells[count]) for name, count in CELLS.items() if count in mesh.cells]
-    unfinished = f"{path}.unfinished.vtu"
-    meshio.Mesh(points, cells).write(unfinished, file_format="vtu")
-    os.replace(unfinished, path)
+    unfinished = f"{path}.{os.getpid()}.unfinished"
+    try:
+        meshio.Mesh(points, cells).write(unfinished, file_format="vtu")
+        os.replace(unfinished, path)
+    except BaseException:
+        Path(unfinished).unlink(missing_ok=True)
+        raise
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
