@@ -29,6 +29,7 @@ COMMANDS = {
     "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
+    "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
     "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "schema", "schema", "Print the JSON schema of studies, or renew it and the manual."),
     "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),

@@ -11,6 +11,9 @@ from typing import Any
 
 from . import sealed
 
+MISSING, DAMAGED = " is missing", " is damaged"
+"""How a fault ends that begins with a file which is not as it was made."""
+
 
 def checksum(path: str | Path) -> str:
     """SHA-256 of a file.
@@ -73,7 +76,7 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
         return "not done yet"
     record = sealed.read(path)
     if record is None:
-        return f"{path} is damaged"
+        return f"{path}{DAMAGED}"
     if record["digest"] != digest:
         return "something else is asked for"
     for product in map(Path, products):
@@ -83,12 +86,12 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
         except OSError:
             if known is None:
                 continue
-            return f"{product} is missing"
+            return f"{product}{MISSING}"
         if known is None:
             return f"{product} is not what this job made"
         size, time, content = known
         if (wholly or state.st_mtime_ns != time or state.st_size != size) and (
             state.st_size != size or checksum(product) != content
         ):
-            return f"{product} is damaged"
+            return f"{product}{DAMAGED}"
     return ""

@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 
-def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
+def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = None) -> Study:
     """Read, validate and expand a study.
 
     Parameters
@@ -43,6 +43,8 @@ def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
         YAML file.
     kinds : tuple of Kind
         Study kinds that it may have.
+    beside : Path, optional
+        Folder that the names of its files are seen from; its own without.
 
     Returns
     -------
@@ -54,6 +56,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
         If anything is wrong with the file; nothing else is raised.
     """
     path, file = Path(path), str(path)
+    beside = beside or path.parent
     text, content, lines = read_study(path)
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
@@ -66,11 +69,11 @@ def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
     problems.stop()
     check_meshes(config, content, problems)
     problems.stop()
-    mesh_files = files_of_meshes(config, path.parent, problems)
+    mesh_files = files_of_meshes(config, beside, problems)
     grids = expand(config, mesh_files, problems)
     check_definitions(config, content, grids, problems)
     problems.stop()
-    printed_path = path.parent / config.printed if config.printed else None
+    printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
     return build(config, grids, kinds, problems, about)
 
