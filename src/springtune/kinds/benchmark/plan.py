@@ -44,7 +44,5 @@ STAGES = (
         _products,
         _members,
         alone=True,
-        definitions=True,
-        mesh_types=True,
     ),
 )

@@ -59,7 +59,5 @@ STAGES = (
         _content,
         _products,
         _members,
-        definitions=True,
-        mesh_types=True,
     ),
 )

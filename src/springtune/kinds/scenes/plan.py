@@ -329,7 +329,7 @@ STAGES = (
         _reference_products,
         _reference_members,
     ),
-    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members, mesh_types=True),
+    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members),
     Stage(
         "sensitivity",
         "kinds.scenes.sensitivity",
@@ -358,6 +358,5 @@ STAGES = (
         like="mesh",
         same=("mesh",),
         every=("reference", "calibrate"),
-        definitions=True,
     ),
 )

@@ -36,7 +36,5 @@ STAGES = (
         _content,
         _products,
         _members,
-        definitions=True,
-        mesh_types=True,
     ),
 )
