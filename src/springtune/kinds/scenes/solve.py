@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import sealed, store
-from ...jobs.hashing import hash_of
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
@@ -16,6 +15,7 @@ from ...scene.sheet import Sheet, definition_of
 from ...springs import DEFINITIONS, DefinitionError
 from . import stored_mesh
 from . import stored_reference as references
+from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key
 
 
 def run(tasks, spent):
@@ -39,7 +39,8 @@ def run(tasks, spent):
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path)
         scenes = {_stored_key(scene, calibration): scene for scene in family["scenes"]}
-        missing = {name: scene for name, scene in scenes.items() if name not in present}
+        kept = {name: fields_key(name) for name in scenes} if family["keep_fields"] else {}
+        missing = {name: scene for name, scene in scenes.items() if not {name, kept.get(name, name)} <= present}
         if not missing:
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
@@ -50,8 +51,13 @@ def run(tasks, spent):
         for name in order:
             scene = missing[name]
             derived = sheet.deriving
-            results[name] = result = solve(sheet, scene, fields.field, calibration, family["keep_fields"])
-            spent.add(scene["kinematics"], len(mesh.points), result["seconds"])
+            result = solve(sheet, scene, fields.field, calibration, family["keep_fields"])
+            if name in kept:
+                results[kept[name]] = {label: result.pop(label) for label in FIELD_ARRAYS if label in result}
+            known = name in present  # then this made its fields alone
+            if not known:
+                results[name] = result
+            spent.add("fields" if known else scene["kinematics"], len(mesh.points), result["seconds"])
             spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
         store.add(path, results)
 
@@ -59,7 +65,7 @@ def run(tasks, spent):
 def _stored_key(scene, calibration):
     """Key of a scene's result; as `springtune.kinds.scenes.plan.solved_key`, from the task."""
     group = scene.get("calibration")
-    return hash_of(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
+    return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
 
 def _turn(scene):
