@@ -10,10 +10,10 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
-	snakemake --configfile $(STUDY)
+	springtune run $(STUDY)
 
 # One file with the study's results, captions and run times, to be opened without a network.
 report: study
@@ -24,12 +24,16 @@ paper: $(VENV)/.run
 
 # Files in this order, those that take longest first: at the end no core waits for the other.
 test: $(VENV)/.test
-	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/physics tests/unit src
+	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/physics tests/faults tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
 test-browser: $(VENV)/.test
 	pytest -m "not slow" tests/browser
+
+# Every write, rename and opening of a file of a small study failed once, by an error, by a full disk and by a kill.
+test-faults: $(VENV)/.test
+	pytest -n 2 tests/faults
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow

@@ -20,6 +20,7 @@ import xarray as xr
 import springtune as st
 from cf import complaints
 from springtune.campaign import provenance
+from springtune.jobs import atomic
 from springtune.kinds import KINDS, load_study
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output import dataset
@@ -207,13 +208,15 @@ class TestInterruptedWrite:
         process.wait()
         with st.open(tmp_path) as tree:
             assert len(np.unique(tree.displacement.values)) == 1 and tree.stiffness.notnull().all()
-        assert {file.name for file in tmp_path.iterdir()} <= {"dataset.nc", "dataset.nc.unfinished"}
+        assert {file.name for file in tmp_path.iterdir()} <= {"dataset.nc", f"dataset.nc.{process.pid}.unfinished"}
+        atomic.remove_unfinished(tmp_path)
+        assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
 
-    def test_an_unfinished_file_is_no_dataset_and_goes_with_the_next_write(self, tmp_path):
+    def test_an_unfinished_file_is_no_dataset(self, tmp_path):
         write_curves(tmp_path / "dataset.nc", 1.0)
         whole = (tmp_path / "dataset.nc").read_bytes()
         os.remove(tmp_path / "dataset.nc")
-        unfinished = tmp_path / "dataset.nc.unfinished"
+        unfinished = tmp_path / "dataset.nc.0.unfinished"
         for share in (0.0, 0.1, 0.5, 0.999):
             unfinished.write_bytes(whole[: int(share * len(whole))])
             with pytest.raises(FileNotFoundError, match="there is no such dataset"):
@@ -221,9 +224,8 @@ class TestInterruptedWrite:
             shutil.copy(unfinished, tmp_path / "cut.nc")
             with pytest.raises(ValueError, match="cannot be read"):
                 st.open(tmp_path / "cut.nc")
-        os.remove(tmp_path / "cut.nc")
-        write_curves(tmp_path / "dataset.nc", 1.0)
-        assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
+        atomic.remove_unfinished(tmp_path)
+        assert not unfinished.exists()
 
     def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(self, tmp_path, writer):
         def limit():

@@ -396,7 +396,7 @@ class TestDefinitions:
     def test_moduli_of_every_pair(self, load):
         study = load(SMALL.replace("grids:", "outputs: [definitions]\ngrids:") + self.GRID)
         assert len(study.parts["moduli"].measurements) == 2 * 2 * 2 * 2
-        assert study.parts["moduli"].measurements[0] == Measurement("area", "structured", 0.002, 0.3)
+        assert study.parts["moduli"].measurements[0] == Measurement("area", "free", 0.002, 0.3)
         assert study.axes["poisson_ratio"] == (0.3, 0.5)
         assert (study.parts["moduli"].patch.length, study.parts["moduli"].patch.height) == (0.1, 0.02)
         assert study.outputs == ("definitions",)
@@ -663,13 +663,13 @@ BROKEN = {
     "open bracket": ("a: [b\n", "study.yaml:2: not YAML: expected"),
     "two colons": ("a: b: c\n", "study.yaml:1: not YAML: mapping values are not allowed here; check"),
     "unknown alias": ("a: *b\n", "study.yaml:1: not YAML: found undefined alias"),
-    "endless alias": ("&a [*a]\n", "study.yaml: not a study: nested too deeply;"),
+    "endless alias": ("&a [*a]\n", "study.yaml:1: an alias stands for what it is part of;"),
     "deep nesting": ("[" * 3000, "study.yaml: not a study: nested too deeply;"),
     "control characters": ("a: \x00b\n", "study.yaml: not YAML: special characters are not allowed"),
     "two documents": ("a: 1\n---\nb: 1\n", "study.yaml:2: not YAML: but found another document"),
     "list as key": ("? [a]\n: b\n", "study.yaml:1: a list or mapping cannot be a key"),
     "merge of a text": ("<<: a\n", "study.yaml:1: '<<' merges mappings only"),
-    "not text": (b"\xff\xfe\x00", "study.yaml: cannot be read: it is not UTF-8 text; give"),
+    "not text": (b"\xff\xfe\x00", "study.yaml:1: not UTF-8 text: byte 0xff; save the file"),
 }
 
 
@@ -760,7 +760,7 @@ class TestPrinted:
         [
             ([], "printed.csv: no printed values; give a line table,beam,"),
             ([HEADER], "printed.csv: no printed values; give"),
-            (["a,b", CELL], "printed.csv:1: has columns a,b; give table,beam,"),
+            (["a,b", CELL], "printed.csv:1: has columns 'a,b'; give table,beam,"),
             (["# x", HEADER, CELL, CELL], "printed.csv:4: is the cell of line 3 again; remove one"),
             ([HEADER, "1,long"], "printed.csv:2: 2 values for 12 columns; add or remove some"),
             (

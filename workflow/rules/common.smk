@@ -124,6 +124,7 @@ def begin():
     for _, one in READ:
         one.write()
         remove_unfinished(one.folder)
+        remove_unfinished(one.folder.parent, below=False)  # of what studies share
     OURS.remember(RESULTS.parent / CODE_FILE)
     tell_start()
 

@@ -231,4 +231,4 @@ def is_damage(why: str) -> bool:
     why : str
         As of `fault`.
     """
-    return why.endswith(("is damaged", "is missing"))
+    return why.endswith((records.DAMAGED, records.MISSING))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 UNFINISHED = ".unfinished"
-"""Ending of the name of a file that is being written, after its own."""
+"""Ending of the name of a file that is being written, after its own and the number of the process that writes it."""
 
 
 @contextmanager
@@ -32,7 +32,7 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(path.name + UNFINISHED)
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}{UNFINISHED}")
     try:
         yield unfinished
         if synced:
@@ -44,17 +44,39 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
         raise
 
 
-def remove_unfinished(folder: str | Path) -> None:
-    """Remove what writers that were killed have left in a folder and those below.
+def remove_unfinished(folder: str | Path, below: bool = True) -> None:
+    """Remove what writers that were killed have left in a folder; what a process that lives is writing stays.
 
     Parameters
     ----------
     folder : str or Path
-        Nobody else may be writing there.
+    below : bool, optional
+        Whether to look into folders below it, too.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_text(Path(folder) / "note.txt.0.unfinished", "half of")
+    ...     remove_unfinished(folder)
+    ...     list(Path(folder).iterdir())
+    []
     """
-    for path in Path(folder).rglob(f"*{UNFINISHED}*"):
-        if path.is_file():
+    for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED}"):
+        if path.is_file() and not _is_written(path.name):
             path.unlink(missing_ok=True)
+
+
+def _is_written(name: str) -> bool:
+    """Whether the process that writes an unfinished file lives."""
+    number = name.removesuffix(UNFINISHED).rpartition(".")[2]
+    try:
+        os.kill(int(number), 0)
+    except (ValueError, OverflowError, ProcessLookupError):
+        return False
+    except PermissionError:  # another user's
+        pass
+    return int(number) != 0
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:

@@ -7,6 +7,7 @@ a beam in tension.
 """
 
 from collections.abc import Callable
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -86,10 +87,15 @@ class Expansion:
         self._length = np.sqrt(np.einsum("nji,nji->ni", self._d, self._d))
         self._inverse = 1.0 / self._length
         self._first = np.zeros(0)
-        self.extend(order)
+        self._extend(order)
 
-    def extend(self, order: int) -> None:
-        """Add the orders up to `order`."""
+    def extended(self, order: int) -> "Expansion":
+        """The series up to a higher order; this one stays what it is, for whoever else has it."""
+        longer = copy(self)
+        longer._extend(order)
+        return longer
+
+    def _extend(self, order: int) -> None:
         network = self._network
         d, length, inverse, coefficients = (
             _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients)

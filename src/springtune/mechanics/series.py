@@ -10,10 +10,7 @@ import numpy as np
 
 from ..linalg.factors import Factor, SingularError
 from .expansion import Expansion
-from .statics import StaticProblem
-
-HIGH_ORDER = 16
-"""Order of one that the rule does not serve."""
+from .statics import HIGH_ORDER, StaticProblem
 
 CURVE_TOLERANCE = 1e-7
 """Largest estimated relative error of a displacement on a sensitivity curve."""
@@ -183,11 +180,11 @@ class StablePath:
         count : int
             How many of the loads the series serve, proved at the last one of each.
         """
-        rest = series = self.problem.rest
-        values, errors = rest.measure(self.weights, loads)
-        if rest.order < HIGH_ORDER and (errors > CURVE_TOLERANCE).any():
-            rest.extend(HIGH_ORDER)
-            values, errors = rest.measure(self.weights, loads)
+        self._rest = series = self.problem.rest
+        values, errors = series.measure(self.weights, loads)
+        if (errors > CURVE_TOLERANCE).any():
+            self._rest = series = self.problem.long_rest
+            values, errors = series.measure(self.weights, loads)
         good, count, served, before = errors <= CURVE_TOLERANCE, 0, errors <= CURVE_TOLERANCE, None
         for _ in range(MAX_SERIES):
             number, point = self._proved(series, loads[count:], values[count:], served)
@@ -324,7 +321,7 @@ class StablePath:
 
     def _check_others(self, loads: np.ndarray, values: np.ndarray, good: np.ndarray, found: np.ndarray) -> None:
         """Keep values of the series about rest beyond the stable path: of equilibria, though not of that path."""
-        rest, others = self.problem.rest, np.flatnonzero(good & ~found)
+        rest, others = self._rest, np.flatnonzero(good & ~found)
         for group in np.split(others, np.flatnonzero(np.diff(others) > 1) + 1):
             while len(group):
                 last = self._point(rest, loads[group[-1]], values[group[-1]])
@@ -356,7 +353,7 @@ class StablePath:
 
     def _elsewhere(self, s: float) -> bool:
         """Whether the series about rest is by now of another path, which the beam would leave."""
-        network, displacements = self.problem.network, self.problem.rest.at(s)[1]
+        network, displacements = self.problem.network, self._rest.at(s)[1]
         missing = s * self.problem.load - network.resistance(displacements)
         near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
         return near and not network.is_stable(displacements)

@@ -39,6 +39,9 @@ MODES = 24
 MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
 
+HIGH_ORDER = 16
+"""Order of a series that the rule does not serve."""
+
 START_ORDER = 3
 """Orders of the series that starts Newton's method: together they cost half of a factorization."""
 
@@ -112,6 +115,11 @@ class StaticProblem:
     def rest(self) -> Expansion:
         """Long series about rest, for a whole curve."""
         return Expansion(self.network, self.load, 0.0, None, self.rest_factor)
+
+    @cached_property
+    def long_rest(self) -> Expansion:
+        """As `rest`, for a curve that it does not serve."""
+        return self.rest.extended(HIGH_ORDER)
 
     def linear(self, s: float) -> Equilibrium:
         """Equilibrium of the network with linear kinematics.

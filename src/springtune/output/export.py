@@ -264,8 +264,7 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
     except ImportError:
         raise ValueError(f"{path}: Zarr needs zarr; {EXTRA}") from None
     path = Path(path)
-    unfinished = path.with_name(path.name + UNFINISHED)
-    shutil.rmtree(unfinished, ignore_errors=True)
+    unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (os.getpid(), "before"))
     tree = tree.load()
     for node in tree.subtree:
         for variable in node.variables.values():
@@ -274,11 +273,16 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what of Zarr may still change
             tree.to_zarr(unfinished, zarr_format=2, consolidated=True, mode="w")
-        if path.exists():
-            shutil.rmtree(path)
+        if path.exists():  # no folder takes the place of another one at once
+            os.replace(path, before)
         os.replace(unfinished, path)
+    except BaseException:
+        if before.exists() and not path.exists():
+            os.replace(before, path)
+        raise
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
+        shutil.rmtree(before, ignore_errors=True)
 
 
 EXPORTS = (".csv", ".parquet", ".zarr", ".nc")

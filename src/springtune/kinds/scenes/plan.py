@@ -10,6 +10,7 @@ from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, 
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
+from . import stored_mesh
 from .stored_scene import calibrated_key
 
 
@@ -177,8 +178,7 @@ def _meshes(study, folder, members):
 
 
 def _mesh_products(content):
-    folder = Path(content["folder"])
-    return [folder / f"{mesh['name']}{ending}" for mesh in content["meshes"] for ending in (".vtu", ".json")]
+    return [path for mesh in content["meshes"] for path in stored_mesh.files(content["folder"], mesh["name"])]
 
 
 def _reference_members(study, costs):

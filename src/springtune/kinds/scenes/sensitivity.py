@@ -1,15 +1,21 @@
-"""Stage `sensitivity`: displacement against uniform stiffness, one equilibrium path for all loads of a mesh.
+"""Stage `sensitivity`: displacement against uniform stiffness.
+
+Loads of a mesh have their network, its factor at rest and the series about it in common. Each curve follows a path of
+its own from there: where a path takes its steps depends on the loads that it is asked for, and a result may not depend
+on which others are computed along with it.
 
 Here, where equilibria are at hand, the stiffness at which a curve meets its reference is solved for, too.
 """
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ...jobs import store
 from ...problem.loads import LOAD_KINDS
+from ...problem.status import Status
 from ...reference.limits import objection
 from ...scene.curve import ending, follow, meeting
 from ...scene.sheet import Sheet
@@ -31,39 +37,70 @@ def run(tasks, spent):
     """
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
-        present = store.stored(path)
+        present = store.stored(path, spent.limits)
         missing = [curve for curve in family["curves"] if curve["key"] not in present]
         if not missing:
+            continue
+        refused = stored_mesh.refusal(tasks["meshes"], family["name"])
+        if refused:
+            store.add(path, {curve["key"]: _hole(curve, **refused) for curve in missing})
+            for _ in missing:
+                spent.add(stored_mesh.REFUSED, 0, 0.0)
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
         results = {}
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
-        for kind in {curve["kind"]: None for curve in missing}:
-            alike = [curve for curve in missing if curve["kind"] == kind]
-            results |= _trace(sheet, LOAD_KINDS[kind], alike, tasks["references"])
+        for curve in missing:
+            traced = partial(_traced, sheet, curve, tasks["references"])
+            result = spent.attempt(curve["key"], traced, partial(_hole, curve))
+            if result is not None:
+                results[curve["key"]] = result
+                spent.add("curve", len(mesh.points), result["seconds"])
         store.add(path, results)
-        for result in results.values():
-            spent.add("curve", len(mesh.points), result["seconds"])
 
 
-def _trace(sheet, kind, curves, folder):
-    """Results of the curves of a kind of load by key; those under loads of one sign lie on one path."""
-    results = {}
-    for kinematics, sign in {(curve["kinematics"], np.sign(curve["force"])): None for curve in curves}:
-        begin = time.perf_counter()
-        alike = [curve for curve in curves if (curve["kinematics"], np.sign(curve["force"])) == (kinematics, sign)]
-        loads = [curve["force"] / np.array(curve["stiffnesses"]) for curve in alike]
-        path = follow(sheet, kind, kinematics, np.concatenate(loads))
-        parts = np.cumsum([len(each) for each in loads])[:-1]
-        found = zip(alike, np.split(path.values, parts), np.split(path.stable, parts))
-        of_these = {curve["key"]: _result(path, curve, *values, folder) for curve, *values in found}
-        seconds = (time.perf_counter() - begin) / len(alike)
-        results |= {key: result | {"seconds": seconds} for key, result in of_these.items()}
-    return results
+def lose(tasks, key, why, limits):
+    """Store that a curve is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the curve; what became of it; the limits.
+    """
+    for family in tasks["families"]:
+        for curve in family["curves"]:
+            if curve["key"] == key:
+                store.add(Path(tasks["folder"]) / f"{family['name']}.h5", {key: _hole(curve, why, limits=limits)})
 
 
-def _result(path, curve, displacement, stable, folder):
+def _hole(curve, message, **limits):
+    """Result of a curve that cannot be traced."""
+    count = len(curve["stiffnesses"])
+    return limits | {
+        "displacement": np.full(count, np.nan),
+        "stable": np.zeros(count, dtype=bool),
+        "status": Status.FAILED,
+        "message": message,
+        "best_stiffness": np.nan,
+        "best_status": Status.FAILED,
+        "best_message": message,
+        "seconds": 0.0,
+    }
+
+
+def _traced(sheet, curve, folder):
+    """Result of a curve."""
+    begin = time.perf_counter()
+    loads = curve["force"] / np.array(curve["stiffnesses"])
+    path = follow(sheet, LOAD_KINDS[curve["kind"]], curve["kinematics"], loads)
+    return _result(path, curve, folder) | {"seconds": time.perf_counter() - begin}
+
+
+def _result(path, curve, folder):
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
+    displacement, stable = path.values, path.stable
     reference = references.read(folder, curve["reference"])
     why = objection(reference, force, curve["kinematics"])
     wanted = force * reference.get("displacement", np.nan)

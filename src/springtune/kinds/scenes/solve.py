@@ -1,6 +1,7 @@
 """Stage `solve`: the mass-spring network of every scene, all scenes of a mesh together."""
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,9 @@ from ...springs import DEFINITIONS, DefinitionError
 from . import stored_mesh
 from . import stored_reference as references
 from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key
+
+KEPT_BACK = 5.0
+"""Seconds for which results are not stored: writing them costs as much as solving small scenes."""
 
 
 def run(tasks, spent):
@@ -37,29 +41,65 @@ def run(tasks, spent):
     calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
-        present = store.stored(path)
+        present = store.stored(path, spent.limits)
         scenes = {_stored_key(scene, calibration): scene for scene in family["scenes"]}
         kept = {name: fields_key(name) for name in scenes} if family["keep_fields"] else {}
         missing = {name: scene for name, scene in scenes.items() if not {name, kept.get(name, name)} <= present}
         if not missing:
             continue
+        refused = stored_mesh.refusal(tasks["meshes"], family["name"])
+        if refused:
+            holes = {name: _hole(**refused) for name in missing if name not in present}
+            store.add(path, holes | {kept[name]: {} for name in missing if name in kept})
+            for _ in missing:
+                spent.add(stored_mesh.REFUSED, 0, 0.0)
+            continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
         fields = References(tasks["references"], mesh)
         sheet = Sheet(mesh, family["thickness"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
-        results = {}
+        results, since = {}, time.perf_counter()
         for name in order:
-            scene = missing[name]
-            derived = sheet.deriving
-            result = solve(sheet, scene, fields.field, calibration, family["keep_fields"])
+            scene, derived = missing[name], sheet.deriving
+            solved = partial(solve, sheet, scene, fields.field, calibration, family["keep_fields"])
+            result = spent.attempt(name, solved, _hole)
+            if result is None:
+                continue
             if name in kept:
                 results[kept[name]] = {label: result.pop(label) for label in FIELD_ARRAYS if label in result}
-            known = name in present  # then this made its fields alone
-            if not known:
+            if name not in present:
                 results[name] = result
-            spent.add("fields" if known else scene["kinematics"], len(mesh.points), result["seconds"])
+            work = "fields" if name in present else scene["kinematics"]
+            spent.add(work, len(mesh.points), result["seconds"])
             spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
+            if time.perf_counter() > since + KEPT_BACK:  # what is solved is not to be lost to what comes
+                store.add(path, results)
+                results, since = {}, time.perf_counter()
         store.add(path, results)
+
+
+def lose(tasks, name, why, limits):
+    """Store that a scene is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    name, why, limits : str
+        Key of its result; what became of it; the limits.
+    """
+    calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
+    for family in tasks["families"]:
+        if any(_stored_key(scene, calibration) == name for scene in family["scenes"]):
+            path = Path(tasks["folder"]) / f"{family['name']}.h5"
+            holes = {fields_key(name): {"limits": limits}} if family["keep_fields"] else {}
+            if name not in store.stored(path, limits):  # else its fields alone are beyond them
+                holes[name] = _hole(why, limits=limits)
+            store.add(path, holes)
+
+
+def _hole(message, **limits):
+    return limits | {"status": Status.FAILED, "message": message, "seconds": 0.0}
 
 
 def _stored_key(scene, calibration):
@@ -127,8 +167,6 @@ def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
         result = _solved(sheet, scene, reference, calibration, keep_fields)
     except DefinitionError as error:
         result = {"status": Status.FAILED, "message": f"{scene['definition']}: {error}"}
-    except Exception as error:  # the other scenes shall still arrive
-        result = {"status": Status.FAILED, "message": f"{type(error).__name__}: {error}"}
     return result | {"seconds": time.perf_counter() - begin - (sheet.deriving - derived)}
 
 
