@@ -197,12 +197,17 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     >>> print(f"{curve.best_stiffness:.3g} N/m, closed form {curve.predicted_stiffness:.3g} N/m")
     1.6e+08 N/m, closed form 1.59e+08 N/m
     """
+    if not hasattr(scene, "follower"):
+        raise ValueError(f"scene: {scene!r} is not a Scene; give one such as springtune.Scene(beam, mesh, ...)")
     if scene.follower:
         raise ValueError(
             f"load: {scene.load!r} turns with its side, and stiffness enters as force over stiffness only where forces "
             "keep their direction; take 'pressure' or linear kinematics"
         )
-    ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
+    try:
+        ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
+    except (TypeError, ValueError):
+        ratios = np.zeros(0)
     if not len(ratios) or not (np.isfinite(ratios) & (ratios > 0)).all():
         raise ValueError("stiffness_ratios: not all above zero; give stiffnesses over E t such as [0.5, 0.8, 1.1]")
     beam, kind, force = scene.beam, scene.kind, scene.force

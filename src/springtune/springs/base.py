@@ -138,6 +138,13 @@ class Definition(Declared):
         >>> print(f"{found.reference:.4g} N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = {3 ** 0.5 / 2 * 210e9 * 1e-3:.4g}")
         1.819e+08 N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = 1.819e+08
         """
+        for one, kind, name in ((mesh, Mesh, "mesh"), (material, Material, "material")):
+            if not isinstance(one, kind):
+                raise DefinitionError(f"{name}: {one!r} is not a {kind.__name__}; give a springtune.{kind.__name__}")
+        told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
+        for name, value in told:
+            if not (isinstance(value, int | float | np.number) and 0 < value < math.inf):
+                raise DefinitionError(f"{name}: {value!r} is not a number above zero; give one in SI units")
         arguments = (given,) if self.needs else ()
         return self.function(mesh, material, thickness, *arguments)
 

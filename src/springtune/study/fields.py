@@ -11,7 +11,7 @@ from pydantic_core import CoreSchema, core_schema
 from .. import units
 from ..mesh import MESH_TYPES
 from ..problem.loads import KINEMATICS, LOADS
-from ..problem.quantities import nearest
+from ..problem.quantities import beyond, nearest
 from ..springs import DEFINITIONS
 from .messages import refuse, show
 from .model import FURTHER_REFERENCES
@@ -67,6 +67,8 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
             raise refuse(str(error)) from None
         if not number > 0:
             raise refuse(f"{show(value)} is not above zero; {negative}, such as '{example}'")
+        if beyond(number, kind):
+            raise refuse(f"{show(value)} is beyond all measure; give a {kind} such as '{example}'")
         return number
 
     schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
