@@ -187,6 +187,8 @@ def predict(beam: Beam, mesh: Mesh, material: Material, known: References | None
     is_a(mesh, Mesh, "mesh", A_MESH)
     is_a(material, Material, "material", A_MATERIAL)
     check_filled(mesh, beam)
+    if known is not None and not (isinstance(known, dict) and set(CASES) <= set(known)):
+        raise ValueError(f"known: {known!r} has no references; give what springtune.prediction.references returns")
     known = references(beam, material) if known is None else known
     sheet, seen, refusals = _Sheet(mesh, beam, material, known), set(), []
     choices: list[Choice] = []

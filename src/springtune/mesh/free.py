@@ -42,6 +42,7 @@ def free(length: float, height: float, size: float) -> Mesh:
 
     check_box(length, height, size)
     # Lengths in units of the edge: netgen's own tolerances are absolute.
+    size = min(size, max(length, height))  # a side of less than an edge is one edge, and netgen bears no tiny boxes
     box = np.array([length, height]) / size
     outline = SplineGeometry()
     corners = [outline.AppendPoint(*(box * corner)) for corner in ((0, 0), (1, 0), (1, 1), (0, 1))]

@@ -7,10 +7,14 @@ from numbers import Real
 from typing import TypeVar
 
 from ..registry import Declared, Registry
-from .cells import Mesh, MeshError
+from .cells import SIDES, Mesh, MeshError
 
 MOST_MESHED = 10_000_000
 """Particles beyond which no mesh is made: its edges alone take gigabytes."""
+
+
+LARGEST_SIZE = 1000.0
+"""Mesh size over the smaller side of a box from which it is taken for an error: cells become slivers [1]."""
 
 
 def check_box(length: float, height: float, size: float) -> None:
@@ -24,13 +28,15 @@ def check_box(length: float, height: float, size: float) -> None:
     Raises
     ------
     MeshError
-        If one is no finite number above zero, or there would be too many particles.
+        If one is no finite number above zero, the size absurdly large, or there would be too many particles.
     """
     for name, value in (("length", length), ("height", height), ("size", size)):
         number = isinstance(value, Real) and not isinstance(value, bool)
-        if not (number and math.isfinite(value) and value > 0):
+        if not (number and 1e-40 <= value <= 1e40):
             raise MeshError(f"{name}: {value!r} is not a number above zero; give one in m")
-    if not (length / size) * (height / size) <= 2 * MOST_MESHED:
+    if size > LARGEST_SIZE * min(length, height):
+        raise MeshError(f"size: {size!r} is no size of {length:g} x {height:g} m; give at most {min(length, height):g}")
+    if not max(length / size, 1.0) * max(height / size, 1.0) <= 2 * MOST_MESHED:
         least = f"{1e3 * math.sqrt(length * height / MOST_MESHED):.2g} mm"
         raise MeshError(f"size: {size!r} makes too many particles of {length:g} x {height:g} m; give at least {least}")
 
@@ -205,6 +211,10 @@ def mesh_type(
     """
 
     def declare(function: Function) -> Function:
+        if corners not in SIDES:
+            raise ValueError(f"mesh type {name!r}: corners {corners!r}; cells have 3 or 4")
+        if not (isinstance(row_height, Real) and 0 < row_height < math.inf):
+            raise ValueError(f"mesh type {name!r}: row_height {row_height!r} is not a number above zero; give one")
         MESH_TYPES.declare(MeshType(name, function, order, corners, row_height, tuple(packages), own_stretch))
         return function
 
