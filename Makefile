@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-fuzz slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -24,12 +24,18 @@ paper: $(VENV)/.run
 
 # Files in this order, those that take longest first: at the end no core waits for the other.
 test: $(VENV)/.test
-	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/physics tests/unit src
+	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
 test-browser: $(VENV)/.test
 	pytest -m "not slow" tests/browser
+
+# Spoiled studies, mesh files and datasets by the thousand; INPUTS and SEED choose others. Some minutes.
+INPUTS ?= 20000
+SEED ?= 1
+test-fuzz: $(VENV)/.test
+	OPENBLAS_NUM_THREADS=1 python tests/fuzz $(INPUTS) $(SEED)
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow

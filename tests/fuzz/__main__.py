@@ -3,11 +3,14 @@
 import os
 import sys
 import time
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from multiprocessing import get_context
+from pathlib import Path
 
-import harness
-import targets
+sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `synthetic`
+
+import harness  # noqa: E402
+import targets  # noqa: E402
 
 INPUTS, PROCESSES = 20_000, 2
 
@@ -20,7 +23,11 @@ def _part(task):
 def main():
     inputs = int(sys.argv[1]) if len(sys.argv) > 1 else INPUTS
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    with open(os.devnull, "w") as quiet, redirect_stdout(quiet):  # meshio warns of what it leaves out
+    with (
+        open(os.devnull, "w") as quiet,
+        redirect_stdout(quiet),
+        redirect_stderr(quiet),
+    ):  # meshio warns of what it leaves out
         targets.warm_up()
     begin, tasks = time.monotonic(), []
     for number, target in enumerate(targets.TARGETS):

@@ -6,6 +6,7 @@ tells what became of each; where it dies, that input is to blame and another wor
 are those of the processor and bytes those of the process, so that a busy machine decides nothing.
 """
 
+import faulthandler
 import os
 import pickle
 import random
@@ -24,6 +25,9 @@ from pathlib import Path
 
 MOST_SECONDS = 10
 """Of the processor, for one input."""
+
+SLACK = 2
+"""Seconds besides, after which a process is ended that does not come to an end by itself."""
 
 MOST_BYTES = 1_000_000_000
 """Of memory, for one input: what the process has, imports and all."""
@@ -145,8 +149,10 @@ def _batch(target, numbers, seed):
 
 def _work(target, numbers, seed, writing):
     """Read inputs in this process, which is at its end then."""
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(devnull, 1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    faulthandler.disable()
+    said = tempfile.TemporaryFile()  # what libraries write past Python, and Python past us
+    os.dup2(said.fileno(), 2)
     _, most = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (_address_space() + 2 * MOST_BYTES, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -161,8 +167,12 @@ def _work(target, numbers, seed, writing):
             _forget_peak()
             begin = time.process_time()
             _, most = resource.getrlimit(resource.RLIMIT_CPU)
-            resource.setrlimit(resource.RLIMIT_CPU, (int(begin) + MOST_SECONDS + 2, most))
+            resource.setrlimit(resource.RLIMIT_CPU, (int(begin) + MOST_SECONDS + SLACK, most))
+            said.truncate(0)
             outcome, message = _read(target, made)
+            text = os.pread(said.fileno(), 2000, 0)
+            if outcome != "broken" and b"Traceback" in text:
+                outcome, message = "broken", f"writes past us: {text.decode(errors='replace')}"
             pickle.dump((number, outcome, message, time.process_time() - begin, _peak()), pipe)
             pipe.flush()
             shutil.rmtree(here)

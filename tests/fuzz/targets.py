@@ -294,7 +294,7 @@ def read_dataset(made):
         if how == 0:
             page(path)
             return "accepted"
-        reading.check_opens(path)
+        reading.check_links(path)
         with reading.open(path) as tree, reading.guarded(path):
             if how == 1:
                 info_text(tree, path)

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import h5netcdf
+import h5py
 import jinja2
 from markupsafe import Markup
 
@@ -71,7 +72,8 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
     try:
-        with guarded(path), h5netcdf.File(path, decode_vlen_strings=True) as file:
+        # Opened first: of what it cannot open h5netcdf leaves a half-made file that complains when it is forgotten.
+        with guarded(path), h5py.File(path) as opened, h5netcdf.File(opened, decode_vlen_strings=True) as file:
             check_size(path, held(file))
             groups, contents = packed(file)
     except OSError as error:

@@ -1,8 +1,6 @@
 """Opening the dataset of a study."""
 
 import os
-import signal
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -82,34 +80,51 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     return tree
 
 
-def check_opens(path: str | os.PathLike[str]) -> None:
-    """Refuse a file on which the library of netCDF would end this process: a child opens it first.
+def check_links(path: str | os.PathLike[str]) -> None:
+    """Refuse a file whose arrays do not tell their dimensions as netCDF does: its library ends this process on some.
 
-    It does so where parts of the file were taken out or renamed by other programs. Commands can afford to know; `open`
-    cannot, in a process with threads and data of its user. Nothing is checked where processes cannot be forked.
+    So it does where another program has changed the attributes by which arrays and dimensions know each other.
 
     Parameters
     ----------
     path : str or Path
+        A dataset, or its folder; nothing is said of one that is not there or is no HDF5 file: `open` does.
 
     Raises
     ------
     ValueError
     """
-    if not hasattr(os, "fork"):
+    import h5py
+
+    found: list[str] = []
+
+    def look(name: bytes) -> None:
+        one = h5py.h5o.open(file.id, name)
+        if not isinstance(one, h5py.h5d.DatasetID):
+            return
+        rank = one.get_space().get_simple_extent_ndims()
+        for attribute, kind, shape in (
+            (b"DIMENSION_LIST", h5py.h5t.VLEN, (rank,)),
+            (b"_Netcdf4Coordinates", h5py.h5t.INTEGER, (rank,)),
+            (b"_Netcdf4Dimid", h5py.h5t.INTEGER, ()),
+            (b"CLASS", h5py.h5t.STRING, ()),
+        ):
+            if h5py.h5a.exists(one, attribute):
+                held = h5py.h5a.open(one, attribute)
+                if held.get_type().get_class() != kind or held.shape != shape:
+                    found.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
+
+    path = Path(path)
+    path = path / "dataset.nc" if path.is_dir() else path
+    try:
+        with guarded(path), h5py.File(path) as file:
+            h5py.h5o.visit(file.id, look)
+    except OSError:
         return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of threads that numpy has, and which a child that opens a file does not need
-        child = os.fork()
-    if not child:
-        try:
-            open(path)
-        finally:
-            os._exit(0)
-    status = os.waitpid(child, 0)[1]
-    if os.WIFSIGNALED(status):
-        name = signal.Signals(os.WTERMSIG(status)).name
-        raise ValueError(f"{path}: is damaged (the library of netCDF ends by {name} on it); {REMEDY}")
+    if found:
+        raise ValueError(
+            f"{path}: is damaged, or changed by another program ({found[0]} is none of netCDF's); {REMEDY}"
+        )
 
 
 def check_size(path: Path, held: float) -> None:
