@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-versions slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	snakemake --configfile $(STUDY)
@@ -34,6 +34,10 @@ test-browser: $(VENV)/.test
 # Every write, rename and opening of a file of a small study failed once, by an error, by a full disk and by a kill.
 test-faults: $(VENV)/.test
 	pytest -n 2 tests/faults
+
+# The same numbers by SuperLU and by CHOLMOD, and with the oldest packages that pyproject.toml allows, which are installed.
+test-versions: $(VENV)/.test
+	pytest -rs tests/versions
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow
