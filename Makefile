@@ -13,7 +13,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 .PHONY: study report paper test test-browser test-faults test-versions slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
-	snakemake --configfile $(STUDY)
+	springtune run $(STUDY)
 
 # One file with the study's results, captions and run times, to be opened without a network.
 report: study

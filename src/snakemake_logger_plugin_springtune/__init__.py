@@ -6,6 +6,7 @@ something to do.
 
 import os
 import sys
+from argparse import ArgumentError, ArgumentParser
 from logging import ERROR, WARNING, LogRecord
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from logging import Handler
 
     from .display import Display
@@ -40,6 +42,34 @@ NOTHING = "Nothing to be done"
 """Beginning of the message of a run that finds everything made."""
 
 
+def _check_study(arguments: "Sequence[str]") -> None:
+    """End Snakemake with our message where a study is no study at all, as `springtune run` would.
+
+    Snakemake reads the file that ``--configfile`` names before the Snakefile, right after it has made its loggers: of
+    one that is missing it shows a traceback, of a tab no line, and aliases in aliases take all memory. What its own
+    parser would make of its arguments is not to be had here; that of a command in which this is not one is left to it.
+    """
+    parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    parser.add_argument("--configfile", "--configfiles", nargs="+", default=[])
+    try:
+        files = parser.parse_known_args(arguments)[0].configfile
+    except (ArgumentError, SystemExit):
+        return
+    if not files:
+        return
+    from springtune.study.messages import StudyError
+    from springtune.study.yaml_lines import read_study
+
+    try:
+        for file in files:
+            if not isinstance(read_study(file)[1], dict):
+                from springtune.kinds import load_study
+
+                load_study(file)
+    except StudyError as error:
+        sys.exit(str(error))
+
+
 class LogHandler(LogHandlerBase):
     """Handler of Snakemake's records.
 
@@ -50,6 +80,7 @@ class LogHandler(LogHandlerBase):
     """
 
     def __post_init__(self) -> None:
+        _check_study(sys.argv[1:])
         self.display: Display | None = None
         self.plain: Handler | None = None
         self.results: Path | None = None  # the Snakefile says it

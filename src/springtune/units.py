@@ -66,6 +66,12 @@ _KNOWN = {unit: (kind, Decimal(size)) for kind, units in COMMON.items() for unit
 _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.DOTALL)
 
 
+LONGEST_QUANTITY = 100
+"""Most characters of a quantity."""
+
+_TOKEN = re.compile(r"[^\W\d]\w*|[0-9.]+|\S")
+
+
 class UnitError(ValueError):
     """A text that is not a quantity of the wanted kind; the message says why and what to write instead.
 
@@ -115,6 +121,9 @@ def parse(text: str, kind: str) -> float:
     springtune.units.UnitError: '200 mm' is a length; give a force such as '400 kN'
     """
     wanted = QUANTITY_KINDS[kind]
+    if len(text) > LONGEST_QUANTITY:
+        text = f"{text[:57]}..."
+        raise UnitError(f"'{text}' is too long; give a {kind} such as '{wanted.example}'")
     remedy = f"give a {kind} such as '{wanted.example}'"
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
@@ -162,8 +171,24 @@ def _registry() -> "pint.UnitRegistry[float]":
     return pint.UnitRegistry()
 
 
+def _plain(unit: str) -> bool:
+    """Whether a unit has no powers of numbers or of powers: pint would work out ``9^9^9^9``."""
+    tokens = _TOKEN.findall(unit)
+    exponent = False  # whether the token before is a power, but for its sign
+    for before, token in zip(["", *tokens], tokens):
+        if token[0].isdigit() or token[0] == ".":
+            if not (exponent and len(token) <= 3) and token != "1":
+                return False
+        elif token == "^" and not (before[-1:].isalpha() or before == ")"):
+            return False
+        exponent = token == "^" or (exponent and token in "+-")
+    return not exponent
+
+
 @cache
 def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
+    if not _plain(unit):
+        return None
     registry = _registry()
     try:
         given = registry.parse_units(unit)

@@ -102,8 +102,8 @@ class TestOutsideThePackage:
         one = DEFINITIONS["twice"]
         assert one.summary.startswith("Springs twice as stiff") and one.file == tmp_path / "own_springs.py"
         assert displacement("twice") == pytest.approx(displacement("lattice") / 2, rel=1e-12)
-        digest = dependencies.definition_digest("twice")
-        assert digest not in {dependencies.definition_digest(name) for name in set(names) - {"twice"}}
+        digest = dependencies.definition_closure("twice").digest
+        assert digest not in {dependencies.definition_closure(name).digest for name in set(names) - {"twice"}}
 
     def test_a_mesh_type(self, outside):
         outside("own_mesh", outside_package("mesh/left.py"))
@@ -114,8 +114,8 @@ class TestOutsideThePackage:
         mesh = one(0.1, 0.02, 5e-3)
         assert mesh.area == pytest.approx(2e-3)
         assert displacement("lattice", "left") == pytest.approx(displacement("lattice", "right"), rel=0.01)
-        digest = dependencies.mesh_type_digest("left")
-        assert digest not in {dependencies.mesh_type_digest(name) for name in set(names) - {"left"}}
+        digest = dependencies.mesh_type_closure("left").digest
+        assert digest not in {dependencies.mesh_type_closure(name).digest for name in set(names) - {"left"}}
 
     def test_what_a_file_imports_from_beside_it_is_part_of_its_digest(self, tmp_path, monkeypatch):
         text, digests = outside_package("springs/twice.py"), set()
@@ -127,7 +127,7 @@ class TestOutsideThePackage:
             (folder / f"own{number}.py").write_text(text)
             monkeypatch.syspath_prepend(folder)
             importlib.import_module(f"own{number}")
-            digests.add(dependencies.definition_digest("twice"))
+            digests.add(dependencies.definition_closure("twice").digest)
             DEFINITIONS.discard("twice")
             sys.modules.pop(f"own{number}")
         assert len(digests) == 2
@@ -170,13 +170,13 @@ from springtune.springs import DEFINITIONS
 import springtune
 found = {
     "place": springtune.__file__,
-    "DEFINITIONS": {name: dependencies.definition_digest(name) for name in DEFINITIONS},
-    "MESH_TYPES": {name: dependencies.mesh_type_digest(name) for name in MESH_TYPES},
+    "DEFINITIONS": {name: dependencies.definition_closure(name).digest for name in DEFINITIONS},
+    "MESH_TYPES": {name: dependencies.mesh_type_closure(name).digest for name in MESH_TYPES},
     "light": not {"scipy", "h5py", "meshio", "netgen", "xarray", "pydantic"} & set(sys.modules),
 }
 from springtune.campaign import plan
 stages = {one.module: {"definitions": one.definitions, "mesh_types": one.mesh_types} for one in plan.stages()}
-found["stages"] = {stage: dependencies.digest(stage) for stage in stages}
+found["stages"] = {stage: dependencies.stage_closure(stage).digest for stage in stages}
 found["modules"] = {stage: dependencies.modules(stage, **chosen) for stage, chosen in stages.items()}
 print(json.dumps(found))
 """
@@ -238,6 +238,8 @@ def check(added, registry, name, after, choosing):
         assert set(modules) - set(before["modules"][stage]) == ({str(path)} if stage in choosing else set()), stage
     assert found["light"]
     path.write_text(path.read_text() + "\n# Edited.\n")
+    assert report(added[0])[registry] == found[registry]
+    path.write_text(path.read_text() + "\nEDITED = True\n")
     edited = report(added[0])
     assert [one for one in edited[registry] if edited[registry][one] != found[registry][one]] == [name]
     assert edited["stages"] == found["stages"]

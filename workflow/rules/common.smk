@@ -12,6 +12,7 @@ from snakemake.settings.enums import Quietness
 from springtune.campaign import due, locks
 from springtune.campaign.plan import plan, stages
 from springtune.jobs.atomic import remove_unfinished
+from springtune.jobs.dependencies import CODE_FILE, OURS
 from springtune.kinds import load_study
 from springtune.kinds.base import FORMATS
 from springtune.study import StudyError
@@ -54,6 +55,7 @@ CONFIG = chosen_config()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
+OURS.recall(RESULTS.parent / CODE_FILE)
 PLAN = plan(STUDY, RESULTS, workflow.cores or 1)
 JOBS = due.jobs(STUDY, PLAN)
 READ = workflow.__dict__.setdefault("studies_read", [])  # the one that is run; for the paper, those that it reads besides
@@ -123,6 +125,7 @@ def begin():
         one.write()
         remove_unfinished(one.folder)
         remove_unfinished(one.folder.parent, below=False)  # of what studies share
+    OURS.remember(RESULTS.parent / CODE_FILE)
     tell_start()
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..jobs import records, sealed
-from ..jobs.keys import hash_of, stage_key
+from ..jobs.hashing import hash_of
+from ..jobs.keys import stage_key
 from ..jobs.run_tasks import RECORDS
 from ..kinds import KINDS, kinds, outputs
 from ..kinds.base import FORMATS
@@ -230,4 +231,4 @@ def is_damage(why: str) -> bool:
     why : str
         As of `fault`.
     """
-    return why.endswith(("is damaged", "is missing"))
+    return why.endswith((records.DAMAGED, records.MISSING))

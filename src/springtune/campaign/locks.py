@@ -55,13 +55,51 @@ def _note() -> Path:
     return RUNS / f"{platform.node()}_{os.getpid()}.json"
 
 
+def is_held(folder: Path) -> bool:
+    """Whether a run has locked a study; that it is gone may be seen from a lock that is stale.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are: ``results/<study>`` in the folder that runs are called in.
+
+    Returns
+    -------
+    bool
+        True where there are locks, and all of them are stale.
+
+    Raises
+    ------
+    LockedError
+        If the process is alive, or on another machine.
+    """
+    place = folder.parent.parent
+    if not any(_is_on(path, folder) for path in _files(place / LOCKS, "*.lock")):
+        return False
+    noted = False
+    for _, note in _notes(place):
+        if Path(folder.parent.name, folder.name) not in map(Path, note["folders"]):
+            continue
+        noted = True
+        if note["host"] != platform.node():
+            raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
+        if _is_alive(note):
+            raise LockedError(_told(folder, note, "on this machine"))
+    # A run that was killed before it noted anything.
+    other = None if noted else _running_in(place)
+    if other is not None:
+        remedy = f"wait for its end, or stop it: kill {other}"
+        raise LockedError(f"{folder}: process {other} computes in this folder; {remedy}")
+    return True
+
+
 def release(folder: Path) -> str:
     """Remove locks on a study that a process which is gone has left.
 
     Parameters
     ----------
     folder : Path
-        Where its results are.
+        As of `is_held`.
 
     Returns
     -------
@@ -71,27 +109,17 @@ def release(folder: Path) -> str:
     Raises
     ------
     LockedError
-        If the process is alive, or on another machine.
+        As `is_held`.
     """
-    locks = [path for path in _files(LOCKS, "*.lock") if _is_on(path, folder)]
-    if not locks:
+    if not is_held(folder):
         return ""
-    for path, note in _notes():
-        if str(folder) not in note["folders"]:
-            continue
-        if note["host"] != platform.node():
-            raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
-        if _is_alive(note):
-            raise LockedError(_told(folder, note, "on this machine"))
-        path.unlink(missing_ok=True)
-    # A run that was killed before it noted anything.
-    other = _running_here()
-    if other is not None:
-        raise LockedError(
-            f"{folder}: process {other} computes in this folder; wait for its end, or stop it: kill {other}"
-        )
-    for path in locks:
-        path.unlink(missing_ok=True)
+    place = folder.parent.parent
+    for path in _files(place / LOCKS, "*.lock"):
+        if _is_on(path, folder):
+            path.unlink(missing_ok=True)
+    for path, note in _notes(place):
+        if note["host"] == platform.node() and not _is_alive(note):
+            path.unlink(missing_ok=True)
     return f"{folder}: the run before was killed and left its lock; the lock is removed"
 
 
@@ -109,13 +137,14 @@ def _files(folder: Path, pattern: str) -> list[Path]:
 
 def _is_on(lock: Path, folder: Path) -> bool:
     try:
-        return any(Path(line).is_relative_to(folder) for line in lock.read_text(errors="replace").splitlines())
+        named = Path(folder.parent.name, folder.name)  # Snakemake names files from where it was called
+        return any(Path(line).is_relative_to(named) for line in lock.read_text(errors="replace").splitlines())
     except OSError:
         return False
 
 
-def _notes() -> Iterator[tuple[Path, dict[str, Any]]]:
-    for path in _files(RUNS, "*.json"):
+def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
+    for path in _files(place / RUNS, "*.json"):
         note = sealed.read(path)
         if note is not None:
             yield path, note
@@ -132,15 +161,17 @@ def _is_alive(note: dict[str, Any]) -> bool:
         return False
 
 
-def _running_here() -> int | None:
-    """Another process of Snakemake in this folder that computes."""
+def _running_in(place: Path) -> int | None:
+    """Another process of Snakemake in a folder that computes."""
     import psutil
 
     own = psutil.Process()
     family = {own.pid, *(process.pid for process in own.parents())}
     for process in psutil.process_iter():
         try:
-            if process.pid in family or process.status() == psutil.STATUS_ZOMBIE or process.cwd() != str(Path.cwd()):
+            if process.pid in family or process.status() == psutil.STATUS_ZOMBIE:
+                continue
+            if Path(process.cwd()) != place.resolve():
                 continue
             words = process.cmdline()
         except psutil.Error:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..jobs import bundles, sealed
-from ..jobs.keys import hash_of
+from ..jobs.hashing import hash_of
 from ..jobs.run_tasks import RECORDS, TASKS
 from ..kinds import kinds
 
@@ -94,6 +94,8 @@ class Plan:
     ----------
     folder : Path
         Where the study's results go.
+    limits : dict
+        Of one task, see `springtune.study.model.Study`.
     bundles : dict
         What each bundle holds, by stage and label, and the cores that they are made for.
     jobs : dict of str to Tasks
@@ -101,6 +103,7 @@ class Plan:
     """
 
     folder: Path
+    limits: dict[str, float]
     bundles: dict[str, Any]
     jobs: dict[str, Tasks]
 
@@ -123,6 +126,7 @@ class Plan:
             notes[self.tasks(name)] = {
                 "digest": job.digest,
                 "module": job.stage.module,
+                "limits": self.limits,
                 "products": list(job.products),
                 "content": job.content,
             }
@@ -166,12 +170,12 @@ def plan(study: "Study", folder: Path, cores: int) -> Plan:
     jobs = {
         job.name: job for stage in stages() for job in _jobs(stage, study, folder, shared[stage.like or stage.name])
     }
-    return Plan(folder, found | {"cores": before["cores"]}, jobs)
+    return Plan(folder, study.limits, found | {"cores": before["cores"]}, jobs)
 
 
 def _jobs(stage: "Stage", study: "Study", folder: Path, shared: dict[str, list[Any]]) -> Iterator[Tasks]:
     for label, one in shared.items():
         content = stage.content(study, folder, one)
         if content:
-            digest = hash_of(stage.module, content)
+            digest = hash_of(stage.module, content, study.limits)
             yield Tasks(stage, label, content, digest, tuple(map(str, stage.products(content))))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..jobs.damage import ASIDE
 from ..output.text import aligned, without_numbers
 from ..problem.status import Status
 from .plan import Plan
@@ -190,6 +191,9 @@ def ending(study: "Study", plan: Plan, since: float) -> str:
     """
     new, took = _computed(plan, since), clock(time.time() - since)
     rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
+    aside = [path for path in plan.folder.rglob(f"*{ASIDE}") if path.stat().st_ctime >= since]
+    if aside:
+        rows.insert(1, ["damaged", f"{len(aside)} set aside and made again: {', '.join(map(str, aside[:NAMED]))}"])
     return f"\n{_stored(study, plan)}\n{aligned(rows, 0)}\n"
 
 
@@ -206,7 +210,9 @@ def broken(study: "Study", plan: Plan, since: float) -> str:
     str
     """
     _, logs = _undone(plan, since)
-    lines = [f"{study.name} is not complete: a job failed or was stopped.", *(f"  its log: {path}" for path in logs)]
+    lines = [f"{study.name} is not complete: a job failed or was stopped."]
+    for path in logs:
+        lines += [f"  {_last(path)}", f"    its log: {path}"]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
 
@@ -228,6 +234,12 @@ def beside(study: "Study", plan: Plan, since: float) -> str:
     lines = [f"new in {study.name}: {_computed(plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
     return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
+
+
+def _last(log: Path) -> str:
+    """What a job said last: why it failed."""
+    said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
+    return said[-1].strip() if said else "it said nothing"
 
 
 def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
@@ -288,7 +300,7 @@ def _computed(plan: Plan, since: float) -> str:
         record, stage = plan.record(name), job.stage.name
         number = computed(record)
         if number is not None:
-            asked[stage] = asked.get(stage, 0) + len(keys_of(job.content))
+            asked[stage] = asked.get(stage, 0) + len(set(keys_of(job.content)))
             new[stage] = new.get(stage, 0) + (number if _time(record) >= since else 0)
     told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if not told:

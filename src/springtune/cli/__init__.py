@@ -22,12 +22,14 @@ class Row(NamedTuple):
 STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
 
 COMMANDS = {
+    "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition and its stiffness for one mesh."),
     "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
+    "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
     "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "schema", "schema", "Print the JSON schema of studies, or renew it and the manual."),
     "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),
@@ -63,9 +65,9 @@ class Commands(click.Group):
     cls=Commands,
     epilog=examples(
         "springtune scenes config/paper.yaml",
+        "springtune run config/paper.yaml",
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
         "springtune browse results/paper",
-        "snakemake --configfile config/paper.yaml",
     ),
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -73,7 +75,7 @@ class Commands(click.Group):
 def main() -> None:
     """Tune the stiffness of 2-D mass-spring models against finite elements.
 
-    Studies are run by Snakemake, see the last example. `springtune COMMAND --help` has examples of each command. A
+    Studies are run by Snakemake, which `springtune run` calls. `springtune COMMAND --help` has examples of each. A
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """

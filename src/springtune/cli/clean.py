@@ -1,19 +1,14 @@
 """What studies no longer ask for: listed, and removed on request."""
 
 from collections import defaultdict
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from ..output.text import bytes_text
 from .examples import examples
+from .folders import studies
 
-if TYPE_CHECKING:
-    from ..study import Study
-
-RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
 LISTED = 12
 """Files of a folder that are listed by name."""
 
@@ -32,7 +27,7 @@ def clean(study: Path | None, remove: bool) -> None:
     from ..study import StudyError
 
     try:
-        chosen = list(_studies(study))
+        chosen = list(studies(study))
         found = {folder: orphans(one, folder) for one, folder in chosen}
     except StudyError as error:
         raise click.ClickException(f"{error}; nothing is listed or removed") from None
@@ -65,35 +60,11 @@ def clean(study: Path | None, remove: bool) -> None:
     click.echo(f"removed {count} files, {bytes_text(total)}")
 
 
-def _studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
-    """Studies with the folders of their results."""
-    from ..kinds import load_study
-
-    if given is not None and not given.is_dir():
-        study = load_study(given)
-        folder = RESULTS_FOLDER / study.name
-        if not folder.is_dir():
-            raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
-        yield study, folder
-        return
-    if given is None and not RESULTS_FOLDER.is_dir():
-        raise click.ClickException(f"{RESULTS_FOLDER}: there is no such folder; go to where studies were run")
-    folders = [given] if given else sorted(path for path in RESULTS_FOLDER.iterdir() if path.is_dir())
-    for folder in folders:
-        config = folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
-        if config.is_file():
-            yield load_study(config), folder
-        elif given:
-            raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
-        else:
-            click.echo(f"{folder}: left alone, there is no {config}; give the study's YAML file, or remove it by hand")
-
-
 def _idle(folder: Path) -> None:
-    """Refuse to remove anything under a run; those of a folder's study leave their locks beside `results`."""
-    locks = folder.parent.parent / ".snakemake/locks"
-    if locks.is_dir() and any(locks.iterdir()):
-        raise click.ClickException(
-            f"{locks}: a run is under way, nothing is removed; wait for its end, or, if it was stopped, call "
-            "`snakemake --unlock`"
-        )
+    """Refuse to remove anything under a run."""
+    from ..campaign.locks import LockedError, is_held
+
+    try:
+        is_held(folder)
+    except LockedError as error:
+        raise click.ClickException(f"{error}; nothing is removed") from None

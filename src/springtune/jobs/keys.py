@@ -1,64 +1,71 @@
-"""Keys of results: hashes of all that they depend on, code and libraries included."""
+"""Keys of results: hashes of all that they depend on, code and packages included.
 
-import hashlib
-import json
+Of Python itself the minor version counts: the sum of floats is another from 3.12 on, and compiled packages differ.
+"""
+
 import os
+import sys
 from dataclasses import asdict
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ..mesh import MESH_TYPES
-from .dependencies import digest, mesh_type_digest
+from . import dependencies
+from .hashing import hash_of
 
 if TYPE_CHECKING:
     from ..problem.geometry import Beam
     from ..problem.materials import Material
 
 
-def hash_of(*parts: Any) -> str:
-    """Hash of what a result depends on.
-
-    Parameters
-    ----------
-    *parts : object
-        Nested dicts, lists, texts and numbers.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
-    True
-    """
-    text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-
-def installed(package: str) -> str:
-    """Version of a package; "none" where it is an extra that is not there, or not wanted."""
+@cache
+def installed(distribution: str) -> str:
+    """Version of a distribution; "none" where it is an extra that is not there, or not wanted."""
     from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
 
-    unused = package == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"
+    unused = distribution == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"
     try:
-        return "none" if unused else version(package)
+        return "none" if unused else version(distribution)
     except PackageNotFoundError:
         return "none"
 
 
 @cache
-def stage_key(module: str, *packages: str) -> list[str]:
-    """What the results of a stage depend on besides their parameters: its modules and these packages."""
-    return [digest(module), *(f"{package} {installed(package)}" for package in packages)]
+def stage_key(*modules: str, without: tuple[str, ...] = ()) -> str:
+    """What results of modules depend on besides their parameters: their code, and versions of the packages it uses.
+
+    Parameters
+    ----------
+    *modules : str
+        From the package on, such as ``"kinds.scenes.solve"``.
+    without : tuple of str, optional
+        Modules that they import for other results than those that are asked about.
+
+    Returns
+    -------
+    str
+        Definitions and mesh types are not in it, see `definition_key` and `mesh_type_key`.
+    """
+    return code_key(dependencies.stage_closure(*modules, without=without))
+
+
+def definition_key(name: str) -> str:
+    """What springs of a definition depend on besides their parameters."""
+    return code_key(dependencies.definition_closure(name))
+
+
+def mesh_type_key(name: str) -> str:
+    """What meshes of a type depend on besides their parameters, and those from files besides their content."""
+    if name not in MESH_TYPES:
+        return code_key(dependencies.mesh_file_closure())
+    return code_key(dependencies.mesh_type_closure(name))
 
 
 @cache
-def mesh_type_key(name: str) -> list[str]:
-    """What meshes of a type depend on besides their parameters; nothing that is known of meshes from files."""
-    if name not in MESH_TYPES:
-        return []
-    return [mesh_type_digest(name), *(f"{package} {installed(package)}" for package in MESH_TYPES[name].packages)]
+def code_key(code: dependencies.Closure) -> str:
+    """Key of code, and of the versions of the packages that it uses."""
+    versions = (f"{name} {installed(name)}" for name in map(dependencies.distribution, code.packages))
+    return hash_of(code.digest, [f"python {sys.version_info[0]}.{sys.version_info[1]}", *sorted(set(versions))])
 
 
 @cache

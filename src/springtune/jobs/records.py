@@ -11,6 +11,9 @@ from typing import Any
 
 from . import sealed
 
+MISSING, DAMAGED = " is missing", " is damaged"
+"""How a fault ends that begins with a file which is not as it was made."""
+
 
 def checksum(path: str | Path) -> str:
     """SHA-256 of a file.
@@ -36,14 +39,16 @@ def write(path: str | Path, digest: str, products: Iterable[str | Path], **more:
     digest : str
         Of all that it was to do.
     products : iterable of str or Path
-        Files that it made.
+        Files that it was to make; one that is not there could not be made, and what it made instead says why.
     **more
         What else is to be told of it.
     """
-    made = {}
+    made: dict[str, list[Any] | None] = {}
     for product in map(Path, products):
-        state = product.stat()
-        made[str(product)] = [state.st_size, state.st_mtime_ns, checksum(product)]
+        made[str(product)] = None
+        if product.exists():
+            state = product.stat()
+            made[str(product)] = [state.st_size, state.st_mtime_ns, checksum(product)]
     sealed.write(path, {"digest": digest, "products": made} | more)
 
 
@@ -71,19 +76,22 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
         return "not done yet"
     record = sealed.read(path)
     if record is None:
-        return f"{path} is damaged"
+        return f"{path}{DAMAGED}"
     if record["digest"] != digest:
         return "something else is asked for"
     for product in map(Path, products):
+        known = record["products"].get(str(product))
         try:
             state = product.stat()
         except OSError:
-            return f"{product} is missing"
-        if str(product) not in record["products"]:
-            return f"{product} is not among what was made"
-        size, time, content = record["products"][str(product)]
+            if known is None:
+                continue
+            return f"{product}{MISSING}"
+        if known is None:
+            return f"{product} is not what this job made"
+        size, time, content = known
         if (wholly or state.st_mtime_ns != time or state.st_size != size) and (
             state.st_size != size or checksum(product) != content
         ):
-            return f"{product} is damaged"
+            return f"{product}{DAMAGED}"
     return ""

@@ -1,11 +1,13 @@
 """A job of a stage: ``python -m springtune.jobs.run_tasks TASKS DONE DIGEST``.
 
 What is to do is the note ``TASKS``; the module that it names does it, and ``DONE`` records what was done and made. A
-stored file that turns out to be damaged is set aside and made again, in the job that needs it.
+stored file that turns out to be damaged is set aside and made again, in the job that needs it. A task that goes beyond
+its limits is lost, and the others are done; a program that is broken ends the job when all other tasks are done.
 """
 
 import os
 import sys
+import traceback
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -13,12 +15,16 @@ from typing import Any, TypeVar
 
 from . import records, sealed
 from .damage import DamagedError, set_aside
+from .guard import Watch, guarded
 from .spent import Spent
 
 Made = TypeVar("Made")
 
 TASKS, RECORDS = "tasks", "done"
 """Folders of a study: what each job of a stage is to do, and what each job has done."""
+
+TRACEBACKS = 3
+"""Most tracebacks of one job's log; tasks that are alike fail alike."""
 
 
 def main(tasks: str, done: str, digest: str) -> None:
@@ -27,8 +33,8 @@ def main(tasks: str, done: str, digest: str) -> None:
     Parameters
     ----------
     tasks : str
-        The note: ``digest``, ``module`` (of the package, with a function ``run(content, spent)``), ``content`` for that
-        and ``products``, files that it makes.
+        The note: ``digest``, ``limits``, ``module`` (of the package, with functions ``run(content, spent)`` and
+        ``lose(content, key, why, limits)``), ``content`` for these and ``products``, files that it makes.
     done : str
         Record to write.
     digest : str
@@ -37,12 +43,23 @@ def main(tasks: str, done: str, digest: str) -> None:
     note = sealed.read(tasks)
     if note is None or note["digest"] != digest:
         raise SystemExit(f"{tasks}: not what this job is to do; call the same command again, it writes it anew")
-    mended(lambda: _do(note, done), Path(tasks).parents[1])
+    module = import_module(f"springtune.{note['module']}")
+    watch = Watch(note["limits"])
+    spent = Spent(watch)
+    guarded(
+        lambda: mended(lambda: _do(note, done, spent), Path(tasks).parents[1]),
+        watch,
+        lambda key, why: module.lose(note["content"], key, why, watch.words),
+    )
 
 
-def _do(note: dict[str, Any], done: str | Path) -> None:
-    spent = Spent()
+def _do(note: dict[str, Any], done: str | Path, spent: Spent) -> None:
     import_module(f"springtune.{note['module']}").run(note["content"], spent)
+    if spent.broken:
+        for error in spent.broken[:TRACEBACKS]:
+            traceback.print_exception(error)
+        first = traceback.format_exception_only(spent.broken[0])[-1].strip()
+        raise SystemExit(f"the program is broken: {len(spent.broken)} of this job's tasks raised {first}")
     records.write(done, note["digest"], note["products"], **spent.summary())
 
 
@@ -80,7 +97,7 @@ def _make_again(product: Path, folder: Path) -> None:
         if note is not None and str(product) in note["products"]:
             done = folder / RECORDS / path.name
             before = done.stat() if done.exists() else None
-            mended(lambda note=note, done=done: _do(note, done), folder)  # type: ignore[misc]
+            mended(lambda note=note, done=done: _do(note, done, Spent()), folder)  # type: ignore[misc]
             if before:  # what waited for it has no reason to run again
                 os.utime(done, ns=(before.st_atime_ns, before.st_mtime_ns))
             return

@@ -1,12 +1,30 @@
-"""What the tasks of a job cost."""
+"""The tasks of a job: what each costs, which limits it has, and what becomes of one that fails."""
 
 import time
 from collections import defaultdict
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .guard import Watch
+
+
+LOST = "beyond limits"
+"""What tasks are counted as that went beyond their limits."""
 
 
 class Spent:
-    """What the tasks of a job cost, for the file that says it is done.
+    """What the tasks of a job cost, for the record that says it is done.
+
+    Parameters
+    ----------
+    watch : Watch, optional
+        Keeps each task within its limits; there are none without.
+
+    Attributes
+    ----------
+    broken : list of Exception
+        What was raised by a program that is broken.
 
     Examples
     --------
@@ -17,9 +35,53 @@ class Spent:
     {'linear': [2, 250.0, 0.75]}
     """
 
-    def __init__(self) -> None:
+    def __init__(self, watch: "Watch | None" = None) -> None:
         self.start_up = time.process_time()  # spent on imports so far
         self.sums: dict[str, list[float]] = defaultdict(lambda: [0, 0.0, 0.0])
+        self.watch = watch
+        self.broken: list[Exception] = []
+
+    @property
+    def limits(self) -> str:
+        """Limits of a task in words, which a result that is lost to them notes."""
+        return self.watch.words if self.watch else ""
+
+    def attempt(self, key: str, function: Callable[[], Any], hole: Callable[[str], dict[str, Any]]) -> Any:
+        """Result of a task.
+
+        Parameters
+        ----------
+        key : str
+            Of the task: one that is beyond its limits is lost under this name.
+        function : callable
+            Computes the result.
+        hole : callable
+            Result of a task that fails for reasons of its own, from these.
+
+        Returns
+        -------
+        object
+            None where the program is broken: nothing is to be stored, and the job ends with an error.
+        """
+        from .failures import own_reason  # here: what counts alone needs no definitions
+
+        try:
+            if self.watch is None:
+                return function()
+            with self.watch.over(key):
+                return function()
+        except MemoryError:
+            return hole(f"not enough memory: {self.limits or 'the machine has no more'}") | {"limits": self.limits}
+        except Exception as error:
+            from .damage import DamagedError
+
+            if isinstance(error, DamagedError):
+                raise
+            why = own_reason(error)
+            if not why:
+                self.broken.append(error)
+                return None
+            return hole(why)
 
     def add(self, kind: str, units: float, seconds: float) -> None:
         """Count a task.
@@ -37,11 +99,13 @@ class Spent:
         sums[2] += seconds
 
     def summary(self) -> dict[str, Any]:
-        """What to write to the file.
+        """What to write to the record.
 
         Returns
         -------
         dict
             ``start_up``, seconds spent on imports; ``work``, by kind: number of tasks, sums of their units and seconds.
         """
-        return {"start_up": self.start_up, "work": dict(self.sums)}
+        lost = self.watch.lost if self.watch else 0
+        work = dict(self.sums) | ({LOST: [lost, 0.0, 0.0]} if lost else {})
+        return {"start_up": self.start_up, "work": work}

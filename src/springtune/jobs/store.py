@@ -55,12 +55,14 @@ def _user_block(image: bytes) -> bytes:
     return (MAGIC + hashlib.sha256(image).hexdigest().encode()).ljust(USER_BLOCK, b"\0")
 
 
-def stored(path: str | Path) -> set[str]:
+def stored(path: str | Path, limits: str | None = None) -> set[str]:
     """Keys of the results in a file; a damaged one is set aside and holds none.
 
     Parameters
     ----------
     path : str or Path
+    limits : str, optional
+        Limits that tasks have now: a result that was lost to others is not stored.
 
     Returns
     -------
@@ -77,7 +79,8 @@ def stored(path: str | Path) -> set[str]:
             set_aside(error)
         return set()
     with h5py.File(path) as file:
-        return set(_scalars(file))
+        scalars = _scalars(file)
+    return {name for name, result in scalars.items() if limits is None or result.get("limits", limits) == limits}
 
 
 def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
@@ -143,7 +146,9 @@ def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[s
     return read(Path(folder) / f"{key}.h5", [key], fields)[key]
 
 
-def missing(folder: str | Path, tasks: Iterable[Mapping[str, Any]]) -> Iterator[tuple[Path, Mapping[str, Any]]]:
+def missing(
+    folder: str | Path, tasks: Iterable[Mapping[str, Any]], limits: str | None = None
+) -> Iterator[tuple[Path, Mapping[str, Any]]]:
     """Tasks whose result, a file each, named by the task's key, is not stored yet.
 
     Parameters
@@ -151,6 +156,8 @@ def missing(folder: str | Path, tasks: Iterable[Mapping[str, Any]]) -> Iterator[
     folder : str or Path
     tasks : iterable of dict
         Each with its ``key``.
+    limits : str, optional
+        As of `stored`.
 
     Yields
     ------
@@ -160,7 +167,7 @@ def missing(folder: str | Path, tasks: Iterable[Mapping[str, Any]]) -> Iterator[
     """
     for task in tasks:
         path = Path(folder) / f"{task['key']}.h5"
-        if task["key"] not in stored(path):
+        if task["key"] not in stored(path, limits):
             yield path, task
 
 

@@ -37,13 +37,15 @@ def outputs() -> "dict[str, Output]":
     return {output.name: output for module in modules for output in module.OUTPUTS}
 
 
-def load_study(path: str | Path) -> "Study":
+def load_study(path: str | Path, beside: Path | None = None) -> "Study":
     """Read, validate and expand a study.
 
     Parameters
     ----------
     path : str or Path
         YAML file.
+    beside : Path, optional
+        Folder that the names of its files are seen from; its own without.
 
     Returns
     -------
@@ -66,4 +68,4 @@ def load_study(path: str | Path) -> "Study":
     """
     from ..study import load
 
-    return load(path, kinds())
+    return load(path, kinds(), beside)

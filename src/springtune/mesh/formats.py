@@ -1,7 +1,10 @@
 """Mesh files: VTU, as meshio and ParaView open them, and whatever else meshio reads."""
 
+import io
 import os
+import warnings
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,19 @@ LEFT_OUT = ("line", "vertex")
 
 DIGITS = 1e-6
 """What coordinates in a file may be off, over the extent of the mesh: formats in text have few digits."""
+
+
+LARGEST_FILE = 60_000_000
+"""Bytes of the largest file that is read: formats in text take a second for some megabytes."""
+
+MOST_IN_FILE = 1_000_000
+"""Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
+
+LONGEST_SAID = 120
+"""Most characters of what meshio says that are shown."""
+
+MOST_SEARCHED = 2000
+"""So many ends of edges are looked at for one that hangs on another edge."""
 
 
 class MeshError(ValueError):
@@ -75,22 +91,15 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     Raises
     ------
     MeshError
-        If the file cannot be read, has cells other than linear triangles and quadrilaterals or none of these, cells of
-        points that it does not have, points that are nowhere or not in one plane, or cells without area.
+        If the file cannot be read, is too large, has cells other than linear triangles and quadrilaterals or none of
+        these, cells of points that it does not have, points that are nowhere or not in one plane, or cells without
+        area.
     """
-    if not Path(path).is_file():
-        raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
-    import meshio
-
-    try:
-        content = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio exits where it does not know the format
-        raise MeshError(
-            f"{path}: meshio cannot read it: {error or 'unknown format'}; convert it to .vtu or .msh"
-        ) from None
+    content = _content(path)
     cells = _read_cells(path, content)
     used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
-    points = _read_points(path, unit * np.asarray(content.points, dtype=float), used)
+    with np.errstate(over="ignore"):  # what is too far away is refused
+        points = _read_points(path, unit * _coordinates(path, content), used)
     start = 0
     for count, corners in cells.items():
         corners = numbers[start : start + corners.size].reshape(corners.shape)
@@ -99,12 +108,67 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4)))
 
 
+def _content(path: str | Path) -> Any:
+    """What meshio reads from a file."""
+    try:
+        size = Path(path).stat().st_size if Path(path).is_file() else -1
+    except (OSError, ValueError):  # a name that no file can have
+        size = -1
+    if size < 0:
+        raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
+    if size == 0:
+        raise MeshError(f"{path}: the file is empty; write the mesh again")
+    if size > LARGEST_FILE:
+        most = f"{LARGEST_FILE // 1_000_000} MB"
+        raise MeshError(
+            f"{path}: {size / 1e6:.0f} MB, and at most {most} are read; write a coarser mesh, or binary VTU"
+        )
+    import meshio
+
+    told = io.StringIO()
+    try:
+        # meshio tells people of what it leaves out, and exits where it does not know the format.
+        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:
+        said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
+        said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
+        if not isinstance(error, SystemExit):
+            said = said or type(error).__name__
+        shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
+        why = f"it is damaged, or not what its name says{shown}; write it again"
+        if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
+            why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
+        raise MeshError(f"{path}: meshio cannot read it: {why}") from None
+
+
+def _coordinates(path: str | Path, content: Any) -> np.ndarray:
+    """Coordinates of all points, shape (n_points, 2 or 3)."""
+    try:
+        points = np.asarray(content.points, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise MeshError(f"{path}: coordinates that are no numbers; write the mesh again") from None
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        shape = " x ".join(map(str, points.shape))
+        raise MeshError(f"{path}: coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
+    if len(points) > MOST_IN_FILE:
+        raise MeshError(f"{path}: {len(points)} points, and at most {MOST_IN_FILE} are read; write a coarser mesh")
+    return points
+
+
 def _read_cells(path: str | Path, content: Any) -> dict[int, np.ndarray]:
     """Corner indices of what meshio read, by number of corners; refused where cells are of other types."""
     cells: dict[int, list[np.ndarray]] = {}
     for block in content.cells:
         if block.type in CELLS:
-            cells.setdefault(CELLS[block.type], []).append(block.data)
+            data = np.asarray(block.data)
+            if not len(data):
+                continue
+            if data.ndim != 2 or data.shape[1] != CELLS[block.type] or data.dtype.kind not in "iu":
+                shape = f"numbers {data.dtype} of shape {data.shape}"
+                raise MeshError(f"{path}: cells '{block.type}' by {shape}; write the mesh again")
+            cells.setdefault(CELLS[block.type], []).append(data)
         elif block.type not in LEFT_OUT:
             raise MeshError(f"{path}: has cells '{block.type}'; write linear triangles and quadrilaterals only")
     if not cells:
@@ -124,8 +188,16 @@ def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.n
         raise MeshError(
             f"{path}: points with coordinates that are no numbers: {nowhere.sum()}, the first one {first}; mend them"
         )
-    if points.shape[1] > 2 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points[:, :2], axis=0).max():
-        raise MeshError(f"{path}: points leave the plane of x and y; give a plane mesh")
+    extent = np.ptp(points, axis=0)
+    if not np.isfinite(extent**4).all():
+        raise MeshError(f"{path}: extends over {extent.max():.3g} m; correct coordinates or the unit")
+    if points.shape[1] > 2 and extent[2] > 1e-9 * extent[:2].max():
+        away = np.abs(points[:, 2] - points[0, 2])
+        first = f"point {used[np.argmax(away > 1e-9 * extent[:2].max())]}"
+        raise MeshError(
+            f"{path}: points leave the plane of x and y, the first one {first}, by up to {1e3 * away.max():.3g} mm; "
+            "give a plane mesh"
+        )
     return points[:, :2].copy()
 
 
@@ -225,15 +297,18 @@ def _opening(points: np.ndarray, edges: np.ndarray) -> str:
     count = f"edges inside the box with one cell only: {len(edges)}"
     small = DIGITS * np.ptp(points, axis=0).max()
     ends = np.unique(edges)
-    pairs = ends[cKDTree(points[ends]).query_pairs(small, output_type="ndarray")]
-    if len(pairs):
-        one, other = points[pairs[np.argmin(pairs.min(axis=1))]]
+    distances, nearest = cKDTree(points[ends]).query(points[ends], k=2)
+    twins = np.flatnonzero(distances[:, 1] <= small)
+    if len(twins):
+        # Of points at one place the nearest may be the point itself.
+        partner = np.where(nearest[:, 1] == np.arange(len(ends)), nearest[:, 0], nearest[:, 1])
+        one, other = points[ends[[twins[0], partner[twins[0]]]]]
         distance = np.linalg.norm(other - one)
         apart = f", {1e3 * distance:.3g} mm apart" if distance else ""
         return f"two points at {_place(one)}{apart}, do not join their cells ({count}); merge duplicate points"
     start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
     squares = (along**2).sum(axis=1)
-    for end in ends:
+    for end in ends[:MOST_SEARCHED]:
         to = points[end] - start
         share = (to * along).sum(axis=1) / squares
         aside = np.linalg.norm(to - share[:, None] * along, axis=1)

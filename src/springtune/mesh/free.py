@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from .cells import Mesh, signed_areas
+from .formats import MeshError
 from .rows import ROW_HEIGHT
 from .types import mesh_type
 
@@ -14,7 +15,7 @@ def _stretch(length: float, height: float, size: float) -> float:
     return length / max(1, math.ceil(length / size)) / (height / max(1, math.ceil(height / size)))
 
 
-@mesh_type("free", order=20, row_height=ROW_HEIGHT, packages=("netgen-mesher",), own_stretch=_stretch)
+@mesh_type("free", order=20, row_height=ROW_HEIGHT, own_stretch=_stretch)
 def free(length: float, height: float, size: float) -> Mesh:
     """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
 
@@ -31,8 +32,14 @@ def free(length: float, height: float, size: float) -> Mesh:
     Returns
     -------
     Mesh
+
+    Raises
+    ------
+    MeshError
+        If netgen fails.
     """
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
+    from netgen.meshing import NgException
 
     # Lengths in units of the edge: netgen's own tolerances are absolute.
     box = np.array([length, height]) / size
@@ -41,7 +48,12 @@ def free(length: float, height: float, size: float) -> Mesh:
     for start, end in zip(corners, corners[1:] + corners[:1]):
         outline.Append(["line", start, end], leftdomain=1, rightdomain=0)
     # A hair above 1: a side of exactly n edges shall not be split into n + 1 by rounding.
-    made = outline.GenerateMesh(maxh=1.0 + 1e-9)
+    try:
+        made = outline.GenerateMesh(maxh=1.0 + 1e-9)
+    except NgException as error:
+        raise MeshError(
+            f"netgen cannot mesh {length:g} x {height:g} m at {size:g} m: {error}; give another size"
+        ) from None
     points = np.array([point.p for point in made.Points()])[:, :2]
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
     for axis in range(2):

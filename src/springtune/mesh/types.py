@@ -56,15 +56,12 @@ class MeshType(Declared):
         Corners of its cells: 3 or 4.
     row_height : float
         Height of a row of cells over the mesh size [1].
-    packages : tuple of str
-        Distributions besides numpy whose versions its meshes depend on.
     own_stretch : callable or None
         (length, height, size) -> `stretch`, where the numbers of cells are not the whole ones nearest to the size.
     """
 
     corners: int = 3
     row_height: float = 1.0
-    packages: tuple[str, ...] = ()
     own_stretch: Callable[[float, float, float], float] | None = None
 
     def __call__(self, length: float, height: float, size: float) -> Mesh:
@@ -132,7 +129,6 @@ def mesh_type(
     order: float = math.inf,
     corners: int = 3,
     row_height: float = 1.0,
-    packages: tuple[str, ...] = (),
     own_stretch: Callable[[float, float, float], float] | None = None,
 ) -> Callable[[Function], Function]:
     """Declare a function to be a mesh type, by a decorator that returns it as it is.
@@ -143,7 +139,7 @@ def mesh_type(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels: a number between those of its neighbours; at the end without.
-    corners, row_height, packages, own_stretch
+    corners, row_height, own_stretch
         As of `MeshType`.
 
     Returns
@@ -172,7 +168,7 @@ def mesh_type(
     """
 
     def declare(function: Function) -> Function:
-        MESH_TYPES.declare(MeshType(name, function, order, corners, row_height, tuple(packages), own_stretch))
+        MESH_TYPES.declare(MeshType(name, function, order, corners, row_height, own_stretch))
         return function
 
     return declare

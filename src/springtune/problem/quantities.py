@@ -76,6 +76,13 @@ def _remedy(kind: str) -> str:
     return f"give a {kind} such as '{QUANTITY_KINDS[kind].example}', or a number in {QUANTITY_KINDS[kind].unit}"
 
 
+LONGEST_WORD = 100
+"""Characters of a word beyond which none is near it."""
+
+MOST_WORDS = 50
+"""Most words that are listed."""
+
+
 def nearest(word: str, words: Iterable[str]) -> str:
     """``did you mean ...?`` if one of the words is near, and all of them.
 
@@ -94,6 +101,7 @@ def nearest(word: str, words: Iterable[str]) -> str:
     "did you mean 'lattice'? known: lattice, uniform"
     """
     words = list(words)
-    near = get_close_matches(word, words, n=1, cutoff=0.6)
+    near = get_close_matches(word, words, n=1, cutoff=0.6) if len(word) <= LONGEST_WORD else []
     hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"{hint}known: {', '.join(words)}"
+    more = f" and {len(words) - MOST_WORDS} more" if len(words) > MOST_WORDS else ""
+    return f"{hint}known: {', '.join(words[:MOST_WORDS])}{more}"

@@ -9,13 +9,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .checks import check_definitions, check_meshes, check_names
+from .checks import check_counts, check_definitions, check_meshes, check_names
 from .config import StudyConfig, expected_value, json_schema, sections, study_model
 from .expand import Declared, build, expand, files_of_meshes
 from .fields import NAME, NAME_RULE
 from .messages import Key, Problems, StudyError, show
 from .model import CurveSpec, MeshSpec, Reference, SceneSpec, Study, StudyKind
-from .yaml_lines import read_yaml
+from .yaml_lines import read_study
 
 __all__ = [
     "CurveSpec",
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 
-def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
+def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = None) -> Study:
     """Read, validate and expand a study.
 
     Parameters
@@ -43,6 +43,8 @@ def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
         YAML file.
     kinds : tuple of Kind
         Study kinds that it may have.
+    beside : Path, optional
+        Folder that the names of its files are seen from; its own without.
 
     Returns
     -------
@@ -54,27 +56,24 @@ def load(path: str | Path, kinds: Sequence[StudyKind]) -> Study:
         If anything is wrong with the file; nothing else is raised.
     """
     path, file = Path(path), str(path)
-    try:
-        text = path.read_bytes().decode()
-    except (OSError, ValueError) as error:
-        why = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
-        raise StudyError(f"{file}: cannot be read: {why}; give the path of a study such as config/paper.yaml") from None
+    beside = beside or path.parent
+    text, content, lines = read_study(path)
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
-    content, lines = read_yaml(text, file)
     problems = Problems(file, lines)
     config = _validate(study_model(kinds), content, problems)
     check_names(config, problems)
+    check_counts(config, problems)
     for kind in kinds:
         kind.check(config, problems)
     problems.stop()
     check_meshes(config, content, problems)
     problems.stop()
-    mesh_files = files_of_meshes(config, path.parent, problems)
+    mesh_files = files_of_meshes(config, beside, problems)
     grids = expand(config, mesh_files, problems)
     check_definitions(config, content, grids, problems)
     problems.stop()
-    printed_path = path.parent / config.printed if config.printed else None
+    printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
     return build(config, grids, kinds, problems, about)
 

@@ -12,10 +12,23 @@ from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
 from .config import PLAUSIBLE, StatedStiffness, StudyConfig
 from .messages import Key, Problems
-from .model import Grid, MeshSpec, Reference, SceneSpec
+from .model import CurveSpec, Grid, MeshSpec, Reference, SceneSpec
 
 MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""
+
+
+MOST_SCENES = 250_000
+"""Most scenes of a study, those that grids share counted in each: more take gigabytes before anything runs."""
+
+MOST_CELLS = 10 * MOST_SCENES
+"""Most cells of a dataset: combinations of labels of all its dimensions, whether or not a grid asks for them."""
+
+MOST_CURVE_POINTS = 10_000_000
+"""Most points of all sensitivity curves in a dataset."""
+
+FEWER = "give shorter lists, or split the study into several"
+"""Remedy where a study asks for too much."""
 
 
 def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str]) -> None:
@@ -65,6 +78,78 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
     if not config.sensitivity.start < config.sensitivity.stop:
         start, stop = config.sensitivity.start, config.sensitivity.stop
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
+
+
+def check_counts(config: StudyConfig, problems: Problems) -> None:
+    """How many scenes grids have, before they are expanded."""
+    before = 0
+    for name, grid in config.grids.items():
+        lists = {label: len(getattr(grid, label)) for label in SCENE_LISTS}
+        count = math.prod(lists.values())
+        if before + count > MOST_SCENES:
+            shown = " x ".join(f"{size} {label}" for label, size in lists.items() if size > 1)
+            beside = f" beside {before} of the grids above" if before else ""
+            most = f"a study has at most {MOST_SCENES}"
+            problems.add(("grids", name), f"{_counted(count)} scenes ({shown}){beside}; {most}: {FEWER}")
+            return
+        before += count
+
+
+SCENE_LISTS = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+"""Lists of a grid whose product are its scenes."""
+
+
+def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
+    """How much a section asks for, before it is expanded: the product of its lists."""
+    lists = {label: len(getattr(section, label)) for label in labels}
+    count = math.prod(lists.values())
+    if count > most:
+        shown = " x ".join(f"{size} {label}" for label, size in lists.items() if size > 1)
+        problems.add(path, f"{_counted(count)} combinations ({shown}); a study has at most {most}: {FEWER}")
+
+
+def check_particles(
+    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
+) -> None:
+    """Mesh sizes against the box that they are for: no mesh of an absurd number of particles."""
+    size = min(sizes)
+    particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
+    if particles > MOST_PARTICLES:
+        least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.2g} mm"
+        problems.add(path, f"{1e3 * size:g} mm gives {particles:.0e} particles; give {least} or more")
+
+
+def check_cells(
+    config: StudyConfig,
+    meshes: Iterable[MeshSpec],
+    scenes: Iterable[SceneSpec],
+    curves: Iterable[CurveSpec],
+    problems: Problems,
+) -> None:
+    """How large the dataset becomes: each combination of labels has a cell, whichever grid has which label."""
+    lists: dict[str, set[object]] = {label: set() for label in SCENE_LISTS}
+    for mesh in meshes:
+        lists["beam"].add(mesh.beam.name)
+        lists["mesh_type"].add(mesh.mesh_type)
+        lists["mesh_size"].add(mesh.mesh_size)
+    for scene in scenes:
+        lists["material"].add(scene.material.name)
+        for label in ("load", "definition", "kinematics"):
+            lists[label].add(getattr(scene, label))
+    shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
+    cells = math.prod(map(len, lists.values()))
+    if cells > MOST_CELLS:
+        most = f"a dataset has at most {MOST_CELLS}"
+        problems.add(("grids",), f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}")
+    points = cells // len(lists["definition"]) * config.sensitivity.points
+    if any(True for _ in curves) and points > MOST_CURVE_POINTS:
+        of = f"{config.sensitivity.points} on each of {cells // len(lists['definition'])} curves"
+        most = f"give at most {MOST_CURVE_POINTS}, or set sensitivity: false in grids that need no curves"
+        problems.add(("sensitivity", "points"), f"{_counted(points)} points, {of}; {most}")
+
+
+def _counted(count: int) -> str:
+    return str(count) if count < 1e7 else f"{count:.3g}"
 
 
 def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:

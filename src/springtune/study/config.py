@@ -19,8 +19,10 @@ from .fields import (
     FurtherReference,
     Kinematics,
     Length,
+    LimitSeconds,
     Load,
     MaterialName,
+    Memory,
     MeshType,
     Named,
     OneOrMore,
@@ -66,7 +68,7 @@ class Section(BaseModel):
             raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
         for key in value:
             if key not in names:
-                raise refuse(f"unknown key '{key}'; {nearest(key, names)}", key)
+                raise refuse(f"unknown key {show(key)}; {nearest(key, names)}", key)
         given = {key: content for key, content in value.items() if content is not None}
         for name, field in names.items():
             if field.is_required() and name not in given:
@@ -145,6 +147,18 @@ class SensitivityConfig(Section):
     start: Ratio = Field("0.4", validate_default=True, alias="from", description="Smallest stiffness.")
     stop: Ratio = Field("1.6", validate_default=True, alias="to", description="Largest stiffness.")
     points: Points = Field("61", validate_default=True, description="Number of stiffnesses, both ends included.")
+
+
+class LimitsConfig(Section):
+    """What one scene may take, or one mesh, curve, reference or other task: one beyond it is a hole, the others go on.
+
+    Results do not depend on limits; where they change, what went beyond them is computed again, and nothing else.
+    """
+
+    seconds: LimitSeconds = Field(
+        "3600", validate_default=True, description="Seconds of the processor, which a busy machine does not change."
+    )
+    memory: Memory = Field("8 GB", validate_default=True, description="Memory on top of what the job has.")
 
 
 class MeshFileConfig(Section):
@@ -235,6 +249,7 @@ class StudyConfig(Section):
         "the group `/finite_strain` with the networks' errors, and under pressure in `/block`, too. They take seconds "
         "each. An incompressible material has none in plane strain.",
     )
+    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="What one scene may take.")
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )

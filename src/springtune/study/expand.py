@@ -1,5 +1,6 @@
 """From the sections of a study to all that they ask for."""
 
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -7,12 +8,13 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from ..mesh import MESH_TYPES
+from ..mesh.formats import LARGEST_FILE
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS, LOADS
 from ..problem.materials import Material
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
-from .checks import check_files, mesh_type_names, stated_rows
+from .checks import check_cells, check_files, mesh_type_names, stated_rows
 from .config import StudyConfig
 from .messages import Problems
 from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, StudyKind
@@ -32,13 +34,26 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
         for number, row in enumerate(rows):
             path, label = folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
-            if not path.is_file():
-                problems.add((*where, "file"), f"'{path}' is not a file; give its path relative to the study's folder")
+            fault = _file_fault(path)
+            if fault:
+                problems.add((*where, "file"), f"'{path}' {fault}")
             if label in found:
                 problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")
             found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
+
+
+def _file_fault(path: Path) -> str:
+    """Why a mesh file cannot be what is meant, and the remedy; empty where it may be. Its content is not looked at."""
+    try:
+        if path.is_file():
+            if path.stat().st_size > LARGEST_FILE:
+                return f"is larger than {LARGEST_FILE // 1_000_000} MB, the most that is read; write a coarser mesh"
+            return "" if os.access(path, os.R_OK) else "may not be read; change its permissions"
+    except (OSError, ValueError):  # a name that no file can have
+        pass
+    return "is not a file; give its path relative to the study's folder"
 
 
 @dataclass(frozen=True)
@@ -165,11 +180,12 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
         for scene in scenes
         if scene.definition == "calibrated"
     }
+    groups: dict[tuple[str, Material], list[tuple[MeshSpec, Material, str, float]]] = {}
+    for cell in cells:
+        groups.setdefault((cell[0].mesh_type, cell[1]), []).append(cell)
     curves: list[CurveSpec] = []
     for mesh_type, material, kinematics in needed:
-        found = [
-            CurveSpec(*cell, kinematics) for cell in cells if (cell[0].mesh_type, cell[1]) == (mesh_type, material)
-        ]
+        found = [CurveSpec(*cell, kinematics) for cell in groups.get((mesh_type, material), ())]
         if not found:
             problems.add(
                 ("definitions", "calibrated"),
@@ -196,6 +212,8 @@ def build(
     references = in_order(Reference(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes)
     check_files(meshes, scenes, references, problems)
     problems.stop()
+    check_cells(config, meshes, scenes, curves, problems)
+    problems.stop()
     parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}
     names = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
@@ -210,6 +228,7 @@ def build(
         outputs=tuple(name for name in names if name in config.outputs),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         parts=parts,
+        limits={"seconds": config.limits.seconds, "memory": config.limits.memory},
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},

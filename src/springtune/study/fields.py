@@ -19,6 +19,12 @@ from .model import FURTHER_REFERENCES
 MOST_POINTS = 10_001
 """Most points of a sensitivity curve."""
 
+LONGEST_TEXT = 1000
+"""Most characters of a value."""
+
+MOST_LISTED = 10_000
+"""Most values of a list."""
+
 
 class Scalar:
     """Annotation of a field.
@@ -45,6 +51,8 @@ class Scalar:
     def _read(self, value: object) -> Any:
         if not isinstance(value, str) or not value.strip():
             raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
+        if len(value) > LONGEST_TEXT:
+            raise refuse(f"{show(value)}, {len(value)} characters; give {self.words}, of at most {LONGEST_TEXT}")
         return self.read(value)
 
 
@@ -58,7 +66,7 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
         except units.UnitError as error:
             raise refuse(str(error)) from None
         if not number > 0:
-            raise refuse(f"'{value}' is not above zero; {negative}, such as '{example}'")
+            raise refuse(f"{show(value)} is not above zero; {negative}, such as '{example}'")
         return number
 
     schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
@@ -72,9 +80,9 @@ def number(words: str, low: float, high: float, *, above: bool = False, whole: b
         try:
             number = int(value) if whole else float(value)
         except ValueError:
-            raise refuse(f"'{value}' is not a {'whole ' if whole else ''}number; give {words}") from None
+            raise refuse(f"{show(value)} is not a {'whole ' if whole else ''}number; give {words}") from None
         if not (low < number if above else low <= number) or not number <= high or not math.isfinite(number):
-            raise refuse(f"'{value}' is out of range; give {words}")
+            raise refuse(f"{show(value)} is out of range; give {words}")
         return number
 
     schema: dict[str, Any] = {"type": "integer" if whole else "number", "exclusiveMinimum" if above else "minimum": low}
@@ -83,12 +91,23 @@ def number(words: str, low: float, high: float, *, above: bool = False, whole: b
     return Scalar(read, schema, words)
 
 
+_MEMORY = re.compile(r"\+?([0-9]+(?:\.[0-9]*)?)\s*([MGT])B")
+
+
+def _read_memory(value: str) -> float:
+    found = _MEMORY.fullmatch(value.strip())
+    size = float(found[1]) * {"M": 1e6, "G": 1e9, "T": 1e12}[found[2]] if found else 0.0
+    if not 1e8 <= size <= 1e15:
+        raise refuse(f"{show(value)} is no memory that a scene could take; give at least '100 MB', such as '8 GB'")
+    return size
+
+
 def one_of(what: str, names: Collection[str]) -> Scalar:
     """Annotation of a name out of some."""
 
     def read(value: str) -> str:
         if value not in names:
-            raise refuse(f"unknown {what} '{value}'; {nearest(value, names)}")
+            raise refuse(f"unknown {what} {show(value)}; {nearest(value, names)}")
         return value
 
     return Scalar(read, {"enum": list(names)}, " or ".join(f"'{name}'" for name in names))
@@ -96,12 +115,18 @@ def one_of(what: str, names: Collection[str]) -> Scalar:
 
 def _read_flag(value: str) -> bool:
     if value.lower() not in ("true", "false"):
-        raise refuse(f"'{value}' is neither true nor false; give one of them")
+        raise refuse(f"{show(value)} is neither true nor false; give one of them")
     return value.lower() == "true"
 
 
-NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
-NAME_RULE = "use letters, digits, '.', '_' and '-', and no '.' in front: names become parts of file names"
+LONGEST_NAME = 60
+"""Most characters of a name: the name of a file has at most 255, and may hold three names."""
+
+NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{LONGEST_NAME - 1}}}")
+NAME_RULE = (
+    f"use letters, digits, '.', '_' and '-', at most {LONGEST_NAME} of them, and no '.' in front: names become "
+    "parts of file names"
+)
 
 Length = Annotated[float, quantity("length")]
 Force = Annotated[float, quantity("force", "the load's name carries the sign: give a magnitude")]
@@ -118,6 +143,13 @@ Load = Annotated[str, one_of("load", LOADS)]
 FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
 Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]
+LimitSeconds = Annotated[float, number("a number of seconds from 1, such as 600", 1, 1e9)]
+Memory = Annotated[
+    float,
+    Scalar(
+        _read_memory, {"type": "string", "pattern": _MEMORY.pattern, "examples": ["8 GB"]}, "a memory such as '8 GB'"
+    ),
+]
 Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
 FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
@@ -142,10 +174,14 @@ class OneOrMore:
             raise refuse(f"{show(value)} instead of a value or a list; write it as [first, second]")
         if not listed:
             raise refuse("an empty list leaves the grid empty; give at least one value, or remove the grid")
+        if len(listed) > MOST_LISTED:
+            raise refuse(f"{len(listed)} values; give at most {MOST_LISTED}, or split the study into several")
         items = handler(listed)
+        seen = set()
         for number, item in enumerate(items):
-            if item in items[:number]:
+            if item in seen:
                 raise refuse(f"{show(listed[number])} is listed twice; remove one", number)
+            seen.add(item)
         return items
 
 
@@ -203,7 +239,7 @@ class Named:
         seen: dict[str, str] = {}
         for name in value if self.for_files else ():
             if not NAME.fullmatch(name):
-                raise refuse(f"'{name}' cannot name a {self.what}; {NAME_RULE}", name)
+                raise refuse(f"{show(name)} cannot name a {self.what}; {NAME_RULE}", name)
             other = seen.setdefault(name.casefold(), name)
             if other != name:
                 message = f"'{name}' and '{other}' differ in case only, which file systems may ignore; rename one"

@@ -7,6 +7,9 @@ from pydantic_core import PydanticCustomError
 Key = str | int
 """A step of a path into a file: a key of a mapping, a number in a list."""
 
+LONGEST_SHOWN = 60
+"""Most characters of a value that a message shows."""
+
 SHOWN_PROBLEMS = 5
 """Problems that one message lists; it counts the others."""
 
@@ -66,7 +69,7 @@ class Problems:
         above = (path[:size] for size in range(len(path), 0, -1))
         line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
         place = f"{self._file}:{line}" if line else self._file
-        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{_clipped(key)}" for key in path).removeprefix(".")
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
 
     def stop(self) -> None:
@@ -124,5 +127,8 @@ def show(value: object) -> str:
         return "a list" if value else "an empty list"
     if value is None:
         return "nothing"
-    text = str(value)
-    return f"'{text}'" if len(text) <= 60 else f"'{text[:57]}...'"
+    return f"'{_clipped(str(value))}'"
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."

@@ -185,6 +185,8 @@ class Study:
         Of `FURTHER_REFERENCES`.
     parts : dict
         What further study kinds ask for, by their names; nothing where the study does not have them.
+    limits : dict
+        ``seconds`` of the processor and ``memory`` [byte] that one task may take.
     grids : tuple of Grid
         In the order of the file.
     stiffness_ratios : tuple of float
@@ -212,6 +214,7 @@ class Study:
     outputs: tuple[str, ...]
     further_references: tuple[str, ...]
     parts: dict[str, Any]
+    limits: dict[str, float]
     grids: tuple[Grid, ...]
     stiffness_ratios: tuple[float, ...]
     stiffness_table: dict[tuple[str, str], float]

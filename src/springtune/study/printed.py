@@ -9,8 +9,11 @@ from typing import Any
 
 from ..problem.loads import LOADS
 from ..problem.quantities import nearest
-from .messages import Problems
+from .messages import Problems, show
 from .model import PrintedCell
+
+LARGEST_TABLE = 5_000_000
+"""Bytes of the largest file of printed values that is read."""
 
 _PRINTED_COLUMNS = {
     # column: field and unit of PrintedCell; without unit, a text
@@ -50,7 +53,11 @@ def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> t
         If anything is wrong with the file.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        with open(path, "rb") as file:
+            found = file.read(LARGEST_TABLE + 1)
+        if len(found) > LARGEST_TABLE:
+            raise ValueError(f"it is larger than {LARGEST_TABLE // 1_000_000} MB")
+        text = found.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
         problems.add(("printed",), f"'{path}' cannot be read: {why}; give the path of a CSV file, or remove the key")
@@ -68,7 +75,7 @@ def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> t
                 header = row
                 if sorted(header) != sorted(_PRINTED_COLUMNS):
                     wanted = ",".join(_PRINTED_COLUMNS)
-                    file_problems.add((), f"has columns {','.join(header)}; give {wanted}", rows.line_num)
+                    file_problems.add((), f"has columns {show(','.join(header))}; give {wanted}", rows.line_num)
                     break
             else:
                 cell = _printed_cell(header, row, mesh_types, rows.line_num, file_problems)
@@ -98,7 +105,7 @@ def _printed_cell(
         if size is None:
             values[field] = text
             if known and text not in known:
-                problems.add((column,), f"unknown {field.replace('_', ' ')} '{text}'; {nearest(text, known)}", line)
+                problems.add((column,), f"unknown {field.replace('_', ' ')} {show(text)}; {nearest(text, known)}", line)
                 return None
             continue
         try:
@@ -106,6 +113,6 @@ def _printed_cell(
             if not math.isfinite(values[field]) or values[field] < 0:
                 raise ValueError
         except (ValueError, ArithmeticError):
-            problems.add((column,), f"'{text}' is not a number of 0 or more; give the printed one, unsigned", line)
+            problems.add((column,), f"{show(text)} is not a number of 0 or more; give the printed one, unsigned", line)
             return None
     return PrintedCell(**values)

@@ -12,7 +12,7 @@ from ...problem.loads import LOADS
 from ...problem.materials import Material
 from ...problem.quantities import nearest
 from ...springs import DEFINITIONS
-from ...study.checks import check_density, check_known
+from ...study.checks import check_density, check_known, check_particles, check_product
 from ...study.config import Section
 from ...study.fields import (
     BeamName,
@@ -32,6 +32,9 @@ from ..base import Kind
 from .names import CURVE_COUNTS, OTHER_APPROACHES, approach_names
 from .outputs import OUTPUTS
 from .plan import STAGES
+
+MOST_RUNS = 100_000
+"""Most combinations of scenes, approaches and mesh sizes that a benchmark measures."""
 
 OtherApproach = Annotated[str, one_of("approach", OTHER_APPROACHES)]
 Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)]
@@ -124,10 +127,14 @@ def _check(config, problems):
     if not config.benchmark:
         return
     section = config.benchmark
+    labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
+    check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
     if section.second_beam:
         check_known(problems, ("benchmark", "second_beam"), "beam", section.second_beam, config.beams)
     for beam in dict.fromkeys([*(scene.beam for scene in section.scenes.values()), section.second_beam]):
         if beam in config.beams:
+            extent = config.beams[beam].length, config.beams[beam].height
+            check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
             side = min(config.beams[beam].length, config.beams[beam].height)
             if max(section.mesh_size) > side / 2:
                 large = f"{1e3 * max(section.mesh_size):g} mm"

@@ -9,11 +9,13 @@ import os
 import resource
 import statistics
 import time
+import traceback
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...jobs.failures import own_reason
 from ...linalg import SOLVERS, factors
 from ...mechanics.network import Network
 from ...mechanics.series import trace
@@ -180,7 +182,10 @@ def _in_process(scene, approach, size, meshes, once=False):
     process.start()
     send.close()
     try:
-        return receive.recv()
+        found = receive.recv()
+        if isinstance(found, Exception):  # the program is broken
+            raise found
+        return found
     except EOFError:
         return {"status": Status.FAILED, "message": "the process died, of lack of memory most likely"}
     finally:
@@ -207,7 +212,10 @@ def _repeat(send, scene, approach, size, mesh, meshing, once):
         send.send({"status": Status.FAILED, "message": str(error)})
         return
     except Exception as error:  # the other cases shall still be measured
-        send.send({"status": Status.NOT_CONVERGED, "message": f"{type(error).__name__}: {error}"})
+        why = own_reason(error)
+        if not why:
+            traceback.print_exc()
+        send.send({"status": Status.NOT_CONVERGED, "message": why} if why else error)
         return
     warm, of_warm = (seconds[1:], parts[1:]) if len(seconds) > 1 else (seconds, parts)
     here, there = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))

@@ -3,8 +3,8 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, hash_of, material_key, mesh_type_key, stage_key
+from ...jobs.hashing import hash_of
+from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ..base import Stage
 
 
@@ -12,13 +12,13 @@ def case_key(case):
     """Key of a scene of the benchmark."""
     parameters = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
     parameters["second_beam"] = case.second_beam and beam_key(case.second_beam)
-    packages = "numpy", "scipy", "cvxopt", "numba", "scikit-fem", "pyamg"
-    code = stage_key("kinds.benchmark.stage", *packages)
     pairs = [approach.split("/") for approach in case.approaches if "/" in approach]
     definitions, mesh_types = ({pair[place] for pair in pairs} for place in (0, 1))
-    digests = [definition_digest(name) for name in sorted(definitions)]
-    # The other approaches have structured meshes.
-    return hash_of(parameters, code, digests, [mesh_type_key(name) for name in sorted(mesh_types | {"structured"})])
+    # What is not named in the approaches is solved and timed on these.
+    definitions, mesh_types = definitions | {"delingette", "lattice"}, mesh_types | {"structured"}
+    springs = [definition_key(name) for name in sorted(definitions)]
+    meshes = [mesh_type_key(name) for name in sorted(mesh_types)]
+    return hash_of(parameters, stage_key("kinds.benchmark.stage"), springs, meshes)
 
 
 def _members(study, costs):

@@ -22,7 +22,7 @@ def run(tasks, spent):
     spent : Spent
         What tasks cost is added to it.
     """
-    for path, task in store.missing(tasks["folder"], tasks["cases"]):
+    for path, task in store.missing(tasks["folder"], tasks["cases"], spent.limits):
         begin = time.perf_counter()
         store.add(path, {task["key"]: _case(task)})
         spent.add("benchmark", 0, time.perf_counter() - begin)

@@ -9,7 +9,7 @@ from pydantic import Field
 from ...problem.geometry import Strip, Trapezoid
 from ...problem.materials import Material
 from ...springs import DEFINITIONS
-from ...study.checks import check_for_triangles, check_known
+from ...study.checks import check_for_triangles, check_known, check_particles, check_product
 from ...study.config import Section
 from ...study.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ..base import Kind
@@ -21,6 +21,9 @@ LOADINGS = ("pressure", "gravity", "ends")
 
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes on which a laid strip's reference is solved, over the one that is given; the first is the answer."""
+
+MOST_STRIPS = 10_000
+"""Most strips that a study lays; each takes seconds."""
 
 Friction = Annotated[float, number("a coefficient from 0 to 2, such as 0.3", 0, 2)]
 Loading = Annotated[str, one_of("loading", LOADINGS)]
@@ -119,6 +122,12 @@ def _check(config, problems):
     for key in ("material", "support"):
         check_known(problems, ("laying", key), "material", getattr(config.laying, key), config.materials)
     check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
+    check_product(problems, config.laying, ("laying",), ("definition", "mesh_size", "loading", "friction"), MOST_STRIPS)
+    if config.laying.strip in config.beams:
+        beam = config.beams[config.laying.strip]
+        check_particles(problems, ("laying", "mesh_size"), config.laying.mesh_size, beam.length, beam.height)
+        finest = [config.laying.reference_size]
+        check_particles(problems, ("laying", "reference_size"), finest, beam.length, beam.height)
     base = config.laying.trapezoid
     if not base.upper_base < base.lower_base:
         problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")

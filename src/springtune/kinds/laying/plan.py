@@ -3,8 +3,8 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from ...jobs.dependencies import definition_digest
-from ...jobs.keys import hash_of, mesh_type_key, stage_key
+from ...jobs.hashing import hash_of
+from ...jobs.keys import definition_key, mesh_type_key, stage_key
 from ..base import Stage
 from .cost import cost_units
 
@@ -13,9 +13,10 @@ def laying_key(one):
     """Key of a laid strip."""
     return hash_of(
         asdict(one),
-        stage_key("kinds.laying.stage", "numpy", "scipy", "cvxopt"),
+        stage_key("kinds.laying.stage"),
         mesh_type_key("structured"),
-        definition_digest(one.definition),
+        definition_key(one.definition),
+        definition_key("delingette"),  # the trapezoid's
     )
 
 

@@ -2,6 +2,8 @@
 
 import time
 from dataclasses import asdict
+from functools import partial
+from pathlib import Path
 
 from ...jobs import store
 from ...problem.geometry import Strip, Trapezoid
@@ -24,10 +26,30 @@ def run(tasks, spent):
     spent : Spent
         What tasks cost is added to it.
     """
-    for path, task in store.missing(tasks["folder"], tasks["strips"]):
+    for path, task in store.missing(tasks["folder"], tasks["strips"], spent.limits):
         begin = time.perf_counter()
-        store.add(path, {task["key"]: _lay(task)})
+        result = spent.attempt(task["key"], partial(_lay, task), _hole)
+        if result is None:
+            continue
+        store.add(path, {task["key"]: result})
         spent.add("laying", cost_units(task["mesh_size"]), time.perf_counter() - begin)
+
+
+def lose(tasks, key, why, limits):
+    """Store that a strip is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the strip; what became of it; the limits.
+    """
+    store.add(Path(tasks["folder"]) / f"{key}.h5", {key: _hole(why) | {"limits": limits}})
+
+
+def _hole(why):
+    return {"status": Status.FAILED, "message": why}
 
 
 def _lay(task):
@@ -39,6 +61,4 @@ def _lay(task):
         )  # fmt: skip
     except DefinitionError as error:
         return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
-    except Exception as error:  # the other strips shall still arrive
-        return {"status": Status.FAILED, "message": f"{type(error).__name__}: {error}"}
     return asdict(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}

@@ -5,8 +5,10 @@ from itertools import product
 
 from pydantic import Field
 
+from ...mesh import MESH_TYPES
 from ...problem.geometry import Beam
 from ...springs import DEFINITIONS
+from ...study.checks import check_particles
 from ...study.config import Section
 from ...study.fields import Flag, Length
 from ..base import Kind
@@ -60,6 +62,14 @@ class Measurements:
     measurements: tuple[Measurement, ...]
 
 
+def _check(config, problems):
+    for name, grid in config.grids.items():
+        made = grid.moduli and any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type)
+        if made:
+            box = config.patch.length, config.patch.height
+            check_particles(problems, ("grids", name, "mesh_size"), grid.mesh_size, *box)
+
+
 def _expand(config, declared):
     """Moduli of definitions that derive a stiffness, on every grid that asks for them."""
     found = {}
@@ -104,6 +114,7 @@ KIND = Kind(
             ),
         )
     },
+    check=_check,
     expand=_expand,
     axes=_axes,
     summary=_summary,

@@ -2,24 +2,20 @@
 
 from pathlib import Path
 
-from ...jobs.dependencies import definition_digest
-from ...jobs.keys import hash_of, mesh_type_key, stage_key
+from ...jobs.hashing import hash_of
+from ...jobs.keys import definition_key, mesh_type_key, stage_key
 from ...mesh import MESH_TYPES
 from ...study.model import MeshSpec
 from ..base import Stage
-from ..scenes.plan import mesh_source, particles
+from ..scenes.plan import mesh_parameters, mesh_source, particles
 
 
 def moduli_key(study, one):
     """Key of the effective moduli of a definition on a patch."""
     mesh = mesh_of(study, one)
-    parameters = [mesh_source(mesh), one.definition, one.poisson_ratio]
-    code = (
-        stage_key("kinds.moduli.stage", "numpy", "scipy", "cvxopt"),
-        mesh_type_key(one.mesh_type),
-        definition_digest(one.definition),
-    )
-    return hash_of(parameters, *code)
+    parameters = [mesh_parameters(mesh), one.definition, one.poisson_ratio]
+    code = stage_key("kinds.moduli.stage"), mesh_type_key(one.mesh_type), definition_key(one.definition)
+    return hash_of(parameters, code)
 
 
 def mesh_of(study, one):

@@ -1,6 +1,7 @@
 """Stage `moduli`: effective moduli of definitions on patches, for E = 1 and t = 1."""
 
 import time
+from functools import partial
 from pathlib import Path
 
 from ...jobs import store
@@ -9,6 +10,7 @@ from ...problem.status import Status
 from ...scene.moduli import MeshModuli
 from ...springs import DefinitionError
 from ..scenes.mesh import make
+from ..scenes.stored_mesh import REFUSED
 
 
 def run(tasks, spent):
@@ -24,16 +26,26 @@ def run(tasks, spent):
     """
     for patch in tasks["patches"]:
         path = Path(tasks["folder"]) / f"{patch['name']}.h5"
-        present = store.stored(path)
+        present = store.stored(path, spent.limits)
         missing = [one for one in patch["measurements"] if one["key"] not in present]
         if not missing:
             continue
-        mesh = make(patch["mesh"])
+        mesh = spent.attempt(patch["name"], partial(make, patch["mesh"]), lambda why: _hole(f"mesh: {why}"))
+        if mesh is None:
+            continue
+        if isinstance(mesh, dict):
+            store.add(path, {one["key"]: mesh for one in missing})
+            for _ in missing:
+                spent.add(REFUSED, 0, 0.0)
+            continue
         moduli = MeshModuli(mesh)
         results = {}
         for measurement in missing:
             begin = time.perf_counter()
-            results[measurement["key"]] = result = _measured(moduli, measurement)
+            result = spent.attempt(measurement["key"], partial(_measured, moduli, measurement), _hole)
+            if result is None:
+                continue
+            results[measurement["key"]] = result
             seconds = time.perf_counter() - begin
             of_definition = result.get("definition_seconds", 0.0)
             spent.add("moduli", len(mesh.points), seconds - of_definition)
@@ -41,11 +53,30 @@ def run(tasks, spent):
         store.add(path, results)
 
 
+def lose(tasks, name, why, limits):
+    """Store that a measurement, or the mesh of a patch, is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    name, why, limits : str
+        Key of the measurement or name of the patch; what became of it; the limits.
+    """
+    for patch in tasks["patches"]:
+        lost = [one["key"] for one in patch["measurements"] if name in (one["key"], patch["name"])]
+        store.add(Path(tasks["folder"]) / f"{patch['name']}.h5", dict.fromkeys(lost, _hole(why) | {"limits": limits}))
+
+
+def _hole(why):
+    return {"status": Status.FAILED, "message": why}
+
+
 def _measured(moduli, measurement):
     """Errors of E and G [1], effective Poisson's ratio, and what the definition cost; or why there are none."""
     try:
         found = moduli(Material(1.0, measurement["poisson_ratio"]), measurement["definition"])
-    except (DefinitionError, ArithmeticError) as error:
+    except DefinitionError as error:
         return {"status": Status.FAILED, "message": f"{measurement['definition']}: {error}"}
     return {
         "status": Status.SOLVED,

@@ -199,7 +199,7 @@ def _sensitivity(study, folder, displacements, axes):
             displacement = result["displacement"]
             reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
             status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
-            status = np.where(np.isnan(displacement), Status.NOT_CONVERGED, status)
+            status = np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status)
             curves.put(
                 {
                     "stiffness": stiffness,
@@ -286,15 +286,16 @@ def _face_reference(folder, one, kind):
 def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
     shown = plan.shown_meshes(study)
-    meshes = {mesh: stored_mesh.read(folder / "meshes", mesh.name) for mesh in study.meshes if mesh in shown}
+    kept = [mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", mesh.name)]
+    meshes = {mesh: stored_mesh.read(folder / "meshes", mesh.name) for mesh in kept}
     outlines = {one: _outline(folder, one) for one in study.references}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {
-        "particle": max(len(mesh.points) for mesh in meshes.values()),
-        "spring": max(len(mesh.edges) for mesh in meshes.values()),
+        "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
+        "spring": max((len(mesh.edges) for mesh in meshes.values()), default=1),
         "spring_end": 2,
-        "cell": max(len(corners) for corners in cells.values()),
-        "cell_corner": max(corners.shape[1] for corners in cells.values()),
+        "cell": max((len(corners) for corners in cells.values()), default=1),
+        "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
         "outline_point": max(len(points) for points, _ in outlines.values()),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}

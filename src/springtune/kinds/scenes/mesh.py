@@ -1,8 +1,8 @@
-"""Stage `mesh`: one VTU file a mesh, with its quality figures in a JSON file beside it."""
+"""Stage `mesh`: one VTU file a mesh, with its quality figures in a note beside it."""
 
 import time
 
-from ...mesh import MESH_TYPES, MeshError, quality, read_beam_mesh
+from ...mesh import MESH_TYPES, quality, read_beam_mesh
 from . import stored_mesh
 
 
@@ -18,17 +18,38 @@ def run(tasks, spent):
     """
     folder = tasks["folder"]
     for task in tasks["meshes"]:
-        if stored_mesh.is_stored(folder, task["name"], task["key"]):
+        if stored_mesh.is_stored(folder, task["name"], task["key"], spent.limits):
             continue
         begin = time.perf_counter()
-        try:
-            mesh = make(task)
-        except MeshError as error:  # the user's file: the message says it all
-            raise SystemExit(str(error)) from None
+        mesh = spent.attempt(task["name"], lambda task=task: make(task), _hole)
         known = {"mesh_seconds": time.perf_counter() - begin}
+        if mesh is None:
+            continue
+        if isinstance(mesh, dict):
+            stored_mesh.refuse(folder, task["name"], task["key"], mesh)
+            spent.add(stored_mesh.REFUSED, 0, known["mesh_seconds"])
+            continue
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
         stored_mesh.write(folder, task["name"], task["key"], mesh, known)
         spent.add("mesh", len(mesh.points), time.perf_counter() - begin)
+
+
+def lose(tasks, name, why, limits):
+    """Store that a mesh is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    name, why, limits : str
+        Of the mesh; what became of it; the limits.
+    """
+    key = next(task["key"] for task in tasks["meshes"] if task["name"] == name)
+    stored_mesh.refuse(tasks["folder"], name, key, _hole(why) | {"limits": limits})
+
+
+def _hole(why):
+    return {"message": f"mesh: {why}"}
 
 
 def make(source):

@@ -5,11 +5,12 @@ from collections import defaultdict
 from functools import cache, lru_cache
 from pathlib import Path
 
-from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, hash_of, material_key, mesh_type_key, stage_key
+from ...jobs.hashing import hash_of
+from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
+from . import stored_mesh
 
 
 def particles(mesh):
@@ -31,9 +32,13 @@ def by_mesh(items):
 @cache
 def mesh_key(mesh):
     """Key of a mesh: its parameters or its file, the code that makes it and the library behind it."""
-    if mesh.file is not None:
-        return hash_of(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy", "meshio"))
-    return hash_of(mesh_source(mesh), stage_key("kinds.scenes.mesh", "numpy"), mesh_type_key(mesh.mesh_type))
+    return hash_of(mesh_parameters(mesh), stage_key("kinds.scenes.mesh"), mesh_type_key(mesh.mesh_type))
+
+
+def mesh_parameters(mesh):
+    """What of its source a mesh depends on: not on where its file is, but on its ending, which says its format."""
+    source = mesh_source(mesh)
+    return source | {"file": mesh.file.suffix} if mesh.file else source
 
 
 def mesh_source(mesh):
@@ -53,15 +58,14 @@ def reference_of(beam, material, load):
     kind.
     """
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
+    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain",))
     key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
 
 def finite_key(reference, kind):
     """Key of a reference at finite strain, which no load scales."""
-    code = stage_key("kinds.scenes.reference", "numpy", "scipy", "cvxopt", "scikit-fem")
-    return hash_of(kind, _finite_problem(reference), code)
+    return hash_of(kind, _finite_problem(reference), stage_key("kinds.scenes.reference"))
 
 
 def _unit_problem(beam, material, load):
@@ -78,7 +82,7 @@ def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind.name, curve.force, curve.kinematics]
     parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
-    return hash_of(parameters, stage_key("kinds.scenes.sensitivity", "numpy", "scipy", "cvxopt"))
+    return hash_of(parameters, stage_key("kinds.scenes.sensitivity"))
 
 
 def scene_key(study, scene):
@@ -87,9 +91,7 @@ def scene_key(study, scene):
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
     parameters += [LOADS[scene.load].kind.name, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
-    return hash_of(
-        parameters, stage_key("kinds.scenes.solve", "numpy", "scipy", "cvxopt"), definition_digest(scene.definition)
-    )
+    return hash_of(parameters, stage_key("kinds.scenes.solve"), definition_key(scene.definition))
 
 
 @lru_cache(maxsize=1)
@@ -164,8 +166,7 @@ def _meshes(study, folder, meshes):
 
 
 def _mesh_products(content):
-    folder = Path(content["folder"])
-    return [folder / f"{mesh['name']}{ending}" for mesh in content["meshes"] for ending in (".vtu", ".json")]
+    return [path for mesh in content["meshes"] for path in stored_mesh.files(content["folder"], mesh["name"])]
 
 
 def _reference_members(study, costs):
@@ -311,7 +312,12 @@ def _calibrate(study, folder, members):
             and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
         ]
         tasks.append({"name": name, "members": curves})
-    return {"file": str(calibration_path(folder)), "curves": str(folder / "curves"), "groups": tasks}
+    return {
+        "file": str(calibration_path(folder)),
+        "curves": str(folder / "curves"),
+        "groups": tasks,
+        "code": stage_key("kinds.scenes.calibrate"),
+    }
 
 
 STAGES = (

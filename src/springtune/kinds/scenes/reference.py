@@ -1,6 +1,8 @@
 """Stage `reference`: one finite-element solution a unit problem, and one a scene at finite strain."""
 
 import time
+from functools import partial
+from pathlib import Path
 
 from ...jobs import store
 from ...problem.geometry import Beam
@@ -22,12 +24,31 @@ def run(tasks, spent):
         What tasks cost is added to it.
     """
     for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
-        for path, task in store.missing(tasks["folder"], tasks[section]):
+        for path, task in store.missing(tasks["folder"], tasks[section], spent.limits):
             begin = time.perf_counter()
-            result = solve(task)
+            result = spent.attempt(task["key"], partial(solve, task), _hole)
+            if result is None:
+                continue
             result["seconds"] = time.perf_counter() - begin
             store.add(path, {task["key"]: result})
             spent.add(kind, 0, result["seconds"])
+
+
+def lose(tasks, key, why, limits):
+    """Store that a reference is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the reference; what became of it; the limits.
+    """
+    store.add(Path(tasks["folder"]) / f"{key}.h5", {key: _hole(why) | {"limits": limits}})
+
+
+def _hole(why):
+    return {"message": why, "seconds": 0.0}
 
 
 def _unit(task):

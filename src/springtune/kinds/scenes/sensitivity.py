@@ -8,12 +8,14 @@ Here, where equilibria are at hand, the stiffness at which a curve meets its ref
 """
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ...jobs import store
 from ...problem.loads import LOAD_KINDS
+from ...problem.status import Status
 from ...reference.limits import objection
 from ...scene.curve import ending, follow, meeting
 from ...scene.sheet import Sheet
@@ -35,18 +37,57 @@ def run(tasks, spent):
     """
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
-        present = store.stored(path)
+        present = store.stored(path, spent.limits)
         missing = [curve for curve in family["curves"] if curve["key"] not in present]
         if not missing:
+            continue
+        refused = stored_mesh.refusal(tasks["meshes"], family["name"])
+        if refused:
+            store.add(path, {curve["key"]: _hole(curve, **refused) for curve in missing})
+            for _ in missing:
+                spent.add(stored_mesh.REFUSED, 0, 0.0)
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
         results = {}
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
         for curve in missing:
-            results[curve["key"]] = _traced(sheet, curve, tasks["references"])
+            traced = partial(_traced, sheet, curve, tasks["references"])
+            result = spent.attempt(curve["key"], traced, partial(_hole, curve))
+            if result is not None:
+                results[curve["key"]] = result
+                spent.add("curve", len(mesh.points), result["seconds"])
         store.add(path, results)
-        for result in results.values():
-            spent.add("curve", len(mesh.points), result["seconds"])
+
+
+def lose(tasks, key, why, limits):
+    """Store that a curve is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the curve; what became of it; the limits.
+    """
+    for family in tasks["families"]:
+        for curve in family["curves"]:
+            if curve["key"] == key:
+                store.add(Path(tasks["folder"]) / f"{family['name']}.h5", {key: _hole(curve, why, limits=limits)})
+
+
+def _hole(curve, message, **limits):
+    """Result of a curve that cannot be traced."""
+    count = len(curve["stiffnesses"])
+    return limits | {
+        "displacement": np.full(count, np.nan),
+        "stable": np.zeros(count, dtype=bool),
+        "status": Status.FAILED,
+        "message": message,
+        "best_stiffness": np.nan,
+        "best_status": Status.FAILED,
+        "best_message": message,
+        "seconds": 0.0,
+    }
 
 
 def _traced(sheet, curve, folder):

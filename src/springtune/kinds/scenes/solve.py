@@ -1,12 +1,13 @@
 """Stage `solve`: the mass-spring network of every scene, all scenes of a mesh together."""
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ...jobs import sealed, store
-from ...jobs.keys import hash_of
+from ...jobs.hashing import hash_of
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
@@ -16,6 +17,9 @@ from ...scene.sheet import Sheet, definition_of
 from ...springs import DEFINITIONS, DefinitionError
 from . import stored_mesh
 from . import stored_reference as references
+
+KEPT_BACK = 5.0
+"""Seconds for which results are not stored: writing them costs as much as solving small scenes."""
 
 
 def run(tasks, spent):
@@ -37,23 +41,55 @@ def run(tasks, spent):
     calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
-        present = store.stored(path)
+        present = store.stored(path, spent.limits)
         scenes = {_stored_key(scene, calibration): scene for scene in family["scenes"]}
         missing = {name: scene for name, scene in scenes.items() if name not in present}
         if not missing:
+            continue
+        refused = stored_mesh.refusal(tasks["meshes"], family["name"])
+        if refused:
+            store.add(path, dict.fromkeys(missing, _hole(**refused)))
+            for _ in missing:
+                spent.add(stored_mesh.REFUSED, 0, 0.0)
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
         fields = References(tasks["references"], mesh)
         sheet = Sheet(mesh, family["thickness"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
-        results = {}
+        results, since = {}, time.perf_counter()
         for name in order:
-            scene = missing[name]
-            derived = sheet.deriving
-            results[name] = result = solve(sheet, scene, fields.field, calibration, family["keep_fields"])
+            scene, derived = missing[name], sheet.deriving
+            solved = partial(solve, sheet, scene, fields.field, calibration, family["keep_fields"])
+            result = spent.attempt(name, solved, _hole)
+            if result is None:
+                continue
+            results[name] = result
             spent.add(scene["kinematics"], len(mesh.points), result["seconds"])
             spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
+            if time.perf_counter() > since + KEPT_BACK:  # what is solved is not to be lost to what comes
+                store.add(path, results)
+                results, since = {}, time.perf_counter()
         store.add(path, results)
+
+
+def lose(tasks, name, why, limits):
+    """Store that a scene is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    name, why, limits : str
+        Key of its result; what became of it; the limits.
+    """
+    calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
+    for family in tasks["families"]:
+        if any(_stored_key(scene, calibration) == name for scene in family["scenes"]):
+            store.add(Path(tasks["folder"]) / f"{family['name']}.h5", {name: _hole(why, limits=limits)})
+
+
+def _hole(message, **limits):
+    return limits | {"status": Status.FAILED, "message": message, "seconds": 0.0}
 
 
 def _stored_key(scene, calibration):
@@ -121,8 +157,6 @@ def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
         result = _solved(sheet, scene, reference, calibration, keep_fields)
     except DefinitionError as error:
         result = {"status": Status.FAILED, "message": f"{scene['definition']}: {error}"}
-    except Exception as error:  # the other scenes shall still arrive
-        result = {"status": Status.FAILED, "message": f"{type(error).__name__}: {error}"}
     return result | {"seconds": time.perf_counter() - begin - (sheet.deriving - derived)}
 
 

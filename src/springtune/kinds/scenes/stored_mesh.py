@@ -1,4 +1,7 @@
-"""Stored meshes: a VTU file each, and a note beside it with its key, its checksum and what is known of it."""
+"""Stored meshes: a VTU file each, and a note beside it with its key, its checksum and what is known of it.
+
+A mesh that cannot be made has no VTU file, and its note says why: it costs its own scenes and no others.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -7,6 +10,9 @@ from ...jobs import sealed
 from ...jobs.damage import DamagedError, set_aside
 from ...jobs.records import checksum
 from ...mesh import Mesh, read_mesh, write_mesh
+
+REFUSED = "without mesh"
+"""What tasks are counted as that have no mesh."""
 
 
 def files(folder: str | Path, name: str) -> tuple[Path, Path]:
@@ -35,8 +41,25 @@ def write(folder: str | Path, name: str, key: str, mesh: Mesh, known: dict[str, 
     sealed.write(notes, {"key": key, "checksum": checksum(path), **known})
 
 
-def is_stored(folder: str | Path, name: str, key: str) -> bool:
-    """Whether a mesh is stored; one that is damaged is set aside.
+def refuse(folder: str | Path, name: str, key: str, hole: dict[str, str]) -> None:
+    """Store that a mesh cannot be made.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+    key : str
+        Of what it would be made from.
+    hole : dict
+        ``message``, such as ``"mesh: own.vtu: cells with no area: 1, ..."``, and ``limits`` where it went beyond them.
+    """
+    path, notes = files(folder, name)
+    path.unlink(missing_ok=True)
+    sealed.write(notes, {"key": key, **hole})
+
+
+def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
+    """Whether a mesh is stored, or that it cannot be made; one that is damaged is set aside.
 
     Parameters
     ----------
@@ -44,16 +67,21 @@ def is_stored(folder: str | Path, name: str, key: str) -> bool:
     name : str
     key : str
         Of what it is to be made from.
+    limits : str
+        Limits that it has now; what went beyond others is not stored.
 
     Returns
     -------
     bool
     """
     path, notes = files(folder, name)
-    if not (path.exists() and notes.exists()):
+    if not notes.exists():
         return False
     try:
-        return read_notes(folder, name)["key"] == key and _checked(path, notes) == path
+        known = read_notes(folder, name)
+        if known["key"] != key or known.get("limits", limits) != limits:
+            return False
+        return "message" in known or (path.exists() and _checked(path, notes) == path)
     except DamagedError as error:
         set_aside(error)
         return False
@@ -78,6 +106,27 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     """
     notes: dict[str, Any] = sealed.demand(files(folder, name)[1])
     return notes
+
+
+def refusal(folder: str | Path, name: str) -> dict[str, str]:
+    """Why a mesh could not be made: ``message``, and ``limits`` where it went beyond them; empty where it was.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    DamagedError
+        As `read_notes`.
+    """
+    notes = read_notes(folder, name)
+    return {label: notes[label] for label in ("message", "limits") if label in notes}
 
 
 def read(folder: str | Path, name: str) -> Mesh:

@@ -8,7 +8,7 @@ from pydantic import Field
 from ...mesh import MESH_TYPES
 from ...problem.geometry import Beam
 from ...problem.materials import Material
-from ...study.checks import check_density, check_for_triangles, check_known
+from ...study.checks import check_density, check_for_triangles, check_known, check_particles
 from ...study.config import Section
 from ...study.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
 from ..base import Kind
@@ -82,6 +82,8 @@ def _check(config, problems):
         message = f"'{section.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
         problems.add(("stability", "mesh_type"), message)
     if section.beam in config.beams:
+        beam = config.beams[section.beam]
+        check_particles(problems, ("stability", "mesh_size"), section.mesh_size, beam.length, beam.height)
         side = min(config.beams[section.beam].length, config.beams[section.beam].height)
         if max(section.mesh_size) > 0.3 * side:
             message = f"{1e3 * max(section.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"

@@ -3,16 +3,16 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from ...jobs.dependencies import definition_digest
-from ...jobs.keys import beam_key, hash_of, material_key, mesh_type_key, stage_key
+from ...jobs.hashing import hash_of
+from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ..base import Stage
 
 
 def experiment_key(one):
     """Key of an experiment on stability."""
     parameters = asdict(one) | {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
-    code = stage_key("kinds.stability.stage", "numpy", "scipy", "cvxopt", "numba"), mesh_type_key(one.mesh_type)
-    return hash_of(parameters, code, definition_digest(one.definition))
+    code = stage_key("kinds.stability.stage"), mesh_type_key(one.mesh_type), definition_key(one.definition)
+    return hash_of(parameters, code)
 
 
 def _members(study, costs):

@@ -1,6 +1,8 @@
 """Stage `stability`: experiments on numerical stability."""
 
 import time
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -23,10 +25,29 @@ def run(tasks, spent):
     spent : Spent
         What tasks cost is added to it.
     """
-    for path, task in store.missing(tasks["folder"], tasks["experiments"]):
-        result = _experiment(task)
+    for path, task in store.missing(tasks["folder"], tasks["experiments"], spent.limits):
+        result = spent.attempt(task["key"], partial(_experiment, task), _hole)
+        if result is None:
+            continue
         store.add(path, {task["key"]: result})
         spent.add(task["name"], 0, result.get("seconds", 0.0))
+
+
+def lose(tasks, key, why, limits):
+    """Store that an experiment is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the experiment; what became of it; the limits.
+    """
+    store.add(Path(tasks["folder"]) / f"{key}.h5", {key: _hole(why) | {"limits": limits}})
+
+
+def _hole(why):
+    return {"failure": why}
 
 
 def _experiment(task):
@@ -35,10 +56,7 @@ def _experiment(task):
         tuple(task["mesh_sizes"]),
     )  # fmt: skip
     begin = time.perf_counter()
-    try:
-        found = stability.run(task["name"], setup)
-    except Exception as error:  # the other experiments shall still arrive
-        return {"failure": f"{type(error).__name__}: {error}"}
+    found = stability.run(task["name"], setup)
     # Texts are no arrays of a file.
     found = {name: np.asarray(values) for name, values in found.items()}
     texts = {name: values.tolist() for name, values in found.items() if values.dtype.kind == "O"}

@@ -1,0 +1,52 @@
+"""Studies whose results a command is about."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
+
+
+def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
+    """Studies with the folders of their results.
+
+    Parameters
+    ----------
+    given : Path or None
+        A study's YAML file, or the folder of its results; all folders in ``results`` without.
+
+    Yields
+    ------
+    study : Study
+    folder : Path
+
+    Raises
+    ------
+    click.ClickException
+        If there is no such folder, or no study of its name.
+    """
+    from ..kinds import load_study
+
+    if given is not None and not given.is_dir():
+        study = load_study(given)
+        folder = RESULTS_FOLDER / study.name
+        if not folder.is_dir():
+            raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
+        yield study, folder
+        return
+    if given is None and not RESULTS_FOLDER.is_dir():
+        raise click.ClickException(f"{RESULTS_FOLDER}: there is no such folder; go to where studies were run")
+    folders = [given] if given else sorted(path for path in RESULTS_FOLDER.iterdir() if path.is_dir())
+    for folder in folders:
+        config = folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
+        if config.is_file():
+            yield load_study(config), folder
+        elif given:
+            raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
+        else:
+            click.echo(f"{folder}: left alone, there is no {config}; give the study's YAML file, or remove it by hand")

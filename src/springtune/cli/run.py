@@ -1,0 +1,112 @@
+"""Run a study: the one front door, which says what is wrong with it before Snakemake starts."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+
+from .completion import studies_here
+from .examples import examples
+
+USUAL_STUDY = "config/paper.yaml"
+"""Study that is run where none is named."""
+
+NOT_SOLVED = 3
+"""Exit code of a strict run of which scenes are not solved."""
+
+WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
+"""Files by which a checkout is known."""
+
+
+@click.command(
+    epilog=examples(
+        "springtune run config/mine.yaml",
+        "springtune run config/mine.yaml --cores 4",
+        "springtune run config/mine.yaml -n",
+        "springtune run --strict config/mine.yaml",
+    ),
+    context_settings={"ignore_unknown_options": True},
+    options_metavar="[--strict]",
+)
+@click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
+@click.argument(
+    "arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]", shell_complete=studies_here
+)
+def run(strict: bool, arguments: tuple[str, ...]) -> None:
+    """Run a study, the paper's where none is named.
+
+    Checks the study and then runs Snakemake in the folder of the checkout, where results/ is. All options but those
+    below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
+    the study is wrong or a job failed, and with 2 when it was called in a wrong way.
+    """
+    from ..kinds import load_study  # here, so that --help does not wait for it
+    from ..study import StudyError
+
+    named = bool(arguments) and not arguments[0].startswith("-")
+    options = [*arguments[named:]]
+    if "--configfile" in options or "--configfiles" in options:
+        raise click.UsageError("give the study itself, without --configfile: springtune run config/mine.yaml")
+    late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
+    if late:
+        raise click.UsageError(f"name the study first: springtune run {late[0]} {options[0]}")
+    checkout = _checkout()
+    path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
+    shown = Path(arguments[0]) if named else path
+    try:
+        study = load_study(shown)
+    except StudyError as error:
+        click.echo(str(error), err=True)
+        raise SystemExit(1) from None
+    path = path.relative_to(checkout) if path.is_relative_to(checkout) else path
+    # A list of targets would take a path that follows it for one more of them, and so would --configfile.
+    command = [*_snakemake(), *options, "--configfile", str(path)]
+    os.chdir(checkout)
+    if not strict:
+        os.execv(command[0], command)
+    code = _called(command)
+    holes = 0 if code else _unsolved(Path("results") / study.name / "dataset.nc")
+    if holes:
+        click.echo(f"--strict: {holes} scenes are not solved", err=True)
+    raise SystemExit(NOT_SOLVED if holes else code)
+
+
+def _checkout() -> Path:
+    """Folder of the workflow: this one, or that of the library."""
+    for folder in (Path.cwd(), Path(__file__).parents[3]):
+        if all((folder / file).is_file() for file in WORKFLOW):
+            return folder
+    raise click.ClickException("there is no Snakefile of springtune here; change to the folder of its checkout")
+
+
+def _snakemake() -> list[str]:
+    """How Snakemake is called on the Python that runs this program."""
+    beside = Path(sys.executable).with_name("snakemake")
+    return [str(beside)] if beside.exists() else [sys.executable, "-m", "snakemake"]
+
+
+def _called(command: list[str]) -> int:
+    """Exit code of a command; what interrupts or ends this program does so with that one, whose end is waited for."""
+    process = subprocess.Popen(command)
+    signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
+    while True:
+        try:
+            return process.wait()
+        except KeyboardInterrupt:
+            continue
+
+
+def _unsolved(path: Path) -> int:
+    """Number of scenes of a dataset that are asked for and not solved; of one that is not there yet, none."""
+    import h5py
+
+    from ..problem.status import Status
+
+    try:
+        with h5py.File(path) as file:
+            status = file["status"][()]
+    except FileNotFoundError:
+        return 0
+    return int(((status != Status.NOT_REQUESTED) & (status != Status.SOLVED)).sum())

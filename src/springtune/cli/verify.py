@@ -1,0 +1,80 @@
+"""Whether results are what was made."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..output.text import aligned
+from .examples import examples
+from .folders import studies
+
+if TYPE_CHECKING:
+    from ..study import Study
+
+TOLD = 20
+"""Most jobs of a study that are told with a fault."""
+
+
+@click.command(epilog=examples("springtune verify config/paper.yaml", "springtune verify results/paper --scenes 50"))
+@click.argument("study", required=False, type=click.Path(path_type=Path))
+@click.option("--scenes", type=click.IntRange(0), default=5, show_default=True, help="Scenes to compute again.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the drawing of these scenes.")
+@click.option("--set-aside", is_flag=True, help="Rename damaged files, so that the next run makes them again.")
+def verify(study: Path | None, scenes: int, seed: int, set_aside: bool) -> None:
+    """Compare all results with their checksums, and compute some scenes again.
+
+    STUDY is its YAML file, or results/<study>; without it, all folders in results. Every file is read: what the stages
+    stored, dataset, tables, figures, page. The scenes are drawn from the dataset and computed by the config that it
+    holds. Exits with 1 if anything is not as it was made; nothing is changed without --set-aside.
+    """
+    from ..study import StudyError
+
+    try:
+        faults = sum(_verified(one, folder, scenes, seed, set_aside) for one, folder in studies(study))
+    except StudyError as error:
+        raise click.ClickException(str(error)) from None
+    if faults:
+        raise click.exceptions.Exit(1)
+
+
+def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: bool) -> int:
+    """Tell of a study; the number of its faults."""
+    from ..campaign import verify
+    from ..study import StudyError
+
+    found = verify.files(study, folder)
+    click.echo(f"{folder}: {found.compared} files compared with their checksums, faults: {len(found.faults)}")
+    rows = [[name, why] for name, why in found.faults.items()]
+    if rows:
+        click.echo(aligned(rows[:TOLD], 2))
+        if len(rows) > TOLD:
+            click.echo(f"  and {len(rows) - TOLD} more")
+        for path in verify.set_aside(found) if set_aside else ():
+            click.echo(f"  set aside: {path}")
+        first = "" if set_aside else f"`springtune verify {study.path} --set-aside`, then "
+        click.echo(f"  {first}`springtune run {study.path}` makes it again")
+    if found.stale:
+        click.echo(f"  out of date, since the study or the program changed: {', '.join(found.stale)}")
+    aside = verify.left(folder)
+    if aside:
+        click.echo(
+            f"  left behind: {len(aside)} of *.damaged, *.unfinished; `springtune clean {study.path}` lists them"
+        )
+    if not scenes:
+        return len(found.faults)
+    try:
+        made = list(verify.again(folder, study.path.parent, scenes, seed))
+    except (StudyError, ValueError, OSError) as error:
+        click.echo(f"no scene is computed again: {error}")
+        return len(found.faults) + 1
+    wrong = [one for one in made if not one.agrees]
+    largest = max((one.difference for one in made if one.agrees), default=0.0)
+    click.echo(
+        f"{len(made)} scenes computed again (seed {seed}): {len(made) - len(wrong)} agree, "
+        f"to {largest:.1e} of their numbers"
+    )
+    for one in wrong:
+        change = f"{one.before}, now {one.after}" if one.before != one.after else f"differs by {one.difference:.1e}"
+        click.echo(f"  {one.labels}: {change}")
+    return len(found.faults) + len(wrong)

@@ -1,0 +1,26 @@
+"""Hashes of what a result depends on."""
+
+import hashlib
+import json
+from typing import Any
+
+
+def hash_of(*parts: Any) -> str:
+    """Hash of what a result depends on.
+
+    Parameters
+    ----------
+    *parts : object
+        Nested dicts, lists, texts and numbers.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
+    True
+    """
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:24]

@@ -1,0 +1,483 @@
+"""Keys follow what is computed: the code without what is written for readers, and the packages that it imports."""
+
+import ast
+import importlib.metadata
+import inspect
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springtune.campaign.plan import stages
+from springtune.jobs import dependencies, keys, sealed
+from springtune.jobs.syntax import read
+from springtune.mesh import MESH_TYPES
+from springtune.springs import DEFINITIONS, Springs, definition
+
+MODULE = '''\
+"""What it is for."""
+
+import numpy as np
+
+SIZE = 3
+"""What the number means."""
+
+
+def area(points, weight=2.0, *, exact=False):
+    """Area of a polygon.
+
+    Parameters are not repeated.
+    """
+    x, y = np.asarray(points).T  # coordinates
+    if exact and len(x) > SIZE:
+        raise ValueError(f"too many: {len(x):>{SIZE}d} {'of them'}")
+    return weight * sum(a * b for a, b in zip(x, np.roll(y, 1)))
+
+
+class Body:
+    """A body."""
+
+    mass: float = 1.0
+
+    def weight(self):
+        """Its weight."""
+        return 9.81 * self.mass
+'''
+
+FOR_READERS = {
+    "docstring of the module": ('"""What it is for."""', '"""What it is for, and more."""'),
+    "docstring of a function": ("Area of a polygon.", "The area of any polygon."),
+    "docstring of a number": ('"""What the number means."""\n', ""),
+    "no docstring of a method": ('        """Its weight."""\n', ""),
+    "comment": ("  # coordinates", "  # x and y"),
+    "new comment": ("import numpy", "# Arrays.\nimport numpy"),
+    "quotes": ("\"too many: {len(x):>{SIZE}d} {'of them'}\"", "'too many: {len(x):>{SIZE}d} {\"of them\"}'"),
+    "broken line": ("weight * sum(", "weight * sum(\n        "),
+    "brackets": ("exact and len(x) > SIZE", "(exact and (len(x) > SIZE))"),
+    "last comma": ("*, exact=False)", "*, exact=False,)"),
+    "spelling of a number": ("2.0", "2.00e0"),
+    "pass": ('        """Its weight."""', '        """Its weight."""\n        pass'),
+    "for type checkers": ("import numpy", "if TYPE_CHECKING:\n    from numpy import ndarray\nimport numpy"),
+}
+
+COMPUTED = {
+    "number": ("2.0", "2.5"),
+    "type of a number": ("SIZE = 3", "SIZE = 3.0"),
+    "operator": ("a * b", "a + b"),
+    "comparison": ("> SIZE", ">= SIZE"),
+    "name": ("np.roll(y, 1)", "np.roll(x, 1)"),
+    "attribute": ("np.roll", "np.flip"),
+    "order": ("a, b in zip", "b, a in zip"),
+    "text": ("too many: ", "many: "),
+    "format": (">{SIZE}d", ">{SIZE}x"),
+    "default": ("exact=False", "exact=True"),
+    "keyword alone": (", *, exact", ", exact"),
+    "new statement": ("SIZE = 3\n", "SIZE = 3\nOTHER = 4\n"),
+    "removed statement": ("SIZE = 3\n", ""),
+    "statement moved": ("    mass: float = 1.0\n\n", ""),
+    "import": ("import numpy as np", "import scipy as np"),
+    "not for type checkers": ("import numpy", "if True:\n    from numpy import ndarray\nimport numpy"),
+    "other than for type checkers": ("SIZE = 3\n", "if TYPE_CHECKING:\n    pass\nelse:\n    SIZE = 4\n"),
+    "precedence": ("9.81 * self.mass", "(9.81 * self).mass"),
+    "name of a function": ("def weight", "def mass"),
+    "decorator": ("    def weight", "    @property\n    def weight"),
+    "async": ("    def weight", "    async def weight"),
+}
+
+
+def digest_of(text):
+    return read(text).digest
+
+
+@pytest.mark.parametrize("change", FOR_READERS.values(), ids=FOR_READERS)
+def test_what_is_for_readers_is_not_in_a_digest(change):
+    assert change[0] in MODULE
+    changed = MODULE.replace(*change)
+    compile(changed, "changed", "exec")
+    assert changed != MODULE and digest_of(changed) == digest_of(MODULE)
+
+
+@pytest.mark.parametrize("change", COMPUTED.values(), ids=COMPUTED)
+def test_every_change_of_code_is_in_a_digest(change):
+    assert change[0] in MODULE
+    changed = MODULE.replace(*change)
+    compile(changed, "changed", "exec")
+    assert digest_of(changed) != digest_of(MODULE)
+
+
+PATHS = sorted(dependencies.PACKAGE.rglob("*.py"))
+
+
+@settings(max_examples=30)
+@given(st.sampled_from(PATHS))
+def test_formatting_of_our_own_modules_changes_nothing(path):
+    """Written anew from its tree a module has no comments, other quotes and other lines."""
+    text = path.read_text()
+    assert digest_of(ast.unparse(ast.parse(text))) == digest_of(text)
+
+
+def _places(tree):
+    """Numbers, names and operators of a tree: what to change, as functions that change it."""
+    others = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.Gt, ast.Gt: ast.Lt}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            yield lambda node=node: setattr(node, "value", node.value + 1)
+        elif isinstance(node, ast.Name):
+            yield lambda node=node: setattr(node, "id", node.id + "_")
+        elif isinstance(node, ast.BinOp) and type(node.op) in others:
+            yield lambda node=node: setattr(node, "op", others[type(node.op)]())
+        elif isinstance(node, ast.BinOp | ast.Compare):
+            pass
+        elif isinstance(node, ast.FunctionDef) and len(node.body) > 1:
+            yield lambda node=node: node.body.pop()
+        elif isinstance(node, ast.Call) and node.args:
+            yield lambda node=node: node.args.pop()
+
+
+PHYSICS = [path for path in PATHS if path.parent.name in ("mechanics", "springs", "linalg", "reference")]
+
+
+@settings(max_examples=30)
+@given(st.sampled_from(PHYSICS), st.data())
+def test_any_change_of_our_own_modules_changes_their_digest(path, data):
+    text = path.read_text()
+    tree = ast.parse(text)
+    for node in ast.walk(tree):  # annotations for type checkers alone are not in the digest
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            node.body = [ast.Pass()]
+    data.draw(st.sampled_from(list(_places(tree)) or [lambda: tree.body.append(ast.parse("x = 1").body[0])]))()
+    assert digest_of(ast.unparse(ast.fix_missing_locations(tree))) != digest_of(text)
+
+
+# -- imports -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Write the modules of a package in the place of springtune; what one of them runs on."""
+    folder = tmp_path / "springtune"
+
+    def closure(start, **texts):
+        for name, text in texts.items():
+            path = folder / (name.replace("__in_", "/") + ".py")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        found = dependencies.Code(folder).closure(folder / f"{start}.py")
+        return {path.relative_to(folder).as_posix() for path in found.files}, set(found.packages), found.digest
+
+    return closure
+
+
+TREE = {
+    "a": "",
+    "b": "import scipy\n",
+    "room__in___init__": "from .c import one\nfrom .d import two, three as third\n\n__all__ = ['one', 'two']\n",
+    "room__in_c": "import pyamg\none = 1\n",
+    "room__in_d": "import cvxopt\ntwo = 2\nthree = 3\n",
+    "lively__in___init__": "from ..b import x\nSIZE = 1\n",
+    "lively__in_e": "",
+}
+
+IMPORTS = {
+    "nothing": ("x = 1", set(), set()),
+    "absolute": ("import springtune.b", {"b"}, {"scipy"}),
+    "relative": ("from .b import x", {"b"}, {"scipy"}),
+    "relative, a module": ("from . import b", {"b"}, {"scipy"}),
+    "two levels": ("from .room import e", {"room/__init__", "room/c", "room/d"}, {"pyamg", "cvxopt"}),
+    "star": ("from .b import *", {"b"}, {"scipy"}),
+    "star of a face": ("from .room import *", {"room/__init__", "room/c", "room/d"}, {"pyamg", "cvxopt"}),
+    "a name of a face": ("from .room import one", {"room/c"}, {"pyamg"}),
+    "a renamed name of a face": ("from .room import third", {"room/d"}, {"cvxopt"}),
+    "a module below a face": ("from .room import d", {"room/d"}, {"cvxopt"}),
+    "a face as a whole": ("import springtune.room", {"room/__init__", "room/c", "room/d"}, {"pyamg", "cvxopt"}),
+    "a module below what is no face": ("from .lively import e", {"lively/__init__", "lively/e", "b"}, {"scipy"}),
+    "conditional": ("if x:\n    from .b import x\nelse:\n    import numba", {"b"}, {"scipy", "numba"}),
+    "tried": ("try:\n    import numba\nexcept ImportError:\n    from . import b", {"b"}, {"scipy", "numba"}),
+    "in a function": ("def f():\n    from .b import x\n    import skfem.helpers", {"b"}, {"scipy", "skfem"}),
+    "in a method": ("class A:\n    def f(self):\n        with x:\n            import h5py", set(), {"h5py"}),
+    "in a case": ("match x:\n    case 1:\n        import h5py", set(), {"h5py"}),
+    "of submodules": ("from scipy.sparse.linalg import splu\nimport numpy.linalg", set(), {"scipy", "numpy"}),
+    "standard library": ("import os.path, json\nfrom __future__ import annotations", set(), set()),
+    "for type checkers": ("if TYPE_CHECKING:\n    from .b import x\n    import matplotlib", set(), set()),
+    "for type checkers, by typing": ("if typing.TYPE_CHECKING:\n    import matplotlib", set(), set()),
+    "else than for type checkers": ("if TYPE_CHECKING:\n    import pandas\nelse:\n    import numba", set(), {"numba"}),
+    "by its name as a text": ("from importlib import import_module\nimport_module('springtune.b')", set(), set()),
+    "in a circle": ("from .a import x", set(), set()),
+}
+
+
+@pytest.mark.parametrize(("text", "files", "packages"), IMPORTS.values(), ids=IMPORTS)
+def test_imports_that_can_run_are_followed(package, text, files, packages):
+    found = package("a", **TREE | {"a": text})
+    assert found[:2] == ({"a.py", *(f"{name}.py" for name in files)}, packages)
+
+
+@pytest.mark.parametrize("changed", ["a", "b", "room__in_c"])
+def test_a_digest_is_that_of_all_that_is_imported(package, changed):
+    texts = TREE | {"a": "from .b import x\nfrom .room import one"}
+    before = package("a", **texts)[2]
+    assert package("a", **texts | {changed: texts[changed] + "\n# A comment.\n"})[2] == before
+    assert package("a", **texts | {changed: texts[changed] + "\nCHANGED = 1\n"})[2] != before
+    assert package("a", **texts | {"room__in_d": "import xarray\ntwo = 4"})[2] == before  # not a name that is used
+
+
+def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
+    folder, note = tmp_path / "springtune", tmp_path / "code.json"
+    folder.mkdir()
+    for name, text in {
+        "a": "from .b import x\nimport numpy",
+        "b": "from .c import *\nfrom .d import y",
+        "c": "",
+        "d": "",
+    }.items():
+        (folder / f"{name}.py").write_text(text)
+
+    def closure(recall=True):
+        code = dependencies.Code(folder)
+        if recall:
+            code.recall(note)
+        found = code.closure(folder / "a.py")
+        code.remember(note)
+        return found
+
+    fresh = closure(recall=False)
+    time = note.stat().st_mtime_ns
+    assert closure() == fresh and note.stat().st_mtime_ns == time
+    # Another digest in the note shows that it is taken, and only for the content that it was made of.
+    content = sealed.read(note)
+    for source in content["sources"].values():
+        source[0] = "taken"
+    sealed.write(note, content)
+    assert closure().digest != fresh.digest
+    sealed.write(note, content | {"reader": "another one"})
+    assert closure() == fresh
+    note.write_text("{")
+    assert closure() == fresh
+    for name in "abcd":
+        (folder / f"{name}.py").write_text((folder / f"{name}.py").read_text() + "\nz = 1\n")
+    assert closure() == closure(recall=False) != fresh
+
+
+# -- what springtune runs on -------------------------------------------------------------------------------------------
+
+WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "rich", "typst", "jinja2", "pydantic", "yaml", "PIL"}
+
+
+@pytest.mark.parametrize("stage", stages(), ids=lambda stage: stage.name)
+def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
+    packages = set(dependencies.stage_closure(stage.module).packages)
+    assert not packages & (WRITING | {package for _, package in dependencies.CARRIED})
+
+
+@pytest.mark.parametrize(
+    ("module", "packages"),
+    [
+        ("kinds.scenes.mesh", {"numpy", "scipy"}),
+        ("kinds.scenes.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("kinds.scenes.sensitivity", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("kinds.scenes.reference", {"numpy", "scipy", "cvxopt", "skfem"}),
+        ("kinds.moduli.stage", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("kinds.stability.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba"}),
+        ("kinds.benchmark.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba", "skfem"}),
+    ],
+)
+def test_packages_are_those_that_are_imported(module, packages):
+    assert set(dependencies.stage_closure(module).packages) == packages
+
+
+def test_packages_that_are_carried_are_imported_where_it_is_said():
+    for place, package in dependencies.CARRIED:
+        assert package in dependencies.OURS.closure(dependencies.PACKAGE / place, carried=False).packages
+
+
+def test_meshers_count_with_their_meshes():
+    assert "netgen" in dependencies.mesh_type_closure("free").packages
+    assert not any("netgen" in dependencies.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
+    assert "meshio" in dependencies.mesh_file_closure().packages
+
+
+LOOKED_UP = ("campaign.collect", "campaign.present", "campaign.browse", "campaign.page", "publication.build")
+
+
+def test_distributions_of_packages_are_those_that_are_installed():
+    known = importlib.metadata.packages_distributions()
+    used = {name for stage in stages() for name in dependencies.stage_closure(stage.module).packages}
+    used |= {name for one in DEFINITIONS for name in dependencies.definition_closure(one).packages} | {"netgen"}
+    used |= {name for module in LOOKED_UP for name in dependencies.stage_closure(module).packages}
+    for package in used & set(known):
+        assert dependencies.distribution(package).lower() in map(str.lower, known[package])
+    # Whatever is known by itself costs nothing to look up.
+    for package in used & set(known):
+        assert package in dependencies.DISTRIBUTIONS or importlib.metadata.version(package)
+    assert dependencies.distribution("no_such_package") == "no_such_package"
+
+
+def forget():
+    """Forget keys; of the same code, versions may be others."""
+    for one in (keys.stage_key, keys.code_key, keys.installed, dependencies.distribution):
+        one.cache_clear()
+
+
+def _keys():
+    forget()
+    found = {stage.module: keys.stage_key(stage.module) for stage in stages()}
+    found["unit"] = keys.stage_key("kinds.scenes.reference", without=("reference.finite_strain",))
+    found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
+    return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}
+
+
+SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
+SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark")} | {"patch", "annealed"}
+REFERENCE = {"kinds.scenes.reference", "unit"}
+
+VERSIONS = {
+    "matplotlib": set(),
+    "xarray": set(),
+    "h5py": set(),
+    "pint": set(),
+    "pydantic": set(),
+    "snakemake": set(),
+    "netgen-mesher": {"free"},
+    "meshio": {"from a file"},
+    "numba": {"kinds.stability.stage", "kinds.benchmark.stage"},
+    "scikit-fem": {"kinds.scenes.reference", "kinds.benchmark.stage"},
+    "pyamg": SOLVING,
+    "cvxopt": SOLVING | REFERENCE,
+    "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "from a file"},
+}
+
+
+@pytest.mark.parametrize("package", VERSIONS)
+def test_a_packages_version_is_in_the_keys_of_what_it_computes(package, monkeypatch):
+    version = importlib.metadata.version
+    before = _keys()
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "999" if name == package else version(name))
+    after = _keys()
+    monkeypatch.undo()
+    forget()
+    assert {name for name in before if after[name] != before[name]} == VERSIONS[package]
+
+
+def test_an_extra_that_is_not_there_or_not_wanted_is_none(monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setenv("SPRINGTUNE_SOLVER", "superlu")
+        unwanted = _keys()
+    with monkeypatch.context() as patch:
+        version = importlib.metadata.version
+
+        def absent(name):
+            if name == "cvxopt":
+                raise importlib.metadata.PackageNotFoundError(name)
+            return version(name)
+
+        patch.setattr(importlib.metadata, "version", absent)
+        patch.setattr(importlib.metadata, "packages_distributions", dict)
+        missing = _keys()
+    forget()
+    assert unwanted == missing
+
+
+def test_pythons_minor_version_counts(monkeypatch):
+    before = _keys()
+    monkeypatch.setattr(sys, "version_info", (3, 99, 0, "final", 0))
+    after = _keys()
+    monkeypatch.undo()
+    forget()
+    assert all(after[name] != before[name] for name in before)
+
+
+# -- definitions of one's own ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """Import a module of some text beside others; closure of its definition ``own``."""
+    monkeypatch.syspath_prepend(tmp_path)
+    number = iter(range(100))
+
+    def closure(text, **beside):
+        for name, other in beside.items():
+            path = tmp_path / (name.replace("__in_", "/") + ".py")
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(other)
+        name = f"own_{tmp_path.name}_{next(number)}"
+        (tmp_path / f"{name}.py").write_text(text)
+        importlib.import_module(name)
+        found = dependencies.definition_closure("own", dependencies.Code())
+        DEFINITIONS.discard("own")
+        sys.modules.pop(name)
+        return found
+
+    yield closure
+    DEFINITIONS.discard("own")
+
+
+OWN = '''\
+from springtune.springs import Springs, definition
+
+@definition("own")
+def springs(mesh, material, thickness):
+    """Springs."""
+    return Springs(1.0, mesh.edge_lengths)  # one
+'''
+
+
+def test_ones_own_definition_counts_with_its_code_and_packages(own):
+    digest = own(OWN).digest
+    assert own(OWN.replace("Springs.", "My springs.").replace("# one", "# 1")).digest == digest
+    assert own(OWN.replace("1.0", "2.0")).digest != digest
+    assert own("import h5py, pandas, os\n" + OWN).packages == ("h5py", "numpy", "pandas")
+
+
+def test_modules_beside_ones_own_definition_count(own):
+    text = OWN.replace("1.0", "factor").replace("\n@", "from beside import factor\n\n@", 1)
+    more = "import scipy\nfactor = 1.0\n"
+    first = own(text, beside="from helpers.more import factor\n", helpers__in_more=more)
+    assert {path.name for path in first.files} >= {"base.py", "more.py"} and "scipy" in first.packages
+    assert own(text, helpers__in_more=more.replace("1.0", "2.0")).digest != first.digest
+
+
+def test_names_of_the_package_itself_are_followed(own):
+    text = OWN.replace("from springtune.springs import Springs, definition", "import springtune as st")
+    text = text.replace("@definition", "@st.definition").replace("Springs(", "st.Springs(")
+    files = {path.name for path in own(text).files}
+    assert "base.py" in files and not {"single.py", "__init__.py"} & files
+    more = own(text.replace("1.0", "st.moduli(mesh, material, 'lattice').young_modulus_error"))
+    assert "moduli.py" in {path.name for path in more.files} and "scipy" in more.packages
+
+
+def test_a_definition_of_a_notebook_is_its_function(monkeypatch):
+    """Its text is all that is known; packages that it imports inside count."""
+    found = []
+    for factor in ("1.0", "1.00", "2.0"):
+        text = f"def springs(mesh, material, thickness):\n    import scipy\n    return Springs({factor}, mesh.areas)\n"
+        space = {"Springs": Springs, "__name__": "cell"}
+        exec(compile(text, "<cell>", "exec"), space)
+        monkeypatch.setattr(inspect, "getsource", lambda function, text=text: text)
+        definition("own")(space["springs"])
+        assert DEFINITIONS["own"].file is None
+        found.append(dependencies.definition_closure("own"))
+        DEFINITIONS.discard("own")
+    assert found[0].digest == found[1].digest != found[2].digest
+    assert found[0].packages == ("scipy",) and not found[0].files
+
+
+def test_a_definition_of_a_prompt_without_a_text_has_a_digest():
+    digests = set()
+    for factor in ("1.0", "2.0"):
+        space = {"Springs": Springs, "__name__": "prompt"}
+        exec(f"springs = lambda mesh, material, thickness: Springs({factor}, mesh.edge_lengths)", space)
+        definition("own")(space["springs"])
+        digests.add(dependencies.definition_closure("own").digest)
+        DEFINITIONS.discard("own")
+    assert len(digests) == 2
+
+
+def test_a_file_keeps_its_digest_wherever_it_is(tmp_path):
+    texts = []
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        folder.mkdir()
+        (folder / "own.py").write_text(MODULE)
+        texts.append(dependencies.OURS.closure(folder / "own.py").digest)
+    assert texts[0] == texts[1]
