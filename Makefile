@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -40,6 +40,10 @@ INPUTS ?= 20000
 SEED ?= 1
 test-fuzz: $(VENV)/.test
 	OPENBLAS_NUM_THREADS=1 python tests/fuzz $(INPUTS) $(SEED)
+
+# The same numbers by SuperLU and by CHOLMOD, and with the oldest packages that pyproject.toml allows, which are installed.
+test-versions: $(VENV)/.test
+	pytest -rs tests/versions
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow

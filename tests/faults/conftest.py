@@ -45,7 +45,7 @@ class Whole:
 def whole(tmp_path_factory):
     """The study run in this process, whose forks find all modules imported and the kernels compiled."""
     os.environ["MPLBACKEND"] = "Agg"
-    driven.remember_what_jobs_compute()
     base = tmp_path_factory.mktemp("whole")
+    driven.warm_up(base / "scratch")
     steps = driven.complete(base / "study", base / "snapshots")
     return Whole(steps, base / "snapshots", driven.contents(base / "study/results"))

@@ -1,6 +1,7 @@
 """A study run job by job in forks of one process, as the rules run it: each job costs milliseconds."""
 
 import contextlib
+import ctypes
 import json
 import os
 import re
@@ -8,17 +9,19 @@ import shutil
 import sys
 import traceback
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import h5py
 import netCDF4
 import numpy as np
-from injection import Faults
+import xarray
 
 from springtune.campaign import browse, collect, due, present
 from springtune.campaign.plan import plan
 from springtune.jobs import run_tasks, sealed, store
 from springtune.jobs.atomic import remove_unfinished
+from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
 from springtune.kinds.benchmark import stage as benchmark
 from springtune.kinds.laying import stage as laying
@@ -28,16 +31,24 @@ FOLDER = Path("results/small")
 BEGIN = "begin"
 """What a run does before its first job."""
 
+ADOPTING = 36
+"""Linux's number for what makes a process the parent of those whose own is gone (prctl)."""
+
 TIMES = re.compile("seconds|time|speed|created|history", re.IGNORECASE)
 """What of names says that a value is another one in every run."""
 
 DATE = re.compile(rb"\d{4}-\d\d-\d\dT[\d:+]+")
 
 
-def remember_what_jobs_compute():
-    """What takes longest is computed once: here it is about what becomes of files."""
+def warm_up(scratch):
+    """Do all jobs of stages once in this process, so that its forks find modules imported and kernels compiled.
+
+    What takes longest is not computed again after that: here it is about what becomes of files.
+    """
     for module, name in ((benchmark, "_case"), (laying, "_lay")):
         setattr(module, name, _remembered(getattr(module, name)))
+    for job in plan(load_study(STUDY), scratch, 1).jobs.values():
+        import_module(f"springtune.{job.stage.module}").run(job.content, Spent())
 
 
 def _remembered(function):
@@ -118,11 +129,17 @@ def complete(folder, snapshots):
 
 def forked(function, folder, log):
     """Status of a process, forked off this one, that calls a function in a folder; what it says goes into a file."""
+    ctypes.CDLL(None).prctl(ADOPTING, 1)
     child = os.fork()
     if child:
-        return os.waitpid(child, 0)[1]
+        status = os.waitpid(child, 0)[1]
+        with contextlib.suppress(ChildProcessError):
+            while True:  # until all that it started is gone, too
+                os.waitpid(-child, 0)
+        return status
     code = 1
     try:
+        os.setsid()
         output = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         for stream in (1, 2):
             os.dup2(output, stream)
@@ -138,31 +155,12 @@ def forked(function, folder, log):
         os._exit(code)
 
 
-def faulty(step, folder, number, how, report):
-    """What a step does with a fault, for `forked`."""
+def faulty(step, faults):
+    """Do a step with faults, or count its operations, for `forked`."""
     run = Run()
-    import xarray
-
-    faults = Faults(folder / "results", number, how, report)
     xarray.DataTree.to_netcdf = faults.watch_library(xarray.DataTree.to_netcdf)
     with faults:
         run.do(step)
-
-
-def operations(step, folder):
-    """Operations on files of a step, which is done."""
-    run = Run()
-    import xarray
-
-    real = xarray.DataTree.to_netcdf
-    faults = Faults(folder / "results")
-    xarray.DataTree.to_netcdf = faults.watch_library(real)
-    try:
-        with faults:
-            run.do(step)
-    finally:
-        xarray.DataTree.to_netcdf = real
-    return faults.seen
 
 
 # -- what is there -----------------------------------------------------------------------------------------------------

@@ -11,12 +11,15 @@ import io
 import os
 import signal
 import traceback
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 FAULTS = ("error", "full", "kill")
 """How an operation fails: the device has an error; the disk is full from then on, and a write ends halfway; the process
-is killed, halfway through a write."""
+and all of its group are killed, halfway through a write."""
+
+WIDTH = 200
+"""Characters of a line of notes."""
 
 ROOM = {"open", "write", "library", "mkdir", "fsync"}
 """Operations that need room on a disk."""
@@ -33,28 +36,22 @@ class Faults:
     Attributes
     ----------
     folder : Path
+    notes : Path
+        File, elsewhere, with a line of `WIDTH` for each operation so far, of this process and of those that it starts:
+        they count together.
     number : int
         Which operation fails, from 1; none does at 0.
     how : str
         One of `FAULTS`.
     report : Path or None
         File, elsewhere, that tells of the failure.
-    group : bool
-        Whether all processes of the group are killed.
-    counter : Path or None
-        File, elsewhere, in which processes count together.
-    seen : list of tuple
-        Operations so far and their files.
     """
 
     folder: Path
+    notes: Path
     number: int = 0
     how: str = ""
     report: Path | None = None
-    group: bool = False
-    counter: Path | None = None
-    seen: list[tuple[str, str]] = field(default_factory=list)
-    full: bool = False
 
     def __enter__(self):
         self.folder = os.path.realpath(self.folder)
@@ -74,18 +71,18 @@ class Faults:
         path = os.fsdecode(path)
         if not os.path.abspath(path).startswith(self.folder + os.sep):
             return
-        self.seen.append((name, os.path.relpath(path, self.folder)))
-        if self._count() == self.number:
+        number = self._count(name, os.path.relpath(path, self.folder))
+        if number == self.number:
             self._fail(name, path, half)
-        if self.full and name in ROOM:
+        if self.how == "full" and 0 < self.number < number and name in ROOM:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), path)
 
-    def _count(self):
-        if not self.counter:
-            return len(self.seen)
-        file = os.open(self.counter, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
-        os.write(file, b".")  # at its end, whoever else writes
-        number = os.lseek(file, 0, os.SEEK_CUR)
+    def _count(self, name, path):
+        """Number of an operation, of all processes."""
+        line = f"{name} {path}"[-WIDTH + 1 :].ljust(WIDTH - 1) + "\n"
+        file = os.open(self.notes, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+        os.write(file, line.encode())  # at its end, whoever else writes
+        number = os.lseek(file, 0, os.SEEK_CUR) // WIDTH
         os.close(file)
         return number
 
@@ -97,9 +94,8 @@ class Faults:
         if self.how != "error":
             half()
         if self.how == "kill":
-            (os.killpg if self.group else os.kill)(os.getpgid(0) if self.group else os.getpid(), signal.SIGKILL)
-        self.full = self.how == "full"
-        code = errno.ENOSPC if self.full else errno.EIO
+            os.killpg(os.getpgid(0), signal.SIGKILL)
+        code = errno.ENOSPC if self.how == "full" else errno.EIO
         raise OSError(code, os.strerror(code), path)
 
     def _watched(self, name, real):
@@ -147,3 +143,8 @@ class _Raw(io.FileIO):
         half = bytes(data)[: memoryview(data).nbytes // 2]
         self._faults.operation("write", self.name, lambda: super(_Raw, self).write(half))
         return super().write(data)
+
+
+def operations(notes):
+    """Operations and their files, from the notes of `Faults`."""
+    return [tuple(line.split(maxsplit=1)) for line in notes.read_text().splitlines()]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import driven
 import pytest
-from injection import FAULTS
+from injection import FAULTS, operations
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -19,8 +19,8 @@ from pathlib import Path
 
 from injection import Faults
 
-folder, number, how, report, counter = os.environ["FAULT"].split("|")
-Faults(Path(folder), int(number), how, Path(report), group=True, counter=Path(counter)).__enter__()
+folder, notes, number, how, report = os.environ["FAULT"].split("|")
+Faults(Path(folder), Path(notes), int(number), how, Path(report)).__enter__()
 """
 """What each process of a run starts with."""
 
@@ -55,7 +55,7 @@ def started(base, name):
     folder = base / name
     folder.mkdir()
     text = re.sub(r"(?ms)^(laying|stability|benchmark):\n.*?(?=^\w)", "", driven.STUDY.read_text())
-    (folder / "small.yaml").write_text(text.replace("outputs: [size, tables]", "outputs: []"))
+    (folder / "small.yaml").write_text(text.replace("outputs: [size, tables]", "outputs: [tables]"))
     return folder
 
 
@@ -63,10 +63,11 @@ def started(base, name):
 def complete(base):
     """Operations of a run, and what it makes."""
     folder = started(base, "complete")
-    counter = base / "complete.count"
-    code, output = run(folder, f"{folder}|0||none|{counter}")
+    notes = base / "complete.notes"
+    code, output = run(folder, f"{folder}|{notes}|0||none")
     assert code == 0, output
-    return counter.stat().st_size, driven.contents(folder / "results", logs=False)
+    print(f"{len(operations(notes))} operations of a run")
+    return len(operations(notes)), driven.contents(folder / "results", logs=False)
 
 
 @pytest.mark.slow
@@ -75,8 +76,8 @@ def test_a_run_with_a_fault_is_made_good_by_a_plain_one(base, complete, place):
     count, wanted = complete
     number, how = 1 + place * (count - 1) // (SAMPLE - 1), FAULTS[(place + 2) % len(FAULTS)]
     folder = started(base, f"{number}_{how}")
-    report, counter = base / f"{number}.txt", base / f"{number}.count"
-    code, output = run(folder, f"{folder}|{number}|{how}|{report}|{counter}")
+    report, notes = base / f"{number}.txt", base / f"{number}.notes"
+    code, output = run(folder, f"{folder}|{notes}|{number}|{how}|{report}")
     told = f"{number} of {count}: " + (report.read_text() if report.exists() else "the operation did not come")
     code, again = run(folder)
     assert code == 0, f"{told}\n{output}\n-- plain:\n{again}"

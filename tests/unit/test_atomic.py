@@ -36,7 +36,7 @@ def test_what_the_dead_left_is_swept_and_what_the_living_write_stays(tmp_path):
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as living:
         kept = tmp_path / "deep" / f"a.h5.{living.pid}.unfinished"
         atomic.write_text(kept, "half of")
-        for name in ("deep/a.h5.0.unfinished", "b.unfinished", "c.x.unfinished", f"d.{10**30}.unfinished"):
+        for name in ("deep/a.h5.99999999.unfinished", "b.unfinished", "c.x.unfinished", f"d.{10**30}.unfinished"):
             atomic.write_text(tmp_path / name, "half of")
         atomic.write_text(tmp_path / "deep/unfinished.txt", "whole")
         atomic.remove_unfinished(tmp_path, below=False)
@@ -46,3 +46,12 @@ def test_what_the_dead_left_is_swept_and_what_the_living_write_stays(tmp_path):
         living.communicate(b"\n")
     atomic.remove_unfinished(tmp_path)
     assert [path.name for path in (tmp_path / "deep").iterdir()] == ["unfinished.txt"]
+
+
+def test_the_dead_that_nobody_waits_for_write_nothing(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    os.waitid(os.P_PID, dead.pid, os.WEXITED | os.WNOWAIT)
+    atomic.write_text(tmp_path / f"note.txt.{dead.pid}.unfinished", "half of")
+    atomic.remove_unfinished(tmp_path)
+    assert not list(tmp_path.iterdir())
+    dead.wait()

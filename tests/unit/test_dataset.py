@@ -216,7 +216,7 @@ class TestInterruptedWrite:
         write_curves(tmp_path / "dataset.nc", 1.0)
         whole = (tmp_path / "dataset.nc").read_bytes()
         os.remove(tmp_path / "dataset.nc")
-        unfinished = tmp_path / "dataset.nc.0.unfinished"
+        unfinished = tmp_path / "dataset.nc.99999999.unfinished"
         for share in (0.0, 0.1, 0.5, 0.999):
             unfinished.write_bytes(whole[: int(share * len(whole))])
             with pytest.raises(FileNotFoundError, match="there is no such dataset"):

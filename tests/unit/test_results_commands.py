@@ -260,8 +260,8 @@ class TestClean:
                  "tasks/bundles.json", "tasks/mesh_0.json", "done/mesh_0.json", "logs/snakemake.log"]  # fmt: skip
         stale = ["meshes/20x10_right_2.5mm.vtu", "meshes/20x10_right_2.5mm.json", "solutions/20x10_right_2.5mm.h5",
                  "figures/size_right_m_bending.png", "tables/table_9.csv", "references/0123456789.h5",
-                 "moduli/patch.h5", "tasks/solve_7.json", "logs/solve_7.log", "dataset.nc.0.unfinished",
-                 "meshes/20x10_right_5mm.vtu.0.unfinished"]  # fmt: skip
+                 "moduli/patch.h5", "tasks/solve_7.json", "logs/solve_7.log", "dataset.nc.99999999.unfinished",
+                 "meshes/20x10_right_5mm.vtu.99999999.unfinished"]  # fmt: skip
         for name in files + stale:
             path = Path("results/two") / name
             path.parent.mkdir(parents=True, exist_ok=True)

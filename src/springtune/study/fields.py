@@ -1,6 +1,7 @@
 """Types of the values of a study: how their text is read, and words for what is expected."""
 
 import math
+import re
 from collections.abc import Callable, Collection
 from typing import Annotated, Any
 

@@ -1,0 +1,72 @@
+"""What the stages of a study store, in a file: ``python computed.py STUDY OUTPUT``.
+
+Any Python that has the packages runs it. Results are told by their place, since versions are part of their keys.
+"""
+
+import pickle
+import sys
+import tempfile
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import h5py
+
+from springtune.campaign.plan import plan
+from springtune.jobs import sealed, store
+from springtune.jobs.spent import Spent
+from springtune.kinds import load_study
+from springtune.kinds.scenes import stored_mesh
+from springtune.kinds.scenes.solve import _stored_key
+
+PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "netgen-mesher", "pyamg", "scikit-fem", "h5py", "meshio")
+
+
+def keys(content, calibration):
+    """Keys of the results of a job, in order."""
+    found = []
+    for value in (value for name, value in content.items() if isinstance(value, list) and name != "members"):
+        for one in (one for one in value if isinstance(one, dict)):
+            found += [_stored_key(one, calibration)] if "key" in one else keys(one, calibration)
+    return found
+
+
+def stored(path):
+    """Results in a file by key, arrays included."""
+    results = store.read(path, store.stored(path))
+    with h5py.File(path) as file:
+        for key in set(file) & set(results):
+            results[key] |= {name: array[()] for name, array in file[key].items()}
+    return results
+
+
+def computed(study, folder):
+    """Results by stage, place and name: numbers, texts and arrays; and the meshes' points."""
+    found = {}
+    for job in plan(study, folder, 1).jobs.values():
+        import_module(f"springtune.{job.stage.module}").run(job.content, Spent())
+        if job.stage.name == "mesh":
+            for one in job.content["meshes"]:
+                found["mesh", one["name"], "points"] = stored_mesh.read(job.content["folder"], one["name"]).points
+            continue
+        calibration = sealed.read(folder / "calibration.json")
+        results = {key: one for path in job.products if path.endswith(".h5") for key, one in stored(path).items()}
+        for place, key in enumerate(keys(job.content, calibration)):
+            found |= {(job.stage.name, place, name): value for name, value in results[key].items()}
+    return found
+
+
+def installed(name):
+    """Version of a package."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "none"
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as scratch:
+        result = computed(load_study(sys.argv[1]), Path(scratch))
+    result["versions"] = {name: installed(name) for name in PACKAGES}
+    with open(sys.argv[2], "wb") as output:
+        pickle.dump(result, output)

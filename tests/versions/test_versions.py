@@ -1,0 +1,130 @@
+"""The same numbers from other solvers and other versions of numpy and scipy, within what a solve promises.
+
+What is compared how follows from what is computed: a state is the same or not; an equilibrium is as good as Newton's
+method leaves it, a curve as its series are, an error as what it is a ratio of. A residual is what rounding leaves, and
+compared with nothing.
+"""
+
+import os
+import pickle
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springtune.linalg.factors import CHOLESKY
+from springtune.mechanics.newton import REFINED
+from springtune.mechanics.series import CURVE_TOLERANCE
+
+REPOSITORY = Path(__file__).parents[2]
+PROGRAM = Path(__file__).with_name("computed.py")
+
+ROUNDING = 1e-12
+"""Of what is computed without a system of equations, or with a well-conditioned one."""
+
+TOLERANCES = {
+    "mesh": ROUNDING,
+    "reference": REFINED,
+    "sensitivity": CURVE_TOLERANCE,
+    "moduli": REFINED,
+    "solve": REFINED,
+    "laying": REFINED,
+    "stability": REFINED,
+}
+"""Largest difference over the largest value of a result, or over 1 for ratios, by stage."""
+
+RATIOS = re.compile("error|ratio|elongation|penetration")
+"""Of names of numbers that are compared as they are: parts of what has size 1."""
+
+COUNTS = re.compile("status|stable|pivots|evaluations|load_share")
+"""Of names of what must be the same."""
+
+LEFT = re.compile("seconds|residual|estimate|iterations|solver|contrast_error|spring_forces")
+"""Of names of what rounding leaves: bounds on errors, not results. Forces are kept in single precision."""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    sys.path.insert(0, str(REPOSITORY / "tests/workflow"))
+    from test_company import STUDY
+
+    path = tmp_path_factory.mktemp("versions") / "many.yaml"
+    path.write_text(STUDY)
+    return path
+
+
+def computed(study, python, name, **environment):
+    """What the stages of the study store, computed by a Python."""
+    output = study.with_name(f"{name}.pickle")
+    environment = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"} | environment
+    subprocess.run([str(python), str(PROGRAM), str(study), str(output)], check=True, env=environment)
+    return pickle.loads(output.read_bytes())
+
+
+@pytest.fixture(scope="module")
+def usual(study):
+    return computed(study, sys.executable, "usual")
+
+
+def compared(found, wanted):
+    """Largest difference of each kind of value over its tolerance, and what is not the same."""
+    worst, others = {}, []
+    versions = found["versions"], wanted["versions"]
+    assert found.keys() == wanted.keys()
+    for place in found.keys() - {"versions"}:
+        stage, _, name = place
+        one, other = found[place], wanted[place]
+        if LEFT.search(name):
+            continue
+        if isinstance(other, str | list):
+            # Texts tell numbers of few digits, the last of which may be another one.
+            if re.sub(r"\d[\d.e+-]*", "#", str(one)) != re.sub(r"\d[\d.e+-]*", "#", str(other)):
+                others.append((place, one, other))
+            continue
+        one, other = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+        counted = bool(COUNTS.search(name)) and not np.array_equal(one, other, equal_nan=True)
+        if counted or not np.array_equal(np.isfinite(one), np.isfinite(other)):
+            others.append((place, one, other))
+            continue
+        size = 1.0 if RATIOS.search(name) else np.abs(other[np.isfinite(other)]).max(initial=0.0) or 1.0
+        apart = np.abs(one - other)[np.isfinite(other)].max(initial=0.0) / size
+        worst[stage, name] = max(worst.get((stage, name), 0.0), float(apart))
+    beyond = {place: apart for place, apart in worst.items() if apart > TOLERANCES[place[0]]}
+    print(*versions, *(f"{apart:.1e} {' '.join(place)}" for place, apart in sorted(worst.items()) if apart), sep="\n")
+    return beyond, others
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not CHOLESKY, reason="CHOLMOD is not installed: SuperLU is what factorizes here")
+def test_superlu_and_cholmod_agree(study, usual):
+    found = computed(study, sys.executable, "superlu", SPRINGTUNE_SOLVER="superlu")
+    assert compared(found, usual) == ({}, [])
+
+
+@pytest.fixture(scope="module")
+def oldest(tmp_path_factory):
+    """A Python with the oldest packages that `pyproject.toml` allows: the newest releases of these minor versions."""
+    declared = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    wanted = [*declared["dependencies"], *declared["optional-dependencies"]["cholesky"]]
+    floors = [one.partition(">=")[::2] for one in wanted if not one.startswith("snakemake")]
+    floors = [f"{name}=={least}{'' if '.' in least else '.0'}.*" for name, least in floors]
+    folder = tmp_path_factory.mktemp("oldest") / "venv"
+    for command in (["venv", "--python", sys.executable, folder], ["pip", "install", "--python", folder, *floors]):
+        try:
+            done = subprocess.run(["uv", *map(str, command)], capture_output=True, text=True, timeout=600)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            pytest.skip(f"the oldest packages cannot be installed here: {error}")
+        if done.returncode:
+            pytest.skip(f"the oldest packages cannot be installed here: {done.stderr.strip()[-300:]}")
+    return folder / "bin/python"
+
+
+@pytest.mark.slow
+def test_the_oldest_and_the_newest_packages_agree(study, usual, oldest):
+    found = computed(study, oldest, "oldest")
+    assert found["versions"]["numpy"] != usual["versions"]["numpy"]
+    assert compared(found, usual) == ({}, [])

@@ -1,0 +1,189 @@
+"""A result depends on its own key alone: not on what is computed along with it, before it, or was stored already."""
+
+import copy
+import random
+from importlib import import_module
+
+import h5py
+import pytest
+
+from springtune.campaign.plan import plan
+from springtune.jobs import sealed, store
+from springtune.jobs.spent import Spent
+from springtune.kinds import load_study
+
+STUDY = """
+title: Many scenes of few meshes
+beams: {small: {length: 50 mm, height: 10 mm}, other: {length: 40 mm, height: 10 mm},
+        strip: {length: 60 mm, height: 10 mm}}
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}
+  rubber: {young_modulus: 1 MPa, poisson_ratio: 0.5}
+definitions: {calibrated: {beam: small, load: traction}}
+outputs: [definitions, deformed]
+laying:
+  strip: strip
+  trapezoid: {lower_base: 60 mm, upper_base: 30 mm, height: 10 mm}
+  material: rubber
+  support: steel
+  definition: area
+  mesh_size: 10 mm
+  reference_size: 10 mm
+  pressure: 0.001 MPa
+stability: {beam: strip, material: steel, force: 1 kN, definition: delingette, mesh_size: 3 mm, experiment: contrast}
+grids:
+  # Rubber is bent far and pressed beyond buckling: paths of many steps, indefinite tangents.
+  far:
+    beam: small
+    mesh_type: [structured, braced]
+    mesh_size: 5 mm
+    material: [rubber, steel]
+    load: [compression, bending, shear]
+    force: 1 N
+    definition: [calibrated, lattice, area]
+    kinematics: [nonlinear, linear]
+    moduli: true
+  near:
+    beam: small
+    mesh_type: [structured, braced, free]
+    mesh_size: [5 mm, 2.5 mm]
+    material: [rubber, steel]
+    load: traction
+    force: 0.2 N
+    definition: [calibrated, lattice, patch]
+    kinematics: [nonlinear, linear]
+  face:
+    beam: other
+    mesh_type: structured
+    mesh_size: 5 mm
+    material: rubber
+    load: [pressure, follower-pressure]
+    pressure: 0.0005 MPa
+    definition: [lattice, uniform]
+"""
+
+TIMES = ("seconds",)
+"""Ends of the names of what is another one in every run."""
+
+
+def stages(study, folder, cores=1):
+    """Modules of the jobs of a study and what they are to do, in an order in which they can run."""
+    return [(job.stage.module, job.content) for job in plan(study, folder, cores).jobs.values()]
+
+
+def compute(module, content):
+    """Do a job."""
+    import_module(f"springtune.{module}").run(content, Spent())
+
+
+def keys(content):
+    """Keys of the tasks of a job."""
+    found = [one["key"] for one in lists(content) if "key" in one]
+    return found + [key for one in lists(content) if "key" not in one for key in keys(one)]
+
+
+def lists(content):
+    """Dicts in lists of a dict: tasks, or what tasks have in common."""
+    return [one for value in content.values() if isinstance(value, list) for one in value if isinstance(one, dict)]
+
+
+def only(content, wanted):
+    """The job with the tasks of these keys alone."""
+    left = dict(content)
+    for name, value in content.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            left[name] = [only(one, wanted) for one in value if {one.get("key"), *keys(one)} & wanted]
+    return left
+
+
+def shuffled(content, generator):
+    """The job with its tasks in another order."""
+    content = copy.deepcopy(content)
+    for value in content.values():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            generator.shuffle(value)
+            value[:] = [shuffled(one, generator) for one in value]
+    return content
+
+
+def results(folder):
+    """What is stored, by file and key: scalars, texts and the bytes of arrays, without times."""
+    found = {}
+    for path in sorted(folder.rglob("*.h5")):
+        for key, result in store.read(path, store.stored(path)).items():
+            found[path.parent.name, path.stem, key] = {
+                name: repr(value) for name, value in result.items() if not name.endswith(TIMES)
+            }
+        with h5py.File(path) as file:
+            for key in set(file) - {store.SCALARS}:
+                of_key = found[path.parent.name, path.stem, key]
+                of_key |= {name: (array.shape, array[()].tobytes()) for name, array in file[key].items()}
+    found["calibration"] = sealed.demand(folder / "calibration.json")
+    return found
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    path = tmp_path_factory.mktemp("company") / "many.yaml"
+    path.write_text(STUDY)
+    return load_study(path)
+
+
+@pytest.fixture(scope="module")
+def usual(study, tmp_path_factory):
+    """Results of the study as it is usually run."""
+    folder = tmp_path_factory.mktemp("usual")
+    for module, content in stages(study, folder):
+        compute(module, content)
+    found = results(folder)
+    solved = [one for (folder, *_), one in found.items() if folder == "solutions"]
+    assert {one["status"] for one in solved} >= {"1", "3", "4"} and len(solved) == 148
+    return found
+
+
+def same(found, wanted):
+    """Fails with what differs."""
+    differing = [(key, name) for key in wanted for name in wanted[key] if found[key].get(name) != wanted[key][name]]
+    assert not differing and found.keys() == wanted.keys(), f"{len(differing)}: {differing[:10]}"
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4))])
+def test_order_does_not_matter(study, usual, tmp_path, seed):
+    generator = random.Random(seed)
+    for module, content in stages(study, tmp_path):
+        # A mean is taken in the order of a study's values, which are sorted.
+        compute(module, content if module.endswith("calibrate") else shuffled(content, generator))
+    same(results(tmp_path), usual)
+
+
+def test_what_was_stored_before_does_not_matter(study, usual, tmp_path):
+    """A random half of the tasks of each job first; then a few at a time; then all that is left."""
+    generator = random.Random(0)
+    for module, content in stages(study, tmp_path):
+        every = sorted(set(keys(content)))
+        generator.shuffle(every)
+        if not module.endswith("calibrate"):  # one result of all curves
+            for part in (every[: len(every) // 2], every[-3:]):
+                compute(module, only(content, set(part)))
+        compute(module, content)
+    same(results(tmp_path), usual)
+
+
+@pytest.mark.slow
+def test_company_does_not_matter(study, usual, tmp_path):
+    for module, content in stages(study, tmp_path):
+        for key in () if module.endswith("calibrate") else sorted(set(keys(content))):
+            compute(module, only(content, {key}))
+        compute(module, content)
+    same(results(tmp_path), usual)
+
+
+@pytest.mark.parametrize("cores", [8, pytest.param(2, marks=pytest.mark.slow)])
+def test_bundles_do_not_matter(study, usual, tmp_path, cores):
+    folder = tmp_path / "results/many"
+    sealed.write(tmp_path / "results/costs.json", {"kinds": {"nonlinear": [1.0, 100.0]}, "start_up": 0.1})
+    jobs = stages(study, folder, cores)
+    assert len(jobs) > len(stages(study, tmp_path / "elsewhere", 1))
+    for module, content in jobs:
+        compute(module, content)
+    same(results(folder), usual)
