@@ -4,6 +4,7 @@ import hashlib
 from collections import defaultdict
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any
 
 from ...jobs.hashing import hash_of
 from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
@@ -19,7 +20,7 @@ def particles(mesh):
     return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
 
 
-_grouped = {}
+_grouped: dict[int, tuple[Any, Any]] = {}
 
 
 def by_mesh(items):
