@@ -120,17 +120,26 @@ def looked_at(found, name):
 
 def begin():
     """What happens when jobs are about to run, and not when the Snakefile is read."""
-    locks.begin([one.folder for _, one in READ])
-    for _, one in READ:
-        one.write()
-        remove_unfinished(one.folder)
-        remove_unfinished(one.folder.parent, below=False)  # of what studies share
-    OURS.remember(RESULTS.parent / CODE_FILE)
+    try:
+        locks.begin([one.folder for _, one in READ])
+        for _, one in READ:
+            remove_unfinished(one.folder)
+            remove_unfinished(one.folder.parent, below=False)  # of what studies share
+            one.write()
+        OURS.remember(RESULTS.parent / CODE_FILE)
+    except OSError as error:
+        remedy = "make room or give leave to write there, then call the same command again"
+        raise WorkflowError(f"{error.filename or RESULTS} cannot be written: {error.strerror}; {remedy}") from None
     tell_start()
 
 
 def release():
     """Remove the lock of a run that was killed; who only looks leaves it where it is."""
+    state = Path(".snakemake")
+    if not os.access(state if state.exists() else ".", os.W_OK):
+        why = f"{Path.cwd()} cannot be written, and Snakemake wants to even where it only looks"
+        print(f"{why}; `springtune info`, `browse` and `verify` do not: call these", file=sys.stderr)
+        sys.exit(1)
     looking = any(handler.common_settings.dryrun for handler in HANDLERS if hasattr(handler, "common_settings"))
     if looking or not workflow.is_main_process:
         return
