@@ -62,7 +62,7 @@ STUDIES = {
     ),
     "a dense dataset": (
         scattered_grids(),
-        "grids: 2652721 cells of all labels together (421 beam x 6301 mesh_size); a",
+        "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
     ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
     "a long name": (SMALL.replace("a: {length", "a" * 61 + ": {length"), "' cannot name a beam; use letters, digits"),
