@@ -172,6 +172,8 @@ def predict(beam: Beam, mesh: Mesh, material: Material, known: References | None
 
     Raises
     ------
+    ValueError
+        If an argument is none, or the mesh does not fill the beam.
     DefinitionError
         If none of them can live on the mesh.
 

@@ -72,10 +72,12 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
     try:
-        # Opened first: of what it cannot open h5netcdf leaves a half-made file that complains when it is forgotten.
-        with guarded(path), h5py.File(path) as opened, h5netcdf.File(opened, decode_vlen_strings=True) as file:
-            check_size(path, held(file))
-            groups, contents = packed(file)
+        with guarded(path), h5py.File(path) as opened:
+            # Asked first: of what it cannot read h5netcdf leaves a half-made file that complains when it is forgotten.
+            opened.attrs.get("_nc3_strict")
+            with h5netcdf.File(opened, decode_vlen_strings=True) as file:
+                check_size(path, held(file))
+                groups, contents = packed(file)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error}); {REMEDY}") from None
     attributes = groups[0]["attributes"]

@@ -66,6 +66,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         raise FileNotFoundError(
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
+    check_links(file)
     try:
         tree = xarray.open_datatree(file, engine="netcdf4")
     except Exception as error:  # of a damaged file the libraries raise whatever they trip over
@@ -80,15 +81,16 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     return tree
 
 
-def check_links(path: str | os.PathLike[str]) -> None:
-    """Refuse a file whose arrays do not tell their dimensions as netCDF does: its library ends this process on some.
+def check_links(path: Path) -> None:
+    """Refuse a file on which the library of netCDF would end this process, or never come to an end.
 
-    So it does where another program has changed the attributes by which arrays and dimensions know each other.
+    So it does on some whose head is damaged, and where another program has changed the attributes by which arrays and
+    dimensions know each other. HDF5's own library says so in some milliseconds.
 
     Parameters
     ----------
-    path : str or Path
-        A dataset, or its folder; nothing is said of one that is not there or is no HDF5 file: `open` does.
+    path : Path
+        A dataset.
 
     Raises
     ------
@@ -114,13 +116,11 @@ def check_links(path: str | os.PathLike[str]) -> None:
                 if held.get_type().get_class() != kind or held.shape != shape:
                     found.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
 
-    path = Path(path)
-    path = path / "dataset.nc" if path.is_dir() else path
     try:
         with guarded(path), h5py.File(path) as file:
             h5py.h5o.visit(file.id, look)
-    except OSError:
-        return
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({_said(error)}); {REMEDY}") from None
     if found:
         raise ValueError(
             f"{path}: is damaged, or changed by another program ({found[0]} is none of netCDF's); {REMEDY}"

@@ -1,0 +1,359 @@
+"""Input that is refused, and what it said or did before it was: found by the targets of tests/fuzz, or by people."""
+
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.browse.page import page
+from springtune.mesh import (
+    MESH_TYPES,
+    Mesh,
+    MeshError,
+    isosceles,
+    lattice,
+    read_beam_mesh,
+    right,
+    structured,
+    write_mesh,
+)
+from springtune.output import reading
+
+BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+
+SMALL = """
+title: small
+beams: {a: {length: 200 mm, height: 30 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  g: {mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN, definition: lattice,
+      beam: a}
+"""
+
+
+def sizes(count):
+    return "[" + ", ".join(f"{1 + number / 1e4:.4f} mm" for number in range(count)) + "]"
+
+
+def many_scenes():
+    """A product of lists that are each within their limit."""
+    names = [f"m{number}" for number in range(40)]
+    materials = ", ".join(f"{name}: {{young_modulus: 1 GPa, poisson_ratio: 0.3}}" for name in names)
+    text = SMALL.replace("material: steel", f"material: [{', '.join(names)}]").replace(
+        "steel: {", f"{materials}, steel: {{"
+    )
+    return text.replace("5 mm", sizes(9000))
+
+
+def scattered_grids():
+    """Few scenes, each of a beam and a mesh size that no other one has."""
+    names = [f"b{number}" for number in range(420)]
+    text = SMALL.replace("beams: {", "beams: {" + "".join(f"{name}: {{length: 1 m, height: 1 m}}, " for name in names))
+    rest = "mesh_type: structured, material: steel, load: traction, force: 1 kN, definition: lattice}"
+    for number, name in enumerate(names):
+        listed = ", ".join(f"{2 + number + part / 100:.2f} mm" for part in range(15))
+        text += f"  {name}: {{beam: {name}, mesh_size: [{listed}], {rest}\n"
+    return text
+
+
+STUDIES = {
+    "many scenes": (
+        many_scenes(),
+        "grids.g: 360000 scenes (9000 mesh_size x 40 material); a study has at most 250000: give shorter lists",
+    ),
+    "a dense dataset": (
+        scattered_grids(),
+        "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
+    ),
+    "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
+    "a long name": (SMALL.replace("a: {length", "a" * 61 + ": {length"), "' cannot name a beam; use letters, digits"),
+    "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give a length such as"),
+    "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
+    "deep": (SMALL.replace("5 mm", "[" * 30 + "5 mm" + "]" * 30), "not a study: nested too deeply"),
+    "no date": (SMALL.replace("small", "2001-99-99"), ":2: not YAML: '2001-99-99' is no timestamp; put it in quotes"),
+    "a tag": (SMALL.replace("small", "!own small"), ":2: a study has no tags such as '!own'; remove it"),
+    "a sign": (SMALL.replace("small", "="), ":2: not YAML: '=' means nothing by itself; put it in quotes"),
+    "a power of powers": (SMALL.replace("5 mm", "5 mm^9^9^9^9"), "unknown unit 'mm^9^9^9^9'"),
+    "beyond measure": (SMALL.replace("30 mm", "1e300 mm"), "'1e300 mm' is beyond all measure; give a length"),
+}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_beyond_limits_is_refused_before_it_is_expanded(tmp_path, name):
+    text, says = STUDIES[name]
+    path = tmp_path / "study.yaml"
+    path.write_text(text)
+    with pytest.raises(st.StudyError) as caught:
+        st.load_study(path)
+    assert says in str(caught.value) and len(str(caught.value)) < 2000
+
+
+def test_a_study_at_the_limits_is_read(tmp_path):
+    path = tmp_path / f"{'s' * 60}.yaml"
+    path.write_text(
+        SMALL.replace("5 mm", sizes(2000))
+        .replace("a: {length", "a" * 60 + ": {length")
+        .replace("beam: a", "beam: " + "a" * 60)
+    )
+    assert len(st.load_study(path).scenes) == 2000
+
+
+def sparse(path):
+    """A file of 61 MB that takes no room."""
+    with path.open("wb") as file:
+        file.truncate(61_000_000)
+
+
+@pytest.mark.parametrize("fault", ["missing", "a folder", "large"])
+def test_a_mesh_file_that_cannot_be_meant_is_an_error_of_the_study(tmp_path, fault):
+    file = tmp_path / "own.vtu"
+    if fault == "a folder":
+        file.mkdir()
+    elif fault == "large":
+        sparse(file)
+    text = SMALL.replace("mesh_type: structured", "mesh_type: own")
+    (tmp_path / "study.yaml").write_text(text + "mesh_files: {own: [{file: own.vtu, beam: a, mesh_size: 5 mm}]}\n")
+    with pytest.raises(st.StudyError, match=r"mesh_files\.own\[0\]\.file: .*own\.vtu' is (not a file|larger than)"):
+        st.load_study(tmp_path / "study.yaml")
+
+
+@pytest.mark.parametrize("make", [structured, right, *MESH_TYPES.values(), lambda *box: isosceles(*box, 0.3)])
+@pytest.mark.parametrize(
+    "box",
+    [
+        (0.12, 0.025, -0.001), (0.12, 0.025, 0.0), (0.12, 0.025, np.nan), (np.inf, 0.025, 0.005), (-0.12, 0.025, 0.005),
+        (0.12, 0.025, 1e-9), (0.12, 0.025, 1e308), (1e-308, 0.02, 0.005), ("120 mm", 0.025, 0.005), (0.12, True, 0.005),
+    ],
+)  # fmt: skip
+def test_no_mesh_is_made_of_a_box_that_is_none(make, box):
+    with pytest.raises(MeshError, match="(length|height|size): .*; give"):
+        make(*box)
+
+
+@pytest.mark.parametrize(
+    "call", [lambda: lattice(0, 3), lambda: lattice(3, 2.5), lambda: isosceles(0.1, 0.02, 5e-3, 0.0)]
+)
+def test_no_rows_are_made_that_are_none(call):
+    with pytest.raises(MeshError, match="; give"):
+        call()
+
+
+POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+@pytest.mark.parametrize(
+    ("points", "triangles", "says"),
+    [
+        (POINTS[:, :1], HALVES, r"points: float64 of shape \(4, 1\); give"),
+        ("x", HALVES, "points: str; give"),
+        (POINTS, HALVES.astype(float), "triangles: float64"),
+        (POINTS, np.zeros((0, 3), dtype=int), "there are no cells"),
+        (POINTS * [1, np.nan], HALVES, "points: 4 are nowhere, the first one 0"),
+        (POINTS, HALVES[:, ::-1], r"cells of 3 corners that are clockwise or have no area: 2, the first one 0 at"),
+        (POINTS, np.array([[0, 1, 2], [0, 0, 3]]), "have no area: 1, the first one 1"),
+        (POINTS, np.array([[0, 1, 2], [0, 2, 4]]), r"cell 1 has corners \[0, 2, 4\], and points are 0 to 3"),
+        (POINTS, np.array([[0, 1, 2], [-1, 0, 2]]), r"cell 1 has corners \[-1, 0, 2\]"),
+    ],
+)
+def test_a_mesh_of_arrays_that_are_none_is_refused(points, triangles, says):
+    with pytest.raises(MeshError, match=says):
+        Mesh(points, triangles)
+
+
+def test_three_cells_at_an_edge_are_refused():
+    points = np.vstack([POINTS, [[0.4, 0.6]]])
+    mesh = Mesh(points, np.vstack([HALVES, [[0, 2, 4]]]))
+    with pytest.raises(MeshError, match=r"the edge of points \[0, 2\] has 3 cells"):
+        len(mesh.edges)
+
+
+def plate(hole):
+    """A plate without the cells in its middle, or without a corner."""
+    whole = MESH_TYPES["right"](0.1, 0.04, 2.5e-3)
+    middles = whole.points[whole.triangles].mean(axis=1)
+    keep = (np.abs(middles - ([0.05, 0.02] if hole else [0.1, 0.04])) > 0.01).any(axis=1)
+    used, cells = np.unique(whole.triangles[keep], return_inverse=True)
+    return Mesh(whole.points[used], cells.reshape(-1, 3))
+
+
+@pytest.mark.parametrize("hole", [True, False])
+@pytest.mark.parametrize("definition", ["patch", "patch-area"])
+def test_a_patch_test_is_of_a_full_strip(hole, definition):
+    """It took the rim of a hole for ends, and gave 468e6 N/m for 182e6."""
+    with pytest.raises(st.DefinitionError, match="the mesh cannot have a patch test: .*; give a full rectangle"):
+        st.DEFINITIONS[definition].springs(plate(hole), STEEL, 1e-3)
+    with pytest.raises(MeshError, match="the mesh cannot have a patch test"):
+        st.moduli(plate(hole), STEEL, "lattice")
+    found = st.DEFINITIONS["lattice"].springs(plate(hole), STEEL, 1e-3)
+    assert found.reference == pytest.approx(3**0.5 / 2 * 210e6)
+
+
+def test_parts_and_slanted_sides_have_no_patch_test():
+    whole = right(0.1, 0.02, 5e-3)
+    twice = Mesh(
+        np.vstack([whole.points, whole.points + [0.2, 0]]),
+        np.vstack([whole.triangles, whole.triangles + len(whole.points)]),
+    )
+    trapezoid = Mesh(whole.points * (1 + whole.points[:, 1:] * [5, 0]), whole.triangles)
+    turned = Mesh(whole.points @ [[0.8, 0.6], [-0.6, 0.8]], whole.triangles)
+    for mesh in (twice, trapezoid, turned):
+        with pytest.raises(MeshError, match="the mesh cannot have a patch test"):
+            st.moduli(mesh, STEEL, "lattice")
+
+
+def test_a_strip_with_staggered_ends_has_one():
+    """Linear triangles are exact under an even strain, and so is the modulus on any strip."""
+    skewed = right(0.1, 0.02, 5e-3)
+    skewed = Mesh(skewed.points + 0.3 * skewed.points[:, 1:] * [1, 0], skewed.triangles)
+    for mesh in (lattice(12, 8, 1e-3), lattice(12, 7, 1e-3), skewed):
+        assert abs(st.moduli(mesh, STEEL, "delingette").young_modulus_error) < 1e-9
+
+
+def test_a_scene_and_a_prediction_are_of_a_beam_that_is_filled():
+    beam = st.Beam("100 mm", "40 mm")
+    for call in (
+        lambda: st.Scene(beam, plate(True), STEEL, "traction", "1 kN"),
+        lambda: st.predict(beam, plate(True), STEEL),
+    ):
+        with pytest.raises(ValueError, match="mesh: does not fill its beam: its cells cover 90 %"):
+            call()
+
+
+MESH = st.make_mesh(BEAM, "structured", "5 mm")
+
+
+def scene(**changed):
+    given = {"beam": BEAM, "mesh": MESH, "material": STEEL, "load": "traction", "force": "1 kN"} | changed
+    return st.Scene(**given)
+
+
+ODD = [np.nan, np.inf, -1, 0, None, "x", [], {}, np.zeros((0, 2)), True, b"1", 10**400, 1 + 2j, object()]
+
+CALLS = {
+    "length": lambda odd: st.Beam(odd, 1.0),
+    "thickness": lambda odd: st.Beam(1.0, 1.0, odd),
+    "modulus": lambda odd: st.Material(odd, 0.3),
+    "ratio": lambda odd: st.Material(1.0, odd if odd != 0 else 0.6),
+    "density": lambda odd: st.Material(1.0, 0.3, "" if odd is None else odd),
+    "size": lambda odd: st.make_mesh(BEAM, "free", odd),
+    "mesh type": lambda odd: st.make_mesh(BEAM, odd, "5 mm"),
+    "beam": lambda odd: scene(beam=odd),
+    "mesh": lambda odd: scene(mesh=odd),
+    "material": lambda odd: scene(material=odd),
+    "load": lambda odd: scene(load=odd),
+    "force": lambda odd: scene(force=odd),
+    "definition": lambda odd: scene(definition=odd),
+    "kinematics": lambda odd: scene(kinematics=odd),
+    "stiffness": lambda odd: scene(definition="paper", stiffness=odd),
+    "sheet": lambda odd: scene(sheet=odd if odd is not None else 1),
+    "curve": st.sensitivity,
+    "ratios": lambda odd: st.sensitivity(scene(), [] if odd is None or odd is True or odd == b"1" else odd),
+    "moduli": lambda odd: st.moduli(MESH, STEEL, odd),
+    "moduli's mesh": lambda odd: st.moduli(odd, STEEL, "lattice"),
+    "prediction": lambda odd: st.predict(BEAM, odd, STEEL),
+    "springs": lambda odd: st.DEFINITIONS["lattice"].springs(MESH, STEEL, odd),
+    "stated": lambda odd: st.DEFINITIONS["paper"].springs(MESH, STEEL, 1e-3, odd),
+    "cases": lambda odd: st.DEFINITIONS["annealed"].springs(MESH, STEEL, 1e-3, odd),
+    "reference": lambda odd: st.Springs(odd if not isinstance(odd, int) or odd < 10**300 else 0, np.ones(3)),
+    "name of a definition": lambda odd: st.definition(odd if odd != "x" else "")(
+        lambda mesh, material, thickness: None
+    ),
+    "name of a mesh type": lambda odd: st.mesh_type(odd if odd != "x" else "")(lambda length, height, size: None),
+    "field": st.field,
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: repr(odd)[:12])
+def test_odd_arguments_are_refused_by_a_message(name, odd):
+    with pytest.raises(ValueError, match=".{12,}"):
+        CALLS[name](odd)
+
+
+def test_an_instability_of_the_patch_test_is_a_failed_scene():
+    result = st.Scene(BEAM, MESH, st.Material("210 GPa", -0.5), "traction", "1 kN", definition="patch-area").solve()
+    assert result.status is st.Status.FAILED and "unstable at rest" in result.message
+
+
+def test_a_definition_and_a_mesh_type_that_return_something_else_are_refused():
+    st.definition("nothing")(lambda mesh, material, thickness: None)
+    st.mesh_type("nothing")(lambda length, height, size: None)
+    try:
+        with pytest.raises(st.DefinitionError, match=r"returns NoneType; return springtune\.Springs"):
+            st.DEFINITIONS["nothing"].springs(MESH, STEEL, 1e-3)
+        with pytest.raises(MeshError, match=r"mesh type 'nothing' returns NoneType; return springtune\.Mesh"):
+            st.make_mesh(BEAM, "nothing", "5 mm")
+    finally:
+        st.DEFINITIONS.discard("nothing")
+        st.MESH_TYPES.discard("nothing")
+
+
+class TestFiles:
+    def test_large_files_are_refused(self, tmp_path):
+        sparse(tmp_path / "own.vtu")
+        with pytest.raises(MeshError, match="61 MB, and at most 60 MB are read; write a coarser mesh, or binary VTU"):
+            read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
+
+    @pytest.mark.slow
+    def test_more_than_a_million_points_are_refused(self, tmp_path):
+        write_mesh(tmp_path / "own.vtu", right(0.1, 0.02, 4.46e-5))
+        with pytest.raises(MeshError, match=r"100\d{4} points, and at most 1000000 are read; write a coarser mesh"):
+            read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
+
+    def test_many_points_at_one_place_are_found_at_once(self, tmp_path):
+        """Pairs of them all would be billions."""
+        meshio = pytest.importorskip("meshio")
+        whole = right(0.1, 0.02, 5e-4)
+        corners = whole.triangles.ravel()
+        points = np.column_stack([whole.points[corners], np.zeros(len(corners))])
+        meshio.Mesh(points, [("triangle", np.arange(len(corners)).reshape(-1, 3))]).write(tmp_path / "own.vtu")
+        with pytest.raises(MeshError, match="two points at .* do not join their cells .*; merge duplicate points"):
+            read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
+
+    def test_a_mesh_is_written_as_what_its_name_says(self, tmp_path):
+        with pytest.raises(MeshError, match="give a name that ends in .vtu"):
+            write_mesh(tmp_path / "own.msh", MESH)
+        assert not list(tmp_path.iterdir())
+
+
+class TestDatasets:
+    @pytest.fixture
+    def path(self, tmp_path):
+        from springtune.output.dataset import write
+
+        from synthetic import dataset
+
+        groups = {node.path: node.to_dataset(inherit=False) for node in dataset().subtree}
+        write(tmp_path / "dataset.nc", groups, {"springtune_version": "1", "study": "x"})
+        return tmp_path / "dataset.nc"
+
+    def test_links_that_are_none_are_refused(self, path):
+        """The library of netCDF ended the process by SIGSEGV on it."""
+        h5py = pytest.importorskip("h5py")
+        reading.check_links(path)
+        with h5py.File(path, "r+") as file:
+            del file["deformation_error"].attrs["DIMENSION_LIST"]
+            file["deformation_error"].attrs["DIMENSION_LIST"] = 1.5
+        with pytest.raises(ValueError, match="DIMENSION_LIST of deformation_error is none of netCDF's"):
+            reading.check_links(path)
+
+    def test_a_dataset_that_says_it_is_huge_is_refused(self, path):
+        netCDF4 = pytest.importorskip("netCDF4")
+        with netCDF4.Dataset(path, "a") as file:
+            file.createDimension("n", 10**10)
+            file.createVariable("huge", "f8", ("n",), chunksizes=(1024,))
+        with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 80 GB in .* MB\)"):
+            st.open(path)
+        with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 80 GB in .* MB\)"):
+            page(path)
+
+    def test_missing_variables_are_told(self, path, capsys):
+        from click.testing import CliRunner
+
+        from springtune.cli import main
+
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "r+") as file:
+            del file["status"]
+        told = CliRunner().invoke(main, ["info", str(path)])
+        assert told.exit_code == 1 and "is damaged, or not as springtune writes it (AttributeError" in told.stderr

@@ -1,0 +1,135 @@
+"""What a bad study and a bad mesh file cost, whichever door they come through."""
+
+import subprocess
+import sys
+
+import meshio
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.cli import main
+from springtune.mesh import write_mesh
+
+BOMB = "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30))
+
+BAD = {
+    "tab": (b"title: x\nbeams:\n\tsmall: {length: 50 mm}\n", "study.yaml:3: not YAML: found character '\\t'"),
+    "not text": (b"title: \xff\n", "study.yaml:1: not UTF-8 text: byte 0xff; save the file in UTF-8"),
+    "empty": (b"", "study.yaml: the file is empty; give the keys title"),
+    "alias bomb": (
+        BOMB.encode(),
+        "study.yaml:11: more than 100000 values, aliases (*name) as what they stand for; give",
+    ),
+    "missing": (None, "study.yaml: cannot be read: No such file or directory; give the path of a study"),
+    "wrong": (b"title: x\nbeems: {}\n", "study.yaml:2: beems: unknown key 'beems'; did you mean 'beams'?"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_all_doors_say_the_same_of_a_bad_study(run, name):
+    content, says = BAD[name]
+    path = run.folder / "study.yaml"
+    path.unlink(missing_ok=True)
+    if content is not None:
+        path.write_bytes(content)
+    for command in ("scenes", "run"):
+        told = CliRunner().invoke(main, [command, str(path)])
+        assert told.exit_code == 1 and str(run.folder / says) in told.stderr
+    code, text = run.snakemake("study.yaml", "-n")
+    # Snakemake's folder is the study's, so that its path is shorter there.
+    message, text = (one.replace(f"{run.folder}/", "") for one in (told.stderr.strip(), text))
+    assert code == 1 and message in text and "Traceback" not in text
+
+
+def test_run_passes_on_what_is_snakemakes(repository):
+    command = [sys.executable, "-m", "springtune", "run", "config/quick.yaml", "--list-rules"]
+    done = subprocess.run(command, cwd=repository, capture_output=True, text=True)
+    assert done.returncode == 0 and "collect" in done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["-n", "config/mine.yaml"], "name the study first: springtune run config/mine.yaml -n"),
+        (["--configfile", "config/mine.yaml"], "give the study itself, without --configfile"),
+    ],
+)
+def test_run_called_wrongly_exits_with_2(arguments, says):
+    told = CliRunner().invoke(main, ["run", *arguments])
+    assert told.exit_code == 2 and says in told.stderr
+
+
+FILES = """
+title: One bad mesh file
+beams: {a: {length: 50 mm, height: 10 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+mesh_files:
+  good: [{file: good.vtu, beam: a, mesh_size: 5 mm}]
+  cut: [{file: cut.vtu, beam: a, mesh_size: 5 mm}]
+  lost: [{file: lost.vtu, beam: a, mesh_size: 5 mm}]
+sensitivity: {points: 5}
+outputs: tables
+grids:
+  all: {beam: a, mesh_type: [structured, good, cut, lost], mesh_size: 5 mm, material: steel, load: traction,
+        force: 1 kN, definition: [lattice, patch], moduli: true}
+"""
+
+
+def test_a_bad_mesh_file_costs_its_own_scenes_alone(run):
+    mesh = st.make_mesh(st.Beam("50 mm", "10 mm"), "free", "5 mm")
+    write_mesh(run.folder / "good.vtu", mesh)
+    content = (run.folder / "good.vtu").read_bytes()
+    (run.folder / "cut.vtu").write_bytes(content[: len(content) // 2])
+    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
+    points[3, 0] = np.nan
+    meshio.Mesh(points, [("triangle", mesh.triangles)]).write(run.folder / "lost.vtu")
+    run.write("files.yaml", FILES)
+    code, text = run.snakemake("files.yaml")
+    assert code == 0, text
+    with st.open(run.folder / "results/files") as tree:
+        scenes = tree.to_dataset().squeeze(drop=True).load()
+        for mesh_type in ("structured", "good"):
+            assert (scenes.status.sel(mesh_type=mesh_type) == st.Status.SOLVED).all()
+            assert scenes.particles.sel(mesh_type=mesh_type) > 0
+        for mesh_type, why in (
+            ("cut", "cut.vtu: meshio cannot read it"),
+            ("lost", "points with coordinates that are no"),
+        ):
+            lost = scenes.sel(mesh_type=mesh_type)
+            assert (lost.status == st.Status.FAILED).all() and lost.displacement.isnull().all()
+            assert all(message.startswith("mesh: ") and why in message for message in lost.message.values)
+            assert lost.particles.isnull() and lost.minimum_angle.isnull()
+            curve = tree["sensitivity"].to_dataset().squeeze(drop=True).sel(mesh_type=mesh_type)
+            assert (curve.status == st.Status.FAILED).all() and why in curve.message.item()
+            assert curve.best_stiffness_status == st.Status.FAILED
+            moduli = tree["moduli"].to_dataset().squeeze(drop=True).sel(mesh_type=mesh_type)
+            assert (moduli.status == st.Status.FAILED).all()
+    # A repaired file is all that is computed again.
+    (run.folder / "cut.vtu").write_bytes(content)
+    code, text = run.snakemake("files.yaml")
+    assert code == 0, text
+    with st.open(run.folder / "results/files") as tree:
+        found = tree.to_dataset().squeeze(drop=True)
+        assert (found.status.sel(mesh_type="cut") == st.Status.SOLVED).all()
+        np.testing.assert_array_equal(found.displacement.sel(mesh_type="cut"), found.displacement.sel(mesh_type="good"))
+
+
+def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
+    for name in ("Snakefile", "profiles", "workflow"):
+        (tmp_path / name).symlink_to(repository / name)
+    grid = "{beam: a, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1e12 N"
+    head = FILES[: FILES.index("mesh_files")]
+    text = f"{head}outputs: tables\ngrids:\n  all: {grid}, definition: lattice, sensitivity: false}}\n"
+    (tmp_path / "hole.yaml").write_text(text)
+
+    def run(*arguments):
+        command = [sys.executable, "-m", "springtune", "run", "hole.yaml", *arguments]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+
+    code, text = run("--strict")
+    assert code == 3, text
+    assert text.endswith("--strict: 1 scenes are not solved\n")
+    assert run()[0] == 0
