@@ -14,7 +14,7 @@ from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
 from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
-from .stored_scene import FIELD_ARRAYS, fields_key
+from .stored_scene import PACKED, fields_key, unpacked
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
 
 COPIED = (
@@ -154,9 +154,9 @@ def _scenes(study, folder, root, block, fields, objections):
         names = [plan.solved_key(study, scene, calibration) for scene in scenes]
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
-        of_fields = store.read(path, {fields_key(name) for name in names}, FIELD_ARRAYS) if mesh in shown else {}
+        of_fields = store.read(path, {fields_key(name) for name in names}, [PACKED]) if mesh in shown else {}
         for scene, name in zip(scenes, names):
-            result = results[name] | of_fields.get(fields_key(name), {})
+            result = results[name] | unpacked(of_fields.get(fields_key(name), {}))
             values = {"status": result["status"], "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
             why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]

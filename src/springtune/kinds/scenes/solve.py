@@ -16,7 +16,7 @@ from ...scene.sheet import Sheet, definition_of
 from ...springs import DEFINITIONS, DefinitionError
 from . import stored_mesh
 from . import stored_reference as references
-from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key
+from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key, packed
 
 KEPT_BACK = 5.0
 """Seconds for which results are not stored: writing them costs as much as solving small scenes."""
@@ -66,9 +66,9 @@ def run(tasks, spent):
             if result is None:
                 continue
             if name in kept:
-                results[kept[name]] = {label: result.pop(label) for label in FIELD_ARRAYS if label in result}
+                results[kept[name]] = packed(result)
             if name not in present:
-                results[name] = result
+                results[name] = {label: value for label, value in result.items() if label not in FIELD_ARRAYS}
             work = "fields" if name in present else scene["kinematics"]
             spent.add(work, len(mesh.points), result["seconds"])
             spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)

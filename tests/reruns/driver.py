@@ -1,0 +1,149 @@
+"""A study run job by job in this process, as the rules run it, and what it solved."""
+
+import contextlib
+import json
+import re
+import shutil
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import meshio
+import netCDF4
+import numpy as np
+
+from springtune.campaign import browse, collect, due, present
+from springtune.campaign.plan import plan
+from springtune.jobs import records, run_tasks, sealed
+from springtune.jobs.dependencies import CODE_FILE, OURS
+from springtune.jobs.spent import Spent
+from springtune.kinds import load_study
+from springtune.mesh import MESH_TYPES
+from springtune.springs import DEFINITIONS
+
+HERE = Path(__file__).parent
+CONFIG = Path("small.yaml")
+FOLDER = Path("results/small")
+
+PRINTED = """\
+table,beam,mesh_type,mesh_size_mm,material,load,force_N,stiffness_N_per_m,\
+reference_displacement_mm,displacement_mm,deformation_error_percent,remark
+1,a,structured,5,steel,traction,1000,170e6,0.01,0.011,10,
+"""
+
+TIMES = re.compile("seconds|created|history|git_|^config|^inputs")
+"""Names of values that are others in every run or checkout, and of the texts that a study was read from."""
+
+
+class Run:
+    """The study of this folder, as it is to be run now."""
+
+    def __init__(self, cores=1):
+        self.study = load_study(CONFIG)
+        self.plan = plan(self.study, FOLDER, cores)
+        self.jobs = due.jobs(self.study, self.plan)
+
+    def due(self):
+        """Names of the jobs that are to run, in order."""
+        found = []
+        for name, job in self.jobs.items():
+            if due.fault(job, self.jobs) or self._before(name) & set(found):
+                found.append(name)
+        return found
+
+    def _before(self, name):
+        """Jobs that a job comes after."""
+        if name not in self.plan.jobs:
+            return {*self.plan.jobs} if name == due.COLLECT else {due.COLLECT}
+        stage, label = self.plan.jobs[name].stage, self.plan.jobs[name].label
+        others = self.plan.jobs.items()
+        same = {other for other, job in others if job.stage.name in stage.same and job.label == label}
+        return same | {other for other, job in others if job.stage.name in stage.every}
+
+    def finish(self):
+        """Run what is to run.
+
+        Returns
+        -------
+        jobs : set of str
+            Jobs that ran; those of stages without the number of their bundle.
+        solved : dict of str to int
+            What they computed, by the kind of task.
+        """
+        names, solved = self.due(), {}
+        if names:
+            self.plan.write()
+            OURS.remember(FOLDER.parent / CODE_FILE)
+        for name in names:
+            self._do(name)
+            work = sealed.read(self.jobs[name].record).get("work", {})
+            # What definitions cost is told beside the scene that they are part of.
+            for kind in work.keys() - set(DEFINITIONS):
+                solved[kind] = solved.get(kind, 0) + work[kind][0]
+        return {self.called(name) for name in names}, solved
+
+    def called(self, name):
+        """Name of a job, without the number of its bundle."""
+        return self.plan.jobs[name].stage.name if name in self.plan.jobs else name
+
+    def _do(self, name):
+        job, dataset = self.jobs[name], str(FOLDER / due.DATASET)
+        if name in self.plan.jobs:
+            run_tasks.mended(lambda: self._compute(name), FOLDER)
+        elif name == due.COLLECT:
+            collect.main(str(CONFIG), str(FOLDER), dataset, str(job.record), job.digest)
+        elif name == due.BROWSE:
+            browse.main(dataset, job.products[0], str(job.record), job.digest, *due.linked(self.study))
+        else:
+            names = [one.name for one in due.output_jobs(self.study)[name]]
+            present.main(dataset, str(FOLDER), str(job.record), job.digest, *names)
+
+    def _compute(self, name):
+        note, spent = sealed.read(self.plan.tasks(name)), Spent()
+        import_module(f"springtune.{note['module']}").run(note["content"], spent)
+        assert not spent.broken
+        records.write(self.jobs[name].record, note["digest"], note["products"], **spent.summary())
+
+
+def prepare(folder):
+    """Write the files of the study into a new folder."""
+    folder.mkdir(parents=True)
+    shutil.copy(HERE / "small.yaml", folder)
+    (folder / "printed.csv").write_text(PRINTED)
+    write_mesh(folder / "own.inp")
+
+
+def write_mesh(path, shift=0.0):
+    """Write a mesh of one's own, points inside shifted [m]."""
+    mesh = MESH_TYPES["structured"](0.02, 0.01, 5e-3)
+    points = mesh.points.copy()
+    points[((points > 1e-9) & (points < [0.02 - 1e-9, 0.01 - 1e-9])).all(axis=1)] += shift
+    points = np.column_stack([1e3 * points, np.zeros(len(points))])
+    meshio.Mesh(points, [("triangle", mesh.triangles)]).write(path)
+
+
+def dataset(folder):
+    """What the dataset of a study holds, without times."""
+    with netCDF4.Dataset(folder / FOLDER / due.DATASET) as file:
+        return _group(file)
+
+
+def _group(group):
+    group.set_auto_maskandscale(False)
+    found = {name: str(group.getncattr(name)) for name in group.ncattrs() if not TIMES.search(name)}
+    for name, variable in group.variables.items():
+        if not TIMES.search(name):
+            values = np.asarray(variable[...])
+            found[name] = (variable.dimensions, values.tolist() if values.dtype == object else values.tobytes())
+    return found | {f"{name}/": _group(below) for name, below in group.groups.items()}
+
+
+if __name__ == "__main__":  # with the package of another folder
+    command, folder = sys.argv[1:]
+    with contextlib.chdir(folder):
+        run = Run()
+        if command == "finish":
+            names, computed = run.finish()
+            print(json.dumps([sorted(names), computed]))
+        else:
+            print(json.dumps([run.called(name) for name in run.due()]))

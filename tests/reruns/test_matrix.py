@@ -1,0 +1,159 @@
+"""What runs again when something changes: exactly these jobs, exactly these results, and the dataset of a fresh run."""
+
+import importlib.metadata
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import driver
+import pytest
+from rows import CODE, STORED, STUDY, VERSIONS
+
+import springtune
+from springtune.jobs import dependencies, keys
+from springtune.kinds.scenes import plan
+
+ROWS = STUDY | STORED
+
+
+@pytest.fixture(scope="session")
+def complete(tmp_path_factory):
+    """The study, complete."""
+    os.environ["MPLBACKEND"] = "Agg"
+    folder = tmp_path_factory.mktemp("complete") / "study"
+    driver.prepare(folder)
+    before = os.getcwd()
+    os.chdir(folder)
+    driver.Run().finish()
+    os.chdir(before)
+    return folder
+
+
+@pytest.fixture
+def changed(complete, tmp_path, monkeypatch, request):
+    """A copy of the complete study with a change, as the working directory; the row of the change."""
+    shutil.copytree(complete, tmp_path / "study")  # times, too
+    monkeypatch.chdir(tmp_path / "study")
+    row = ROWS[request.param]
+    row.change()
+    return row
+
+
+@pytest.fixture(scope="session")
+def fresh(tmp_path_factory, complete):
+    """The dataset of a study that is run in a new folder, by its text."""
+    known = {}
+
+    def of():
+        read = [path for ending in ("yaml", "csv", "inp") for path in sorted(Path().rglob(f"*.{ending}"))]
+        files = {path: path.read_bytes() for path in read if "results" not in path.parts}
+        mark = repr(sorted(files.items()))
+        if mark not in known:
+            folder = tmp_path_factory.mktemp("fresh")
+            for path, content in files.items():
+                (folder / path).parent.mkdir(parents=True, exist_ok=True)
+                (folder / path).write_bytes(content)
+            before = os.getcwd()
+            os.chdir(folder)
+            driver.Run().finish()
+            os.chdir(before)
+            known[mark] = driver.dataset(folder)
+        return known[mark]
+
+    return of
+
+
+@pytest.mark.parametrize("changed", STUDY, indirect=True)
+def test_exactly_these_jobs_are_to_run(changed):
+    run = driver.Run(changed.cores)
+    assert {run.called(name) for name in run.due()} == set(changed.jobs.split())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changed", ROWS, indirect=True)
+def test_exactly_these_results_are_computed_and_the_dataset_is_that_of_a_fresh_run(changed, fresh):
+    jobs, solved = driver.Run(changed.cores).finish()
+    assert solved == changed.solved
+    assert driver.dataset(Path()) == fresh()
+    assert driver.Run(changed.cores).due() == []
+
+
+# -- code --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def package(tmp_path_factory):
+    """A copy of the package, to be edited."""
+    folder = tmp_path_factory.mktemp("package") / "springtune"
+    shutil.copytree(Path(springtune.__file__).parent, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.fixture
+def edited(package, request):
+    """The copy with an edit, and what it changes."""
+    place, change, jobs, solved = CODE[request.param]
+    path = package / place
+    before = path.read_text()
+    assert not change or change[0] in before
+    path.write_text(before.replace(*change, 1) if change else f"{before}\nEDITED = True\n")
+    yield package.parent, set(jobs.split()), solved
+    path.write_text(before)
+
+
+def driven(command, package, folder):
+    """What the driver says with the package of another folder."""
+    environment = os.environ | {"PYTHONPATH": str(package), "MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"}
+    arguments = [sys.executable, driver.__file__, command, folder]
+    done = subprocess.run(list(map(str, arguments)), env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edited", CODE, indirect=True)
+def test_an_edit_computes_again_what_it_computes(edited, complete, tmp_path):
+    package, jobs, solved = edited
+    shutil.copytree(complete, tmp_path / "study")
+    found = driven("finish", package, tmp_path / "study")
+    assert (set(found[0]), found[1]) == (jobs, solved)
+    assert driver.dataset(tmp_path / "study") == driver.dataset(complete)  # the edits change no number
+    assert driven("due", package, tmp_path / "study") == []
+
+
+@pytest.mark.parametrize(
+    "edited", ["docstring of a stage", "stage of curves", "definition of one scene"], indirect=True
+)
+def test_an_edit_runs_what_it_concerns(edited, complete):
+    package, jobs, _ = edited
+    assert set(driven("due", package, complete)) == jobs
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("distribution", VERSIONS)
+def test_another_version_of_a_package_computes_again_what_it_computes(distribution, complete, tmp_path, monkeypatch):
+    version, (jobs, solved) = importlib.metadata.version, VERSIONS[distribution]
+    caches = [
+        keys.installed,
+        keys.code_key,
+        keys.stage_key,
+        dependencies.distribution,
+        plan.mesh_key,
+        plan.reference_of,
+    ]
+    shutil.copytree(complete, tmp_path / "study")
+    monkeypatch.chdir(tmp_path / "study")
+    for cache in caches:
+        cache.cache_clear()
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(importlib.metadata, "version", lambda name: "999" if name == distribution else version(name))
+            found = driver.Run().finish()
+            left = driver.Run().due()
+    finally:
+        for cache in caches:
+            cache.cache_clear()
+    assert found == (set(jobs.split()), solved) and left == []
