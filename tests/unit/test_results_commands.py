@@ -254,14 +254,14 @@ class TestClean:
         monkeypatch.chdir(tmp_path)
         Path("config").mkdir()
         Path("config/two.yaml").write_text(STUDY.replace("SIZE", "2.5 mm").replace("LOAD", "[traction, bending]"))
-        files = ["dataset.nc", "browse.html", "meshes/b_right_5mm.vtu", "meshes/b_right_5mm.json", "logs/collect.log",
-                 "solutions/b_right_5mm.h5", "figures/size_right_m_traction.png", "tables/index.html", "notes/mine.txt",
-                 "notes/mine.h5",
+        files = ["dataset.nc", "browse.html", "meshes/20x10_right_5mm.vtu", "meshes/20x10_right_5mm.json",
+                 "logs/collect.log", "solutions/20x10_right_5mm.h5", "figures/size_right_m_traction.png",
+                 "tables/index.html", "notes/mine.txt", "notes/mine.h5",
                  "tasks/bundles.json", "tasks/mesh_0.json", "done/mesh_0.json", "logs/snakemake.log"]  # fmt: skip
-        stale = ["meshes/b_right_2.5mm.vtu", "meshes/b_right_2.5mm.json", "solutions/b_right_2.5mm.h5",
+        stale = ["meshes/20x10_right_2.5mm.vtu", "meshes/20x10_right_2.5mm.json", "solutions/20x10_right_2.5mm.h5",
                  "figures/size_right_m_bending.png", "tables/table_9.csv", "references/0123456789.h5",
                  "moduli/patch.h5", "tasks/solve_7.json", "logs/solve_7.log", "dataset.nc.99999999.unfinished",
-                 "meshes/b_right_5mm.vtu.99999999.unfinished"]  # fmt: skip
+                 "meshes/20x10_right_5mm.vtu.99999999.unfinished"]  # fmt: skip
         for name in files + stale:
             path = Path("results/two") / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -283,7 +283,7 @@ class TestClean:
             result = run("clean", *given)
             assert result.exit_code == 0, result.stderr
             assert "results/two: 11 files, 1.1 kB" in result.stdout
-            assert "  solutions/b_right_2.5mm.h5  100 B" in result.stdout
+            assert "  solutions/20x10_right_2.5mm.h5  100 B" in result.stdout
         assert self.there() == before
 
     def test_removes_it_on_request_and_nothing_else(self, left):

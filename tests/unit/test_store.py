@@ -68,14 +68,7 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again
 
 
-def test_definitions_belong_to_the_stages_that_choose_them_and_to_their_own_keys():
-    solve, sensitivity = (
-        set(code.modules("kinds.scenes.solve", definitions=True)),
-        set(code.modules("kinds.scenes.sensitivity")),
-    )
-    for name in ("angular", "delingette", "patch"):
-        path = str(code.PACKAGE / f"springs/{name}.py")
-        assert path in solve and path not in sensitivity
+def test_definitions_belong_to_their_own_keys_and_to_no_stage():
     # An edit of one definition is to solve that definition's scenes again and no others.
     digests = {name: code.definition_closure(name).digest for name in ("angular", "delingette", "patch", "lattice")}
     assert len(set(digests.values())) == len(digests)

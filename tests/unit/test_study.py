@@ -396,7 +396,7 @@ class TestDefinitions:
     def test_moduli_of_every_pair(self, load):
         study = load(SMALL.replace("grids:", "outputs: [definitions]\ngrids:") + self.GRID)
         assert len(study.parts["moduli"].measurements) == 2 * 2 * 2 * 2
-        assert study.parts["moduli"].measurements[0] == Measurement("area", "structured", 0.002, 0.3)
+        assert study.parts["moduli"].measurements[0] == Measurement("area", "right", 0.002, 0.3)
         assert study.axes["poisson_ratio"] == (0.3, 0.5)
         assert (study.parts["moduli"].patch.length, study.parts["moduli"].patch.height) == (0.1, 0.02)
         assert study.outputs == ("definitions",)

@@ -1,7 +1,7 @@
 """Who runs what in a folder, and locks that a run which was killed has left.
 
-Snakemake locks the files of a run by lists of them, and does not say by whom. So a run notes its process beside them;
-a lock is stale when that process is gone.
+Snakemake locks the files of a run by lists of them, does not say by whom, and at the end of a run removes the locks of
+all others in its folder. So a run notes its process beside them; a lock is stale when that process is gone.
 """
 
 import os
@@ -74,17 +74,18 @@ def is_held(folder: Path) -> bool:
         If the process is alive, or on another machine.
     """
     place = folder.parent.parent
-    if not any(_is_on(path, folder) for path in _files(place / LOCKS, "*.lock")):
-        return False
+    locked = any(_is_on(path, folder) for path in _files(place / LOCKS, "*.lock"))
     noted = False
     for _, note in _notes(place):
         if Path(folder.parent.name, folder.name) not in map(Path, note["folders"]):
             continue
         noted = True
-        if note["host"] != platform.node():
+        if note["host"] != platform.node() and locked:
             raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
-        if _is_alive(note):
+        if note["host"] == platform.node() and _is_alive(note):
             raise LockedError(_told(folder, note, "on this machine"))
+    if not locked:
+        return False
     # A run that was killed before it noted anything.
     other = None if noted else _running_in(place)
     if other is not None:

@@ -243,15 +243,13 @@ OURS = Code()
 """The code of springtune."""
 
 
-def modules(*names: str, definitions: bool = False, mesh_types: bool = False) -> tuple[str, ...]:
-    """Files that modules run on: their own, all that they import and what they may choose by name.
+def modules(*names: str) -> tuple[str, ...]:
+    """Files that modules run on: their own and all that they import.
 
     Parameters
     ----------
     *names : str
         Modules, from the package on, such as ``"campaign.collect"``.
-    definitions, mesh_types : bool, optional
-        Whether they run definitions and make meshes by name: which modules those are no import in them says.
 
     Returns
     -------
@@ -263,10 +261,7 @@ def modules(*names: str, definitions: bool = False, mesh_types: bool = False) ->
     >>> [Path(file).name for file in modules("jobs.atomic")]
     ['atomic.py']
     """
-    declared: list[Declared] = [*DEFINITIONS.values()] if definitions else []
-    declared += MESH_TYPES.values() if mesh_types else ()
-    starts = {_module(name) for name in names} | {one.file for one in declared if one.file}
-    return tuple(sorted({str(file) for start in starts for file in OURS.closure(start).files}))
+    return tuple(sorted({str(file) for name in names for file in OURS.closure(_module(name)).files}))
 
 
 def stage_closure(*names: str, without: tuple[str, ...] = ()) -> Closure:

@@ -26,6 +26,9 @@ SCALARS = "scalars"
 MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
 """What a file begins with."""
 
+LIMITS = "limits"
+"""What a result notes that was lost to limits: these, in words; readers are not told."""
+
 USER_BLOCK = 512
 """Length of the block before HDF5's own [bytes]."""
 
@@ -80,7 +83,7 @@ def stored(path: str | Path, limits: str | None = None) -> set[str]:
         return set()
     with h5py.File(path) as file:
         scalars = _scalars(file)
-    return {name for name, result in scalars.items() if limits is None or result.get("limits", limits) == limits}
+    return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
 
 
 def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
@@ -116,7 +119,7 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
         lacking = [name for name in names if name not in scalars]
         if lacking:
             raise DamagedError(path, f"it lacks {len(lacking)} of {len(names)} results", whole=True)
-        results = {name: scalars[name] for name in names}
+        results = {name: {label: value for label, value in scalars[name].items() if label != LIMITS} for name in names}
         for name, result in results.items() if fields else ():
             if name in file:
                 result |= {label: file[name][label][()] for label in fields if label in file[name]}
@@ -169,6 +172,22 @@ def missing(
         path = Path(folder) / f"{task['key']}.h5"
         if task["key"] not in stored(path, limits):
             yield path, task
+
+
+def lose(folder: str | Path, key: str, hole: Mapping[str, Any], limits: str) -> None:
+    """Store that a task, whose result has a file to itself, went beyond its limits.
+
+    Parameters
+    ----------
+    folder : str or Path
+    key : str
+        Of the task.
+    hole : dict
+        Its result.
+    limits : str
+        In words; where they change, the task is not stored any more.
+    """
+    add(Path(folder) / f"{key}.h5", {key: {**hole, LIMITS: limits}})
 
 
 def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:

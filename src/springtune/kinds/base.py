@@ -78,8 +78,8 @@ class Output:
 class Stage:
     """A stage before the dataset: jobs that each work off a bundle of tasks.
 
-    A stage is run by ``python -m springtune.<module> TASKS DONE`` and has a function ``run(tasks, done)``: what is to
-    do is the JSON file ``TASKS``; ``DONE`` appears when it is done and says what it cost.
+    Its module has functions ``run(content, spent)``, which computes what is not stored yet, and ``lose(content, key,
+    why, limits)``, which stores the hole of a task that went beyond its limits; see `springtune.jobs.run_tasks`.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Stage:
         Of a study, its folder and the values of a bundle's members: content of the task file; nothing where there is
         nothing to do.
     products : callable
-        Of that content: files that a job makes besides `DONE`.
+        Of that content: files that a job makes besides its record.
     members : callable, optional
         Of a study and the `springtune.jobs.bundles.Costs` of a machine: by name, the seconds that it takes and a value.
         Not of a stage that works on the bundles of another one.
@@ -103,8 +103,6 @@ class Stage:
         Stages that it waits for: for the job of the same bundle, and for all jobs.
     alone : bool
         Whether a job has a single member and the machine to itself, since other jobs would be in its seconds.
-    definitions, mesh_types : bool
-        Whether it runs definitions and makes meshes by name.
     """
 
     name: str
@@ -117,8 +115,6 @@ class Stage:
     same: tuple[str, ...] = ()
     every: tuple[str, ...] = ()
     alone: bool = False
-    definitions: bool = False
-    mesh_types: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,7 +145,7 @@ class Kind:
     tables : callable, optional
         Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
     costs : dict of str to tuple
-        Seconds of a task by its name in ``DONE``, in any case and per unit, before any was measured.
+        Seconds of a task by its name in records, in any case and per unit, before any was measured.
     """
 
     name: str

@@ -264,8 +264,11 @@ def check_files(
     parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
     pairs = {(reference.beam.name, reference.material.name) for reference in references}
     sizes = {mesh.mesh_size for mesh in meshes}
+    boxes = {(mesh.beam.length, mesh.beam.height) for mesh in meshes}
+    extents = [f"{1e3 * length:g} x {1e3 * height:g} mm" for length, height in boxes]
     for path, what, names, remedy in (
         (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
+        (("beams",), "extents of beams", extents, "give these beams the same, names keep six digits"),
         (("beams",), "meshes", [mesh.name for mesh in meshes], "rename a beam"),
         (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
         (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),

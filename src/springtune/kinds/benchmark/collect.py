@@ -8,9 +8,9 @@ from .variables import BENCHMARK
 def groups(study, folder):
     """Groups of a dataset, see `springtune.kinds.scenes.collect.groups`."""
     data = BENCHMARK.empty(study.axes)
-    for case in study.parts["benchmark"]:
+    for case, key, _ in plan.cases(study):
         data.attrs["second_beam"] = case.second_beam.name if case.second_beam else ""
-        result = store.read_one(folder / "benchmark", plan.case_key(case), BENCHMARK.variables)
+        result = store.read_one(folder / "benchmark", key, BENCHMARK.variables)
         place = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
         for name, values in result.items():
             array = data[name]

@@ -166,6 +166,7 @@ def _expand(config, declared):
     section = config.benchmark
     if not section:
         return ()
+    mesh_types = [name for name in MESH_TYPES if name in section.mesh_type]
     definitions = [name for name in DEFINITIONS if name in section.definition]
     others = [name for name in OTHER_APPROACHES if name in section.approach]
     return tuple(
@@ -175,11 +176,11 @@ def _expand(config, declared):
             declared.materials[scene.material],
             scene.load,
             LOADS[scene.load].sign * scene.force,
-            approach_names(definitions, section.mesh_type, others),
+            approach_names(definitions, mesh_types, others),
             tuple(sorted(section.mesh_size)),
             section.most_seconds,
             section.most_thorough,
-            tuple(section.thorough),
+            tuple(sorted(section.thorough)),
             declared.beams[section.second_beam] if section.second_beam else None,
         )
         for name, scene in section.scenes.items()

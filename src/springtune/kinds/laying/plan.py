@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...jobs.hashing import hash_of
-from ...jobs.keys import definition_key, mesh_type_key, stage_key
+from ...jobs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ..base import Stage
 from .cost import cost_units
 
@@ -12,7 +12,7 @@ from .cost import cost_units
 def laying_key(one):
     """Key of a laid strip."""
     return hash_of(
-        asdict(one),
+        _parameters(one),
         stage_key("kinds.laying.stage"),
         mesh_type_key("structured"),
         definition_key(one.definition),
@@ -20,14 +20,19 @@ def laying_key(one):
     )
 
 
+def _parameters(one):
+    """What a strip depends on: not on labels of its materials."""
+    return asdict(one) | {"material": material_key(one.material), "support": material_key(one.support)}
+
+
 def _members(study, costs):
     laying = study.parts["laying"]
-    strips = {hash_of(asdict(one)): one for one in (*laying.strips, *laying.references)} if laying else {}
+    strips = {hash_of(_parameters(one)): one for one in (*laying.strips, *laying.references)} if laying else {}
     return {name: (costs.of("laying", cost_units(one.mesh_size)), one) for name, one in strips.items()}
 
 
 def _content(study, folder, strips):
-    return {"folder": str(folder / "laying"), "strips": [{"key": laying_key(one)} | asdict(one) for one in strips]}
+    return {"folder": str(folder / "laying"), "strips": [{"key": laying_key(one)} | _parameters(one) for one in strips]}
 
 
 def _products(content):
@@ -42,7 +47,5 @@ STAGES = (
         _content,
         _products,
         _members,
-        definitions=True,
-        mesh_types=True,
     ),
 )

@@ -3,7 +3,6 @@
 import time
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
 
 from ...jobs import store
 from ...problem.geometry import Strip, Trapezoid
@@ -45,7 +44,7 @@ def lose(tasks, key, why, limits):
     key, why, limits : str
         Of the strip; what became of it; the limits.
     """
-    store.add(Path(tasks["folder"]) / f"{key}.h5", {key: _hole(why) | {"limits": limits}})
+    store.lose(tasks["folder"], key, _hole(why), limits)
 
 
 def _hole(why):

@@ -81,7 +81,7 @@ def _expand(config, declared):
     if not found:
         return None
     box = Beam(config.patch.length, config.patch.height, 1.0, "patch")
-    return Measurements(box, tuple(Measurement(*labels) for labels in found))
+    return Measurements(box, tuple(Measurement(*labels) for labels in sorted(found)))
 
 
 def _axes(moduli):

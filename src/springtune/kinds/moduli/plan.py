@@ -7,7 +7,7 @@ from ...jobs.keys import definition_key, mesh_type_key, stage_key
 from ...mesh import MESH_TYPES
 from ...study.model import MeshSpec
 from ..base import Stage
-from ..scenes.plan import mesh_parameters, mesh_source, particles
+from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles
 
 
 def moduli_key(study, one):
@@ -19,10 +19,11 @@ def moduli_key(study, one):
 
 
 def mesh_of(study, one):
-    """Mesh of a patch test: on the box, or the first mesh from a file."""
+    """Mesh of a patch test: on the box, or of the meshes from files that of the shortest beam."""
     if one.mesh_type in MESH_TYPES:
         return MeshSpec(study.parts["moduli"].patch, one.mesh_type, one.mesh_size)
-    return next(mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size))
+    found = [mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size)]
+    return min(found, key=lambda mesh: (mesh.beam.length, mesh.beam.height, mesh_key(mesh)))
 
 
 def patch_name(one):
@@ -59,7 +60,5 @@ STAGES = (
         _content,
         _products,
         _members,
-        definitions=True,
-        mesh_types=True,
     ),
 )

@@ -14,6 +14,7 @@ from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
 from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
+from .stored_scene import FIELD_ARRAYS, fields_key
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
 
 COPIED = (
@@ -108,7 +109,7 @@ def _calibration(study, folder):
 
 def _meshes(study, folder, root):
     for mesh in study.meshes:
-        notes = stored_mesh.read_notes(folder / "meshes", mesh.name)
+        notes = stored_mesh.read_notes(folder / "meshes", plan.stem(mesh))
         root.put({label: value for label, value in notes.items() if label in root.data}, **_mesh_labels(mesh))
 
 
@@ -148,12 +149,14 @@ def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
     calibration = _calibration(study, folder)
     arrays = ["face_profile"] * (block is not None)
-    arrays += ["displacements", "spring_stiffnesses", "spring_forces"] * (fields is not None)
+    shown = plan.shown_meshes(study) if fields else ()
     for mesh, scenes in plan.by_mesh(study.scenes).items():
         names = [plan.solved_key(study, scene, calibration) for scene in scenes]
-        results = store.read(folder / "solutions" / f"{mesh.name}.h5", set(names), arrays)
+        path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
+        results = store.read(path, set(names), arrays)
+        of_fields = store.read(path, {fields_key(name) for name in names}, FIELD_ARRAYS) if mesh in shown else {}
         for scene, name in zip(scenes, names):
-            result = results[name]
+            result = results[name] | of_fields.get(fields_key(name), {})
             values = {"status": result["status"], "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
             why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]
@@ -193,7 +196,7 @@ def _sensitivity(study, folder, displacements, axes):
     curves = Filler(SENSITIVITY.empty(axes))
     for mesh, members in plan.by_mesh(study.curves).items():
         names = [plan.curve_key(study, curve) for curve in members]
-        results = store.read(folder / "curves" / f"{mesh.name}.h5", names, ["displacement", "stable"])
+        results = store.read(folder / "curves" / f"{plan.stem(mesh)}.h5", names, ["displacement", "stable"])
         for curve, name in zip(members, names):
             result, stiffness = results[name], np.array(plan.stiffnesses(study, curve))
             displacement = result["displacement"]
@@ -286,8 +289,10 @@ def _face_reference(folder, one, kind):
 def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
     shown = plan.shown_meshes(study)
-    kept = [mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", mesh.name)]
-    meshes = {mesh: stored_mesh.read(folder / "meshes", mesh.name) for mesh in kept}
+    kept = [
+        mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))
+    ]
+    meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
     outlines = {one: _outline(folder, one) for one in study.references}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {

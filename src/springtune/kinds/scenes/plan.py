@@ -11,6 +11,7 @@ from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
 from . import stored_mesh
+from .stored_scene import calibrated_key
 
 
 def particles(mesh):
@@ -48,6 +49,14 @@ def mesh_source(mesh):
         return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
     content = hashlib.sha256(mesh.file.read_bytes()).hexdigest()
     return source | {"file": str(mesh.file), "unit": mesh.unit, "content": content}
+
+
+@cache
+def stem(mesh):
+    """Stem of a mesh's files: says what it is, not by which labels a study knows it; beams of one extent share it."""
+    extent = f"{1e3 * mesh.beam.length:g}x{1e3 * mesh.beam.height:g}"
+    own = f"_{mesh_source(mesh)['content'][:8]}" if mesh.file else ""
+    return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm{own}"
 
 
 @cache
@@ -90,7 +99,7 @@ def scene_key(study, scene):
     reference = reference_of(scene.mesh.beam, scene.material, scene.load)
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
     parameters += [LOADS[scene.load].kind.name, _follows(scene), scene.force, scene.definition, scene.kinematics]
-    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.mesh in shown_meshes(study)]
+    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene)]
     return hash_of(parameters, stage_key("kinds.scenes.solve"), definition_key(scene.definition))
 
 
@@ -103,15 +112,15 @@ def _shown_meshes(meshes):
 
 
 def shown_meshes(study):
-    """Meshes whose whole fields are kept, the coarsest of each beam and mesh type; none where none are drawn."""
-    return _shown_meshes(study.meshes) if "deformed" in study.outputs else frozenset()
+    """Meshes whose whole fields are kept, the coarsest of each beam and mesh type, whether or not they are drawn."""
+    return _shown_meshes(study.meshes)
 
 
 def solved_key(study, scene, calibration):
     """Key under which a scene's result is stored, given the calibrated stiffnesses by group."""
     name = scene_key(study, scene)
     if scene.definition == "calibrated":
-        return hash_of(name, calibration[calibration_name(scene)]["stiffness"])
+        return calibrated_key(name, calibration[calibration_name(scene)]["stiffness"])
     return name
 
 
@@ -131,7 +140,7 @@ def _thickness_ratio(study, scene):
 
 def calibration_name(scene):
     """Name of the group of curves that calibrates a scene."""
-    return f"{scene.mesh.mesh_type}_{scene.material.name}_{scene.kinematics}"
+    return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
 
 
 def _follows(scene):
@@ -148,20 +157,23 @@ def _given_stiffness(study, scene):
 
 def _mesh_members(study, costs):
     """Meshes, and what they and all their scenes and curves cost."""
-    seconds = {mesh.name: costs.of("mesh", particles(mesh)) for mesh in study.meshes}
+    seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
     for scene in study.scenes:
         count = particles(scene.mesh)
-        seconds[scene.mesh.name] += costs.of(scene.kinematics, count)
-        seconds[scene.mesh.name] += costs.of(scene.definition, count)
+        seconds[stem(scene.mesh)] += costs.of(scene.kinematics, count)
+        seconds[stem(scene.mesh)] += costs.of(scene.definition, count)
     for curve in study.curves:
-        seconds[curve.mesh.name] += costs.of("curve", particles(curve.mesh))
-    return {mesh.name: (seconds[mesh.name], mesh) for mesh in study.meshes}
+        seconds[stem(curve.mesh)] += costs.of("curve", particles(curve.mesh))
+    members = defaultdict(list)
+    for mesh in study.meshes:
+        members[stem(mesh)].append(mesh)
+    return {name: (seconds[name], meshes) for name, meshes in members.items()}
 
 
-def _meshes(study, folder, meshes):
+def _meshes(study, folder, members):
     return {
         "folder": str(folder / "meshes"),
-        "meshes": [{"name": mesh.name, "key": mesh_key(mesh)} | mesh_source(mesh) for mesh in meshes],
+        "meshes": [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members],
     }
 
 
@@ -225,10 +237,11 @@ def _curve(study, curve):
     }
 
 
-def _sensitivity(study, folder, meshes):
+def _sensitivity(study, folder, members):
     curves = by_mesh(study.curves)
     families = [
-        {"name": mesh.name, "curves": [_curve(study, curve) for curve in curves[mesh]]}
+        {"name": stem(mesh), "curves": [_curve(study, curve) for curve in curves[mesh]]}
+        for meshes in members
         for mesh in meshes
         if curves[mesh]
     ]
@@ -240,15 +253,16 @@ def _sensitivity(study, folder, meshes):
     }
 
 
-def _solve(study, folder, meshes):
+def _solve(study, folder, members):
     scenes = by_mesh(study.scenes)
     families = [
         {
-            "name": mesh.name,
+            "name": stem(mesh),
             "thickness": mesh.beam.thickness,
             "keep_fields": mesh in shown_meshes(study),
             "scenes": [_scene(study, scene) for scene in scenes[mesh]],
         }
+        for meshes in members
         for mesh in meshes
     ]
     return {
@@ -281,7 +295,8 @@ def _scene(study, scene):
 
 
 def _family_products(content):
-    return [Path(content["folder"]) / f"{family['name']}.h5" for family in content["families"]]
+    names = dict.fromkeys(family["name"] for family in content["families"])
+    return [Path(content["folder"]) / f"{name}.h5" for name in names]
 
 
 def calibrated(study):
@@ -306,7 +321,7 @@ def _calibrate(study, folder, members):
     tasks = []
     for name, (mesh_type, material, kinematics) in (pair for groups in members for pair in groups):
         curves = [
-            {"mesh": curve.mesh.name, "curve": curve_key(study, curve), "load": curve.load, "force": curve.force}
+            {"mesh": stem(curve.mesh), "curve": curve_key(study, curve), "load": curve.load, "force": curve.force}
             for curve in study.curves
             if (curve.mesh.beam.name, curve.load) == study.calibration
             and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
@@ -329,7 +344,7 @@ STAGES = (
         _reference_products,
         _reference_members,
     ),
-    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members, mesh_types=True),
+    Stage("mesh", "kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members),
     Stage(
         "sensitivity",
         "kinds.scenes.sensitivity",
@@ -358,6 +373,5 @@ STAGES = (
         like="mesh",
         same=("mesh",),
         every=("reference", "calibrate"),
-        definitions=True,
     ),
 )

@@ -2,7 +2,6 @@
 
 import time
 from functools import partial
-from pathlib import Path
 
 from ...jobs import store
 from ...problem.geometry import Beam
@@ -44,7 +43,7 @@ def lose(tasks, key, why, limits):
     key, why, limits : str
         Of the reference; what became of it; the limits.
     """
-    store.add(Path(tasks["folder"]) / f"{key}.h5", {key: _hole(why) | {"limits": limits}})
+    store.lose(tasks["folder"], key, _hole(why), limits)
 
 
 def _hole(why):

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import sealed, store
-from ...jobs.hashing import hash_of
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
@@ -17,6 +16,7 @@ from ...scene.sheet import Sheet, definition_of
 from ...springs import DEFINITIONS, DefinitionError
 from . import stored_mesh
 from . import stored_reference as references
+from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key
 
 KEPT_BACK = 5.0
 """Seconds for which results are not stored: writing them costs as much as solving small scenes."""
@@ -43,12 +43,14 @@ def run(tasks, spent):
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path, spent.limits)
         scenes = {_stored_key(scene, calibration): scene for scene in family["scenes"]}
-        missing = {name: scene for name, scene in scenes.items() if name not in present}
+        kept = {name: fields_key(name) for name in scenes} if family["keep_fields"] else {}
+        missing = {name: scene for name, scene in scenes.items() if not {name, kept.get(name, name)} <= present}
         if not missing:
             continue
         refused = stored_mesh.refusal(tasks["meshes"], family["name"])
         if refused:
-            store.add(path, dict.fromkeys(missing, _hole(**refused)))
+            holes = {name: _hole(**refused) for name in missing if name not in present}
+            store.add(path, holes | {kept[name]: {} for name in missing if name in kept})
             for _ in missing:
                 spent.add(stored_mesh.REFUSED, 0, 0.0)
             continue
@@ -63,8 +65,12 @@ def run(tasks, spent):
             result = spent.attempt(name, solved, _hole)
             if result is None:
                 continue
-            results[name] = result
-            spent.add(scene["kinematics"], len(mesh.points), result["seconds"])
+            if name in kept:
+                results[kept[name]] = {label: result.pop(label) for label in FIELD_ARRAYS if label in result}
+            if name not in present:
+                results[name] = result
+            work = "fields" if name in present else scene["kinematics"]
+            spent.add(work, len(mesh.points), result["seconds"])
             spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
             if time.perf_counter() > since + KEPT_BACK:  # what is solved is not to be lost to what comes
                 store.add(path, results)
@@ -85,7 +91,11 @@ def lose(tasks, name, why, limits):
     calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
         if any(_stored_key(scene, calibration) == name for scene in family["scenes"]):
-            store.add(Path(tasks["folder"]) / f"{family['name']}.h5", {name: _hole(why, limits=limits)})
+            path = Path(tasks["folder"]) / f"{family['name']}.h5"
+            holes = {fields_key(name): {"limits": limits}} if family["keep_fields"] else {}
+            if name not in store.stored(path, limits):  # else its fields alone are beyond them
+                holes[name] = _hole(why, limits=limits)
+            store.add(path, holes)
 
 
 def _hole(message, **limits):
@@ -95,7 +105,7 @@ def _hole(message, **limits):
 def _stored_key(scene, calibration):
     """Key of a scene's result; as `springtune.kinds.scenes.plan.solved_key`, from the task."""
     group = scene.get("calibration")
-    return hash_of(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
+    return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
 
 def _turn(scene):

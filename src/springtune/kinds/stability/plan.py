@@ -10,17 +10,21 @@ from ..base import Stage
 
 def experiment_key(one):
     """Key of an experiment on stability."""
-    parameters = asdict(one) | {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
     code = stage_key("kinds.stability.stage"), mesh_type_key(one.mesh_type), definition_key(one.definition)
-    return hash_of(parameters, code)
+    return hash_of(_parameters(one), code)
+
+
+def _parameters(one):
+    """What an experiment depends on: not on labels of its beam and material."""
+    return asdict(one) | {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
 
 
 def _members(study, costs):
-    return {hash_of(asdict(one)): (costs.of(one.name), one) for one in study.parts["stability"]}
+    return {hash_of(_parameters(one)): (costs.of(one.name), one) for one in study.parts["stability"]}
 
 
 def _content(study, folder, experiments):
-    tasks = [{"key": experiment_key(one)} | asdict(one) for one in experiments]
+    tasks = [{"key": experiment_key(one)} | _parameters(one) for one in experiments]
     return {"folder": str(folder / "stability"), "experiments": tasks}
 
 
@@ -36,7 +40,5 @@ STAGES = (
         _content,
         _products,
         _members,
-        definitions=True,
-        mesh_types=True,
     ),
 )

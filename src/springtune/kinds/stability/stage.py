@@ -2,7 +2,6 @@
 
 import time
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -43,7 +42,7 @@ def lose(tasks, key, why, limits):
     key, why, limits : str
         Of the experiment; what became of it; the limits.
     """
-    store.add(Path(tasks["folder"]) / f"{key}.h5", {key: _hole(why) | {"limits": limits}})
+    store.lose(tasks["folder"], key, _hole(why), limits)
 
 
 def _hole(why):

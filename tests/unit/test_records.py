@@ -1,0 +1,249 @@
+"""Notes, results and records: what was not written is not read."""
+
+import json
+import os
+import re
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from springtune.jobs import records, run_tasks, sealed, store
+from springtune.jobs.damage import ASIDE, DamagedError
+from springtune.jobs.spent import Spent
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+def flipped(content, place, bit):
+    """Bytes of which one bit is another."""
+    changed = bytearray(content)
+    changed[place % len(content)] ^= 1 << bit
+    return bytes(changed)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("notes")
+
+
+class TestSealed:
+    @given(content=st.dictionaries(st.text(), JSON, max_size=4))
+    def test_what_goes_in_comes_out(self, folder, content):
+        sealed.write(folder / "note.json", content)
+        assert sealed.read(folder / "note.json") == content == sealed.demand(folder / "note.json")
+        assert json.loads((folder / "note.json").read_text())["content"] == content
+
+    @given(place=st.integers(0, 10**6), bit=st.integers(0, 7))
+    def test_no_flipped_bit_is_read(self, folder, place, bit):
+        path = folder / "flipped.json"
+        sealed.write(path, {"seconds": 0.25, "names": ["a", "b"]})
+        path.write_bytes(flipped(path.read_bytes(), place, bit))
+        assert sealed.read(path) is None
+        with pytest.raises(DamagedError, match="checksum"):
+            sealed.demand(path)
+
+    @pytest.mark.parametrize("content", [b"", b"{}", b"null", b"\xff\xfe", b'{"seal": "'], ids=repr)
+    def test_other_files_are_none(self, tmp_path, content):
+        (tmp_path / "note.json").write_bytes(content)
+        assert sealed.read(tmp_path / "note.json") is None
+
+    def test_a_missing_one_is_none(self, tmp_path):
+        assert sealed.read(tmp_path / "note.json") is None
+        with pytest.raises(DamagedError, match="missing"):
+            sealed.demand(tmp_path / "note.json")
+
+
+class TestStore:
+    RESULT = {"displacement": 1.25e-3, "field": np.arange(6.0).reshape(3, 2)}
+
+    @given(place=st.integers(0, 10**6), bit=st.integers(0, 7))
+    def test_no_flipped_bit_is_read(self, folder, place, bit):
+        path = folder / "flipped.h5"
+        path.unlink(missing_ok=True)
+        store.add(path, {"one": self.RESULT})
+        path.write_bytes(flipped(path.read_bytes(), place, bit))
+        with pytest.raises(DamagedError):
+            store.read(path, ["one"])
+        assert store.stored(path) == set()
+
+    @given(length=st.integers(0, 10**6))
+    def test_no_truncated_file_is_read(self, folder, length):
+        path = folder / "short.h5"
+        path.unlink(missing_ok=True)
+        store.add(path, {"one": self.RESULT})
+        content = path.read_bytes()
+        path.write_bytes(content[: length % len(content)])
+        with pytest.raises(DamagedError):
+            store.read(path, ["one"])
+
+    def test_a_damaged_file_is_set_aside_with_a_warning_and_its_results_are_stored_anew(self, tmp_path, capsys):
+        path = tmp_path / "results.h5"
+        store.add(path, {"one": self.RESULT})
+        damaged = flipped(path.read_bytes(), 1000, 3)
+        path.write_bytes(damaged)
+        assert store.stored(path) == set() and not path.exists()
+        aside = path.with_name(path.name + ASIDE)
+        assert aside.read_bytes() == damaged
+        assert re.fullmatch(rf"{path}: its checksum .*; set aside as {aside.name}, .*\n", capsys.readouterr().err)
+        store.add(path, {"one": self.RESULT})
+        assert store.stored(path) == {"one"}
+
+    def test_the_file_of_another_mesh_keeps_what_it_has_and_lacks_what_is_asked_for(self, tmp_path):
+        path = tmp_path / "results.h5"
+        store.add(path, {"other": self.RESULT})
+        with pytest.raises(DamagedError, match="lacks 1 of 1 results") as caught:
+            store.read(path, ["one"])
+        assert caught.value.whole
+        store.add(path, {"one": self.RESULT})
+        assert store.stored(path) == {"one", "other"}
+
+    def test_files_from_before_there_were_checksums_hold_nothing(self, tmp_path, capsys):
+        path = tmp_path / "results.h5"
+        with h5py.File(path, "w") as file:
+            file["scalars"] = "{}"
+        assert store.stored(path) == set() and path.exists()
+        assert capsys.readouterr().err == ""
+        store.add(path, {"one": self.RESULT})
+        assert store.stored(path) == {"one"}
+
+    def test_what_was_lost_to_limits_is_computed_again_when_they_change(self, tmp_path):
+        store.lose(tmp_path, "one", {"message": "not done within 1 s"}, "1 s")
+        path = tmp_path / "one.h5"
+        assert store.stored(path, "1 s") == {"one"} == store.stored(path)
+        assert store.stored(path, "2 s") == set()
+        assert store.read_one(tmp_path, "one") == {"message": "not done within 1 s"}
+        assert [task["key"] for _, task in store.missing(tmp_path, [{"key": "one"}], "2 s")] == ["one"]
+        assert not list(store.missing(tmp_path, [{"key": "one"}], "1 s"))
+
+
+class TestRecords:
+    @pytest.fixture
+    def made(self, tmp_path):
+        """A job's record, and what it made."""
+        products = [tmp_path / "a.txt", tmp_path / "b.txt"]
+        for product in products:
+            product.write_text(product.name)
+        records.write(tmp_path / "done.json", "digest", products)
+        return tmp_path / "done.json", products
+
+    def test_what_is_there_as_it_was_needs_no_job(self, made):
+        record, products = made
+        assert records.fault(record, "digest", products) == "" == records.fault(record, "digest", products, wholly=True)
+
+    def test_a_file_of_another_time_and_the_same_content_needs_none(self, made):
+        record, products = made
+        os.utime(products[0], (1, 1))
+        assert records.fault(record, "digest", products) == ""
+
+    def test_whatever_differs_needs_one(self, made):
+        record, products = made
+        assert records.fault(record.with_name("none.json"), "digest", products) == "not done yet"
+        assert records.fault(record, "other", products) == "something else is asked for"
+        assert "not what this job made" in records.fault(record, "digest", [*products, record])
+        state = products[1].stat()
+        products[1].write_text("b.txT")
+        assert records.fault(record, "digest", products) == f"{products[1]} is damaged"
+        # Not even the time tells: only who reads all of it finds out.
+        os.utime(products[1], ns=(state.st_atime_ns, state.st_mtime_ns))
+        assert records.fault(record, "digest", products) == ""
+        assert records.fault(record, "digest", products, wholly=True) == f"{products[1]} is damaged"
+        products[0].unlink()
+        assert records.fault(record, "digest", products) == f"{products[0]} is missing"
+        record.write_bytes(flipped(record.read_bytes(), 200, 1))
+        assert records.fault(record, "digest", products) == f"{record} is damaged"
+
+    def test_what_could_not_be_made_is_not_missing(self, tmp_path):
+        record, never = tmp_path / "done.json", tmp_path / "never.vtu"
+        records.write(record, "digest", [never])
+        assert records.fault(record, "digest", [never]) == ""
+        never.write_text("somebody's")
+        assert records.fault(record, "digest", [never])
+
+
+class TestRunTasks:
+    """A job of the stage `reference`, whose result another job reads."""
+
+    @pytest.fixture
+    def study(self, tmp_path):
+        folder = tmp_path / "results/mine"
+        content = {"folder": str(folder / "references"), "finite": []}
+        content["references"] = [{"key": "one", "problem": [5.0, 0.3, "axial"]}]
+        note = {"digest": "digest", "module": "kinds.scenes.reference", "limits": {"seconds": 60, "memory": 4e9},
+                "products": [str(folder / "references/one.h5")], "content": content}  # fmt: skip
+        sealed.write(folder / "tasks/reference_0.json", note)
+        run_tasks.main(str(folder / "tasks/reference_0.json"), str(folder / "done/reference_0.json"), "digest")
+        return folder
+
+    def test_a_job_stores_its_results_and_leaves_its_record(self, study):
+        assert store.read_one(study / "references", "one")["displacement"] > 0
+        record = sealed.read(study / "done/reference_0.json")
+        assert record["digest"] == "digest" and record["work"]["reference"][0] == 1
+        assert list(record["products"]) == [str(study / "references/one.h5")]
+
+    def test_tasks_that_are_not_those_of_the_plan_are_not_done(self, study):
+        with pytest.raises(SystemExit, match="not what this job is to do"):
+            run_tasks.main(str(study / "tasks/reference_0.json"), str(study / "done/reference_0.json"), "other")
+
+    @pytest.mark.parametrize("how", ["flip", "cut", "empty", "lost"])
+    def test_what_a_reader_finds_damaged_is_made_again_where_it_stands(self, study, how, capsys):
+        path, done = study / "references/one.h5", study / "done/reference_0.json"
+        before, time = store.read_one(study / "references", "one"), done.stat().st_mtime_ns
+        content = path.read_bytes()
+        changed = {"flip": flipped(content, 900, 0), "cut": content[:-1], "empty": b""}
+        if how == "lost":
+            path.unlink()
+        else:
+            path.write_bytes(changed[how])
+        found = run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
+        assert {name: found[name] for name in ("displacement", "strain")} == {
+            name: before[name] for name in ("displacement", "strain")
+        }
+        assert "computed again" in capsys.readouterr().err
+        assert path.with_name(path.name + ASIDE).exists() == (how != "lost")
+        # What waited for that job has no reason to run again.
+        assert done.stat().st_mtime_ns == time
+        assert records.fault(done, "digest", [path], wholly=True) == ""
+
+    def test_what_no_job_makes_ends_the_reader(self, study):
+        with pytest.raises(SystemExit, match="no job makes it"):
+            run_tasks.mended(lambda: store.read_one(study / "references", "other"), study)
+
+    def test_what_stays_damaged_ends_the_reader(self, study):
+        with pytest.raises(SystemExit, match="did not help"):
+            run_tasks.mended(lambda: store.read(study / "references/one.h5", ["another"]), study)
+
+
+class TestAttempt:
+    def attempt(self, error):
+        def task():
+            raise error
+
+        spent = Spent()
+        return spent.attempt("key", task, lambda why: {"message": why}), spent.broken
+
+    @pytest.mark.parametrize(
+        "error",
+        [ZeroDivisionError("by zero"), np.linalg.LinAlgError("singular"), RuntimeError("no end"), MemoryError()],
+    )
+    def test_what_fails_for_its_own_reasons_is_a_hole(self, error):
+        result, broken = self.attempt(error)
+        assert result["message"] and not broken
+
+    @pytest.mark.parametrize(
+        "error",
+        [TypeError(), KeyError("x"), AttributeError(), ValueError("shapes"), NotImplementedError(), AssertionError()],
+    )
+    def test_what_a_broken_program_raises_is_none(self, error):
+        result, broken = self.attempt(error)
+        assert result is None and broken == [error]
+
+    def test_damage_goes_to_who_mends_it(self):
+        with pytest.raises(DamagedError):
+            self.attempt(DamagedError("path", "why"))

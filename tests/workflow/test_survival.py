@@ -1,0 +1,187 @@
+"""What a run survives, and what it says: other runs, kills, broken programs, scenes beyond limits."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+import xarray as xr
+
+import springtune
+
+STUDY = """
+title: Survival
+beams: {small: {length: 50 mm, height: 20 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+outputs: [size]
+grids:
+  one:
+    beam: small
+    mesh_type: structured
+    mesh_size: [10 mm, 5 mm]
+    material: steel
+    load: [traction, compression]
+    force: 20 kN
+    definition: [lattice, delingette]
+    kinematics: linear
+"""
+
+
+def everything(folder):
+    """All that is in a folder, Snakemake's own aside: of each file its content and its time."""
+    return {
+        path.relative_to(folder): (path.read_bytes(), path.stat().st_mtime_ns)
+        for path in folder.rglob("*")
+        if path.is_file() and ".snakemake" not in path.parts
+    }
+
+
+@pytest.fixture(scope="module")
+def finished(run):
+    run.write("survival.yaml", STUDY)
+    code, output = run.snakemake("survival.yaml")
+    assert code == 0, output
+    return run
+
+
+@pytest.mark.parametrize(
+    "arguments", [["-n"], ["--summary"], ["--list-changes", "params"], ["--rulegraph"]], ids=lambda one: one[0]
+)
+def test_who_only_looks_changes_nothing(finished, arguments):
+    before = everything(finished.folder)
+    code, output = finished.snakemake("survival.yaml", *arguments)
+    assert code == 0, output
+    assert everything(finished.folder) == before
+
+
+def test_a_plan_of_what_was_never_run_is_made_without_writing(run):
+    run.write("never.yaml", STUDY)
+    code, output = run.snakemake("never.yaml", "-n")
+    assert code == 0 and re.search(r"solve +1\n", output), output
+    assert not (run.folder / "results/never").exists()
+
+
+class TestLocks:
+    """Locks as Snakemake writes them, of a run of the study's collect."""
+
+    @pytest.fixture
+    def locked(self, finished):
+        locks = finished.folder / ".snakemake/locks"
+        locks.mkdir(exist_ok=True)
+        (locks / "0.output.lock").write_text("results/survival/dataset.nc\n")
+        (finished.folder / "results/survival/dataset.nc").unlink(missing_ok=True)
+        yield finished
+        shutil.rmtree(locks, ignore_errors=True)
+        shutil.rmtree(finished.folder / ".snakemake/springtune", ignore_errors=True)
+
+    def note(self, run, **changed):
+        from springtune.campaign import locks
+        from springtune.jobs import sealed
+
+        process = psutil.Process()
+        note = {"host": locks.platform.node(), "pid": process.pid, "start": process.create_time(),
+                "command": "snakemake", "folders": ["results/survival"]} | changed  # fmt: skip
+        sealed.write(run.folder / locks.RUNS / "of_a_test.json", note)
+
+    def test_one_of_a_process_that_is_gone_is_removed_with_a_word(self, locked):
+        self.note(locked, start=1.0)  # another process had its number
+        code, output = locked.snakemake("survival.yaml")
+        assert code == 0 and "was killed and left its lock; the lock is removed" in output
+        assert not list((locked.folder / ".snakemake/springtune").glob("*"))
+
+    def test_one_that_nobody_noted_is_removed_where_nobody_runs(self, locked):
+        code, output = locked.snakemake("survival.yaml")
+        assert code == 0 and "the lock is removed" in output
+
+    def test_that_of_a_living_process_stays_and_is_told_with_the_remedy(self, locked):
+        self.note(locked)
+        code, output = locked.snakemake("survival.yaml")
+        assert code == 1 and "Traceback" not in output
+        assert re.search(rf"results/survival: process {os.getpid()} on this machine computes it since .*; wait", output)
+        assert (locked.folder / ".snakemake/locks/0.output.lock").exists()
+
+    def test_a_living_process_needs_no_lock(self, locked):
+        """Snakemake removes the locks of all runs in a folder at the end of one."""
+        shutil.rmtree(locked.folder / ".snakemake/locks")
+        self.note(locked)
+        code, output = locked.snakemake("survival.yaml")
+        assert code == 1 and "on this machine computes it since" in output
+
+    def test_that_of_another_machine_stays_and_is_told_with_the_remedy(self, locked):
+        self.note(locked, host="elsewhere", start=1.0)
+        code, output = locked.snakemake("survival.yaml")
+        assert code == 1 and "on elsewhere" in output and "snakemake --unlock" in output
+
+    def test_that_of_another_study_is_nobodys_business(self, locked):
+        other = locked.folder / ".snakemake/locks/7.output.lock"
+        (locked.folder / ".snakemake/locks/0.output.lock").rename(other)
+        other.write_text("results/other/dataset.nc\n")
+        self.note(locked, folders=["results/other"])
+        code, output = locked.snakemake("survival.yaml")
+        assert code == 0 and "lock" not in output, output
+
+
+def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
+    """Wherever it is: the kill comes when the first mesh is there."""
+    run = finished
+    run.write("killed.yaml", STUDY)
+    repository = Path(__file__).parents[2]
+    command = ["snakemake", "--snakefile", repository / "Snakefile", "--cores", "2", "--configfile", "killed.yaml",
+               "--workflow-profile", repository / "workflow/profiles/default"]  # fmt: skip
+    job = subprocess.Popen(list(map(str, command)), cwd=run.folder, start_new_session=True, stderr=subprocess.DEVNULL)
+    while not list(run.folder.glob("results/killed/meshes/*.json")):
+        assert job.poll() is None
+        time.sleep(0.01)
+    children = psutil.Process(job.pid).children(recursive=True)
+    os.killpg(job.pid, signal.SIGKILL)
+    job.wait()
+    psutil.wait_procs(children)
+    code, output = run.snakemake("killed.yaml")
+    assert code == 0, output
+    with (
+        xr.open_dataset(run.folder / "results/killed/dataset.nc") as one,
+        xr.open_dataset(run.folder / "results/survival/dataset.nc") as other,
+    ):
+        assert one.displacement.equals(other.displacement) and one.stiffness.equals(other.stiffness)
+    assert not list(run.folder.rglob("*.unfinished"))
+
+
+def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp_path, monkeypatch):
+    """The package in a copy, with an error that scenes in traction run into."""
+    shutil.copytree(Path(springtune.__file__).parent, tmp_path / "springtune")
+    path = tmp_path / "springtune/scene/sheet.py"
+    line = "        problem, load = self.problem(kind, springs, follower), force / springs.reference\n"
+    assert path.read_text().count(line) == 1
+    path.write_text(path.read_text().replace(line, f"{line}        None if force < 0 else None + force\n"))
+    run.write("broken.yaml", STUDY)
+    with monkeypatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(tmp_path))
+        code, output = run.snakemake("broken.yaml")
+    assert code == 1 and "Traceback" not in output
+    broken = re.findall(r"\n  the program is broken: (\d) of this job's tasks raised TypeError: unsupported op", output)
+    assert sum(map(int, broken)) == 4, output
+    assert "Traceback" in (run.folder / "results/broken/logs/solve_0.log").read_text()
+    assert not (run.folder / "results/broken/dataset.nc").exists()
+    from springtune.jobs import store
+
+    assert len(store.stored(run.folder / "results/broken/solutions/small_structured_5mm.h5")) == 2
+
+
+def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run):
+    """A second of the processor is much for one mesh and little for the other, by a factor of a hundred each."""
+    text = STUDY.replace("[10 mm, 5 mm]", "[10 mm, 0.15 mm]").replace("kinematics: linear", "kinematics: nonlinear")
+    text = text.replace("load: [traction, compression]", "load: traction").replace("[lattice, delingette]", "evolved")
+    run.write("limits.yaml", text.replace("grids:", "limits: {seconds: 1, memory: 1 GB}\ngrids:"))
+    code, output = run.snakemake("limits.yaml", "--until", "collect")
+    assert code == 0, output
+    assert "scenes, failed: 1 of 2\n  small, structured, 0.15 mm, steel, traction, evolved, nonlinear: " in output
+    assert "at most 1 s and 1 GB for each (`limits` of the study)" in output
+    run.write("limits.yaml", text.replace("grids:", "limits: {seconds: 2, memory: 1 GB}\ngrids:"))
+    code, output = run.snakemake("limits.yaml", "--until", "collect")
+    assert code == 0 and "at most 2 s and 1 GB" in output, output
+    assert "sensitivity 1 of 2, solve 1 of 2; the others were stored before" in output
