@@ -21,6 +21,7 @@ from .problem.materials import Material
 from .problem.status import Status
 from .reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
 from .scene.curve import face_edge
+from .scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from .scene.sheet import Sheet
 from .springs import DefinitionError, Springs, lattice
 from .springs.lattice import uniform
@@ -182,6 +183,12 @@ def predict(beam: Beam, mesh: Mesh, material: Material, known: References | None
     >>> print(f"{best.definition}: {100 * best.worst:.1f} % at worst")
     patch-area: 6.3 % at worst
     """
+    is_a(beam, Beam, "beam", A_BEAM)
+    is_a(mesh, Mesh, "mesh", A_MESH)
+    is_a(material, Material, "material", A_MATERIAL)
+    check_filled(mesh, beam)
+    if known is not None and not (isinstance(known, dict) and set(CASES) <= set(known)):
+        raise ValueError(f"known: {known!r} has no references; give what springtune.prediction.references returns")
     known = references(beam, material) if known is None else known
     sheet, seen, refusals = _Sheet(mesh, beam, material, known), set(), []
     choices: list[Choice] = []

@@ -7,6 +7,7 @@ one place: its function. Code outside the package adds its own with the same dec
 import importlib
 import inspect
 import pkgutil
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -52,6 +53,12 @@ class Declared:
 Entry = TypeVar("Entry", bound=Declared)
 
 
+NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,59}")
+NAME_RULE = (
+    "use letters, digits, '.', '_' and '-', at most 60 of them, and no '.' in front: names become parts of file names"
+)
+
+
 class Registry(Mapping[str, Entry]):
     """Read-only mapping from names to what was declared, in order; the modules of a package are read when needed.
 
@@ -77,8 +84,14 @@ class Registry(Mapping[str, Entry]):
         Raises
         ------
         ValueError
-            If another function has the name.
+            If another function has the name, or the entry cannot be one.
         """
+        if not (isinstance(entry.name, str) and NAME.fullmatch(entry.name)):
+            raise ValueError(f"{self._what}: {entry.name!r} cannot name one; {NAME_RULE}")
+        if not callable(entry.function):
+            raise ValueError(f"{self._what} '{entry.name}': {entry.function!r} is not a function; decorate one")
+        if isinstance(entry.order, bool) or not (isinstance(entry.order, int | float) and entry.order == entry.order):
+            raise ValueError(f"{self._what} '{entry.name}': order {entry.order!r} is not a number; give one")
         if not entry.function.__module__.startswith(f"{self._package}."):
             self._discover()
         former = self._entries.get(entry.name)

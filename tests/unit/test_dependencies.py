@@ -344,7 +344,7 @@ VERSIONS = {
     "scikit-fem": {"kinds.scenes.reference", "kinds.benchmark.stage"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "free", "from a file"},
+    "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "from a file"},
 }
 
 

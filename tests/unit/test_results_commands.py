@@ -13,6 +13,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 import springtune as st
+from springtune.campaign import locks
 from springtune.campaign.orphans import orphans
 from springtune.cli import main
 from springtune.kinds import load_study
@@ -305,9 +306,10 @@ class TestClean:
 
     def test_nothing_is_removed_under_a_run_or_with_a_faulty_study(self, left):
         before = self.there()
-        Path(".snakemake/locks").mkdir(parents=True)
-        Path(".snakemake/locks/0.input.lock").write_text("")
-        refused(run("clean", "config/two.yaml", "--remove"), "a run is under way, nothing is removed")
+        locks.begin([Path("results/two")])
+        told = "results/two: process", "on this machine computes it since", "nothing is removed"
+        refused(run("clean", "config/two.yaml", "--remove"), *told)
+        locks.end()
         Path("config/two.yaml").write_text("title: none\n")
         assert run("clean", "config/two.yaml", "--remove").exit_code == 1
         assert self.there() == before

@@ -17,7 +17,7 @@ from springtune.jobs import sealed, store
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
 from springtune.kinds.scenes import stored_mesh
-from springtune.kinds.scenes.solve import _stored_key
+from springtune.kinds.scenes.solve import stored_key
 from springtune.kinds.scenes.stored_scene import fields_key
 
 PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "netgen-mesher", "pyamg", "scikit-fem", "h5py", "meshio")
@@ -28,7 +28,7 @@ def keys(content, calibration):
     found = []
     for value in (value for name, value in content.items() if isinstance(value, list) and name != "members"):
         for one in (one for one in value if isinstance(one, dict)):
-            found += [_stored_key(one, calibration)] if "key" in one else keys(one, calibration)
+            found += [stored_key(one, calibration)] if "key" in one else keys(one, calibration)
     return found
 
 

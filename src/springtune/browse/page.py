@@ -12,20 +12,20 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import h5netcdf
+import h5py
 import jinja2
 from markupsafe import Markup
 
 from ..kinds import KINDS
+from ..output.reading import REMEDY, check_size, guarded
 from ..output.views import View
-from .payload import packed
+from .payload import held, packed
 
 SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
 """Modules of the page's own script, in the order in which they are put together."""
 
 LIBRARY = ("bokeh", "bokeh-api")
 """Scripts of BokehJS that the page needs."""
-
-REMEDY = "give the dataset.nc of a study, or run the study again"
 
 
 def views() -> dict[str, View]:
@@ -72,9 +72,11 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
     try:
-        with h5netcdf.File(path, decode_vlen_strings=True) as file:
+        # Opened first: of what it cannot open h5netcdf leaves a half-made file that complains when it is forgotten.
+        with guarded(path), h5py.File(path) as opened, h5netcdf.File(opened, decode_vlen_strings=True) as file:
+            check_size(path, held(file))
             groups, contents = packed(file)
-    except (OSError, ValueError, KeyError) as error:
+    except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error}); {REMEDY}") from None
     attributes = groups[0]["attributes"]
     if "springtune_version" not in attributes:

@@ -9,6 +9,7 @@ are sorted by their place in a number, since those of one place are alike, and e
 import zlib
 from collections.abc import Iterator
 from itertools import accumulate
+from math import prod
 from typing import Any
 
 import h5netcdf
@@ -58,6 +59,21 @@ def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]],
         for row, begin in zip(described["variables"], ends):
             row["at"] = begin
     return [described for described, _ in found], contents
+
+
+def held(group: h5netcdf.Group) -> float:
+    """Bytes of all arrays of a file, as it says itself.
+
+    Parameters
+    ----------
+    group : h5netcdf.Group
+
+    Returns
+    -------
+    float
+    """
+    own = sum(float(prod(one.shape)) * one.dtype.itemsize for one in group.variables.values())
+    return own + sum(held(child) for child in group.groups.values())
 
 
 def _lighten(found: list[Packed], room: int) -> None:
@@ -162,7 +178,8 @@ def _plain(value: Any) -> Any:
 def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
     row: dict[str, Any] = {}
     if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
-        numbers = values.real.astype(np.float32)
+        with np.errstate(over="ignore"):  # beyond 3e38 nothing is shown but that it is infinite
+            numbers = values.real.astype(np.float32)
         return _rows(row | {"type": "float"}, numbers, ~np.isnan(numbers))
     if values.dtype.kind in "iub":
         return _rows(row | {"type": "integer"}, values.astype(np.int32), values != 0)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 COMPARED = ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement")
 """Numbers of a scene that are made again."""
 
-SAME, ALIKE = 1e-12, 1e-6
+SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
 """Relative differences that are none: with the versions of the software that the dataset was made with, and with
 others, whose factors round differently; equilibria are solved to 1e-10 of the load."""
 
@@ -168,7 +168,7 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
     software = json.loads(root.attrs["software"])
     same = all(installed(name) == version for name, version in software.items() if name != "python")
     for scene in part.scenes:
-        yield _compared(scene, root, made, SAME if same else ALIKE)
+        yield _compared(scene, root, made, SAME_SOFTWARE if same else OTHER_SOFTWARE)
 
 
 def _part(study: "Study", scenes: "list[SceneSpec]") -> "Study":

@@ -30,7 +30,8 @@ def info(path: Path) -> None:
     from ..output import reading
 
     try:
-        with reading.open(path) as tree:
+        reading.check_links(path)
+        with reading.open(path) as tree, reading.guarded(path):
             click.echo(info_text(tree, path / "dataset.nc" if path.is_dir() else path))
     except (OSError, ValueError) as error:
         raise click.ClickException(str(error)) from None

@@ -17,9 +17,12 @@ from typing import Protocol
 import numpy as np
 
 from ..linalg.factors import SingularError
-from ..mesh.cells import Mesh
+from ..mesh.cells import Mesh, MeshError
 from .energies import Energy
 from .network import Network
+
+EVEN = 1e-6
+"""What a strip's length may differ by, over its extent: coordinates from files have few digits [1]."""
 
 
 class Elastic(Protocol):
@@ -68,6 +71,61 @@ def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     middles = mesh.points[edges, 0].mean(axis=1)
     left = middles < 0.5 * (middles.min() + middles.max())
     return np.unique(edges[left]), np.unique(edges[~left])
+
+
+def strip_fault(mesh: Mesh) -> str:
+    """Why a patch test between rollers says nothing of a mesh, with the remedy; empty where it does.
+
+    An even strain is what a continuum has between the ends alone where the mesh is a strip: between a straight lower
+    and a straight upper face, of one length at every height, without a hole. Staggered ends are fine.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    A plate with a hole:
+
+    >>> from springtune.mesh import Mesh, right
+    >>> whole = right(0.1, 0.04, 5e-3)
+    >>> middles = whole.points[whole.triangles].mean(axis=1)
+    >>> ring = (abs(middles - [0.05, 0.02]) > 0.01).any(axis=1)
+    >>> strip_fault(whole), strip_fault(Mesh(whole.points, whole.triangles[ring]))[:35]
+    ('', 'its outline is no single line aroun')
+    """
+    outline = mesh.edges[mesh.on_outline]
+    x, y = mesh.points.T
+    remedy = "give a full rectangle, or rows of one length"
+    if (np.bincount(outline.ravel(), minlength=len(x))[outline] != 2).any() or not _one_round(outline, len(x)):
+        return f"its outline is no single line around it: there are holes or parts; {remedy}"
+    left, right = (end[np.argsort(y[end], kind="stable")] for end in ends(mesh))
+    size = max(np.ptp(x), np.ptp(y))
+    sides = [(side, y[side]) for side in (left, right)]
+    rising = all(len(side) > 1 and (np.diff(heights) > 0).all() for side, heights in sides)
+    whole = rising and all(abs(heights[[0, -1]] - [y.min(), y.max()]).max() <= EVEN * size for _, heights in sides)
+    if not whole:
+        return f"its ends do not run from a straight lower face to a straight upper one; {remedy}"
+    heights = np.union1d(y[left], y[right])
+    lengths = np.interp(heights, y[right], x[right]) - np.interp(heights, y[left], x[left])
+    covered = float(lengths.mean() * np.ptp(y))
+    if np.ptp(lengths) > EVEN * size or abs(mesh.area / covered - 1) > EVEN:
+        return f"it is not of one length at every height; {remedy}"
+    return ""
+
+
+def _one_round(outline: np.ndarray, count: int) -> bool:
+    """Whether edges, two at each of their particles, make one round."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    joined = coo_array((np.ones(len(outline)), outline.T), shape=(count, count))
+    rounds = connected_components(joined, directed=False)[1][outline[:, 0]]
+    return bool((rounds == rounds[0]).all())
 
 
 def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
@@ -132,6 +190,9 @@ class PatchTest:
     @cached_property
     def _rollers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Particles at both ends, directions held and displacements given between rollers."""
+        fault = strip_fault(self.mesh)
+        if fault:
+            raise MeshError(f"the mesh cannot have a patch test: {fault}")
         left, right = ends(self.mesh)
         held = np.zeros(self.mesh.points.shape, dtype=bool)
         held[left, 0] = held[right, 0] = True
@@ -190,6 +251,8 @@ def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
     ------
     SingularError
         If the network is singular or unstable at rest.
+    MeshError
+        If the mesh is no full strip, see `strip_fault`.
 
     Examples
     --------

@@ -15,8 +15,8 @@ Examples
 29.4 degrees at least
 """
 
-from .cells import Mesh, corner_angles, quality, signed_areas
-from .formats import MeshError, read_beam_mesh, read_mesh, write_mesh
+from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
+from .formats import read_beam_mesh, read_mesh, write_mesh
 from .free import free
 from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
 from .squares import alternating, braced, right

@@ -17,6 +17,22 @@ def no_cells(corners: int) -> np.ndarray:
     return np.zeros((0, corners), dtype=np.int64)
 
 
+class MeshError(ValueError):
+    """A mesh that cannot be used; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> from springtune.mesh import write_mesh
+    >>> write_mesh("own.vtu", st.make_mesh(st.Beam("100 mm", "20 mm"), "right", "5 mm"))
+    >>> try:
+    ...     st.read_mesh("own.vtu", st.Beam("200 mm", "40 mm"))
+    ... except st.MeshError as error:
+    ...     print(error)
+    own.vtu: extends over 100 x 20 mm, its beam over 200 x 40 mm; correct the unit or the beam
+    """
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     r"""A conforming mesh of counter-clockwise cells; each edge carries one spring.
@@ -36,6 +52,12 @@ class Mesh:
         Corner indices, counter-clockwise.
     quads : ndarray of int, shape (n_quads, 4), optional
         Corner indices, counter-clockwise.
+
+    Raises
+    ------
+    MeshError
+        If an array has another shape, a coordinate is no finite number, a cell is clockwise or flat or has a point that
+        is not there, or there are no cells.
 
     Examples
     --------
@@ -67,6 +89,30 @@ class Mesh:
     triangles: np.ndarray
     quads: np.ndarray = field(default_factory=lambda: no_cells(4))
 
+    def __post_init__(self) -> None:
+        points = _array(self.points, "points", 2, float)
+        object.__setattr__(self, "points", points)
+        for name, count in (("triangles", 3), ("quads", 4)):
+            object.__setattr__(self, name, _array(getattr(self, name), name, count, np.int64))
+        lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(lost):
+            raise MeshError(f"points: {len(lost)} are nowhere, the first one {lost[0]}; give finite coordinates in m")
+        if not self.cells:
+            raise MeshError("there are no cells; give triangles, quads or both")
+        for count, corners in self.cells.items():
+            if corners.min() < 0 or corners.max() >= len(points):
+                cell = np.argmax(((corners < 0) | (corners >= len(points))).any(axis=1))
+                shown = f"cell {cell} has corners {corners[cell].tolist()}"
+                raise MeshError(f"{shown}, and points are 0 to {len(points) - 1}; renumber them")
+            areas = signed_areas(points, corners)
+            if not (areas > 0).all():
+                cell = np.argmin(areas > 0)
+                where, wrong = points[corners[cell]].mean(axis=0), int((~(areas > 0)).sum())
+                raise MeshError(
+                    f"cells of {count} corners that are clockwise or have no area: {wrong}, the first one {cell} at "
+                    f"({1e3 * where[0]:.6g}, {1e3 * where[1]:.6g}) mm; turn them, or remove them"
+                )
+
     @property
     def cells(self) -> dict[int, np.ndarray]:
         """Corner indices of the cells by number of corners, those kinds that the mesh has."""
@@ -84,6 +130,11 @@ class Mesh:
             pairs[:, 0] * len(self.points) + pairs[:, 1], return_inverse=True, return_counts=True
         )
         edges = np.stack(np.divmod(codes, len(self.points)), axis=1)
+        if counts.max() > 2:
+            first = edges[np.argmax(counts)].tolist()
+            raise MeshError(
+                f"the edge of points {first} has {counts.max()} cells, and a plane has two sides; remove some"
+            )
         parts = iter(np.split(places, sizes[1:-1]))
         of_cells = {
             count: np.stack([next(parts) for _ in SIDES[count] + DIAGONALS[count]], axis=1) for count in self.cells
@@ -241,6 +292,20 @@ class Mesh:
                 if (signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) <= 0).any():
                     return True
         return False
+
+
+def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
+    """Array of so many columns, of a kind of number."""
+    try:
+        given = np.asarray(values)
+        fits = given.ndim == 2 and given.shape[1] == columns and given.dtype.kind in ("iuf" if kind is float else "iu")
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        shape = f"{given.dtype} of shape {given.shape}" if isinstance(values, np.ndarray) else type(values).__name__
+        numbers = "numbers" if kind is float else "whole numbers"
+        raise MeshError(f"{name}: {shape}; give an array of {numbers} of shape (n, {columns})")
+    return given.astype(kind, copy=False)
 
 
 def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

@@ -3,24 +3,20 @@
 import io
 import os
 import warnings
-from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .cells import Mesh, no_cells, signed_areas
+from .box import DIGITS, box_fault, in_words, on_sides
+from .cells import Mesh, MeshError, no_cells, signed_areas
 
 CELLS = {"triangle": 3, "quad": 4}
 """Corners of the cells that can be read, by meshio's name."""
 
 LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
-
-DIGITS = 1e-6
-"""What coordinates in a file may be off, over the extent of the mesh: formats in text have few digits."""
-
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
@@ -31,25 +27,6 @@ MOST_IN_FILE = 1_000_000
 LONGEST_SAID = 120
 """Most characters of what meshio says that are shown."""
 
-MOST_SEARCHED = 2000
-"""So many ends of edges are looked at for one that hangs on another edge."""
-
-
-class MeshError(ValueError):
-    """A mesh that cannot be used; the message says why and what to do.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> from springtune.mesh import write_mesh
-    >>> write_mesh("own.vtu", st.make_mesh(st.Beam("100 mm", "20 mm"), "right", "5 mm"))
-    >>> try:
-    ...     st.read_mesh("own.vtu", st.Beam("200 mm", "40 mm"))
-    ... except st.MeshError as error:
-    ...     print(error)
-    own.vtu: extends over 100 x 20 mm, its beam over 200 x 40 mm; correct the unit or the beam
-    """
-
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:
     """Write a mesh; the file appears whole or not at all.
@@ -59,7 +36,16 @@ def write_mesh(path: str | Path, mesh: Mesh) -> None:
     path : str or Path
         File to write, ending in ``.vtu``.
     mesh : Mesh
+
+    Raises
+    ------
+    MeshError
+        If the name has another ending, or `mesh` is none.
     """
+    if not isinstance(mesh, Mesh):
+        raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
+    if Path(path).suffix != ".vtu":
+        raise MeshError(f"{path}: is not to end in '{Path(path).suffix}'; give a name that ends in .vtu")
     import meshio
 
     points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
@@ -206,7 +192,7 @@ def _counter_clockwise(path: str | Path, points: np.ndarray, corners: np.ndarray
     areas = signed_areas(points, corners)
     flat = np.abs(areas) <= 1e-12 * np.abs(areas).max()
     if flat.any():
-        first = _place(points[corners[flat][0]])
+        first = in_words(points[corners[flat][0]])
         raise MeshError(f"{path}: cells with no area: {flat.sum()}, the first one at {first}; remove them")
     clockwise = areas < 0
     corners[clockwise] = corners[clockwise][:, ::-1]
@@ -235,96 +221,16 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
     """
     mesh = read_mesh(path, unit)
     box = np.array([length, height])
-    points = mesh.points - mesh.points.min(axis=0)
-    extent = points.max(axis=0)
+    mesh = Mesh(mesh.points - mesh.points.min(axis=0), mesh.triangles, mesh.quads)
+    extent = mesh.points.max(axis=0)
     if np.abs(extent / box - 1).max() > DIGITS:
         shown, wanted = (" x ".join(f"{1e3 * side:.6g}" for side in sides) for sides in (extent, box))
         raise MeshError(f"{path}: extends over {shown} mm, its beam over {wanted} mm; correct the unit or the beam")
-    # Sides shall be straight.
-    near = np.abs(points - extent) <= DIGITS * extent
-    points = np.where(near, box, np.where(points <= DIGITS * extent, 0.0, points))
-    mesh = Mesh(points, mesh.triangles, mesh.quads)
-    fault = _fault(mesh, box)
-    if fault:
-        raise MeshError(f"{path}: {fault}")
+    try:
+        mesh = on_sides(mesh, box)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+    wrong = box_fault(mesh)
+    if wrong:
+        raise MeshError(f"{path}: {wrong}")
     return mesh
-
-
-def _fault(mesh: Mesh, box: np.ndarray) -> str:
-    """Why a mesh does not fill a box exactly once, and what to do about it; empty where it does.
-
-    All cells are convex and counter-clockwise, no two lie on the same side of an edge, and the edges that have one cell
-    only make one round of the box. As many cells lie over a point as that round winds about it: one. So there is no
-    slit, hole or overlap, however thin, and there are no parts that meet in a point alone.
-    """
-    points = mesh.points
-    for count, corners in mesh.cells.items():
-        turns = [signed_areas(points, corners[:, [i - 1, i, (i + 1) % count]]) for i in range(count)]
-        bad = corners[np.min(turns, axis=0) <= 0]
-        if len(bad):
-            shape, remedy = "with a corner of 180 degrees or more", "split them into triangles"
-            if count == 3:
-                shape, remedy = "within rounding of a side of the box", "make them larger or remove them"
-            return f"cells {shape}: {len(bad)}, the first one at {_place(points[bad[0]])}; {remedy}"
-    share = mesh.area / box.prod()
-    lead = f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > DIGITS else ""
-    edges = np.concatenate(
-        [np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2) for corners in mesh.cells.values()]
-    )
-    codes = np.sort(edges @ [len(points), 1])  # one integer per edge and direction
-    again = codes[1:][codes[1:] == codes[:-1]]
-    if len(again):
-        first = _edge(points, np.divmod(again[0], len(points)))
-        return f"{lead}edges with two cells on the same side: {len(again)}, the first one {first}; remove one of them"
-    back = np.setdiff1d(edges @ [1, len(points)], codes, assume_unique=True)
-    outline = np.stack(np.divmod(back, len(points))[::-1], axis=1)
-    ends = points[outline]
-    on_side = [(ends[..., axis] == value).all(axis=1) for axis in range(2) for value in (0.0, box[axis])]
-    inside = ~np.any(on_side, axis=0)
-    if inside.any():
-        return lead + _opening(points, outline[inside])
-    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
-    if len(again) or lead:
-        where = _place(points[again[0] if len(again) else outline[0, 0]])
-        return f"{lead}the outline runs through {where} more than once; give a mesh that fills the box once"
-    return ""
-
-
-def _opening(points: np.ndarray, edges: np.ndarray) -> str:
-    """What is wrong where edges inside a box have one cell only, and what to do about it."""
-    from scipy.spatial import cKDTree  # here, since a good mesh needs none
-
-    count = f"edges inside the box with one cell only: {len(edges)}"
-    small = DIGITS * np.ptp(points, axis=0).max()
-    ends = np.unique(edges)
-    distances, nearest = cKDTree(points[ends]).query(points[ends], k=2)
-    twins = np.flatnonzero(distances[:, 1] <= small)
-    if len(twins):
-        # Of points at one place the nearest may be the point itself.
-        partner = np.where(nearest[:, 1] == np.arange(len(ends)), nearest[:, 0], nearest[:, 1])
-        one, other = points[ends[[twins[0], partner[twins[0]]]]]
-        distance = np.linalg.norm(other - one)
-        apart = f", {1e3 * distance:.3g} mm apart" if distance else ""
-        return f"two points at {_place(one)}{apart}, do not join their cells ({count}); merge duplicate points"
-    start, along = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
-    squares = (along**2).sum(axis=1)
-    for end in ends[:MOST_SEARCHED]:
-        to = points[end] - start
-        share = (to * along).sum(axis=1) / squares
-        aside = np.linalg.norm(to - share[:, None] * along, axis=1)
-        hangs = np.flatnonzero((aside <= small) & (share > 0) & (share < 1) & (edges != end).all(axis=1))
-        if len(hangs):
-            edge = _edge(points, edges[hangs[0]])
-            hanging = f"the point at {_place(points[end])} hangs on the edge {edge}"
-            return f"{hanging} ({count}); split the cell of that edge there"
-    return f"{count}, the first one {_edge(points, edges[0])}; close the hole there"
-
-
-def _place(points: np.ndarray) -> str:
-    """Middle of one or more points, in words."""
-    return "({:.6g}, {:.6g}) mm".format(*(1e3 * points.reshape(-1, 2).mean(axis=0)))
-
-
-def _edge(points: np.ndarray, ends: Sequence[int] | np.ndarray) -> str:
-    """Both ends of an edge, in words."""
-    return f"from {_place(points[ends[0]])} to {_place(points[ends[1]])}"

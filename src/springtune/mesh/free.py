@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 
-from .cells import Mesh, signed_areas
-from .formats import MeshError
+from .cells import Mesh, MeshError, signed_areas
 from .rows import ROW_HEIGHT
-from .types import mesh_type
+from .types import check_box, mesh_type
 
 
 def _stretch(length: float, height: float, size: float) -> float:
@@ -41,7 +40,9 @@ def free(length: float, height: float, size: float) -> Mesh:
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException
 
+    check_box(length, height, size)
     # Lengths in units of the edge: netgen's own tolerances are absolute.
+    size = min(size, max(length, height))  # a side of less than an edge is one edge, and netgen bears no tiny boxes
     box = np.array([length, height]) / size
     outline = SplineGeometry()
     corners = [outline.AppendPoint(*(box * corner)) for corner in ((0, 0), (1, 0), (1, 1), (0, 1))]

@@ -1,11 +1,12 @@
 """Rows of isosceles triangles fitted to a box: equilateral ones (`structured`) and others (`isosceles`)."""
 
 import math
+from numbers import Integral, Real
 
 import numpy as np
 
-from .cells import Mesh
-from .types import mesh_type, nearest_counts
+from .cells import Mesh, MeshError
+from .types import MOST_MESHED, check_box, mesh_type, nearest_counts
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""
@@ -63,6 +64,9 @@ def isosceles(length: float, height: float, size: float, poisson_ratio: float) -
 
 
 def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: float) -> tuple[int, int]:
+    check_box(length, height, size)
+    if not (isinstance(poisson_ratio, Real) and 1e-6 <= poisson_ratio <= 1):
+        raise MeshError(f"poisson_ratio: {poisson_ratio!r} has no such rows; give a number above 0 and at most 1")
     rows = max(1, round(height / row_height(size, poisson_ratio)))
     size = 2 * math.sqrt(poisson_ratio) * height / rows
     return max(1, round(length / size)), rows
@@ -122,6 +126,10 @@ def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None =
     Mesh
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
+    for name, value in (("cells", cells), ("rows", rows)):
+        if not (isinstance(value, Integral) and 1 <= value <= MOST_MESHED):
+            raise MeshError(f"{name}: {value!r} is not a whole number above zero; give one, such as 10")
+    check_box(cells * size, rows * row_height, size)
     line = size * np.arange(cells + 1.0)
     return _join([line + 0.5 * size * (row % 2) for row in range(rows + 1)], row_height * np.arange(rows + 1.0))
 

@@ -3,13 +3,42 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from typing import TypeVar
 
 from ..registry import Declared, Registry
-from .cells import Mesh
+from .cells import SIDES, Mesh, MeshError
 
 MOST_MESHED = 10_000_000
 """Particles beyond which no mesh is made: its edges alone take gigabytes."""
+
+
+LARGEST_SIZE = 1000.0
+"""Mesh size over the smaller side of a box from which it is taken for an error: cells become slivers [1]."""
+
+
+def check_box(length: float, height: float, size: float) -> None:
+    """Refuse a box that cannot be meshed.
+
+    Parameters
+    ----------
+    length, height, size
+        As of a `MeshType`.
+
+    Raises
+    ------
+    MeshError
+        If one is no finite number above zero, the size absurdly large, or there would be too many particles.
+    """
+    for name, value in (("length", length), ("height", height), ("size", size)):
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        if not (number and 1e-40 <= value <= 1e40):
+            raise MeshError(f"{name}: {value!r} is not a number above zero; give one in m")
+    if size > LARGEST_SIZE * min(length, height):
+        raise MeshError(f"size: {size!r} is no size of {length:g} x {height:g} m; give at most {min(length, height):g}")
+    if not max(length / size, 1.0) * max(height / size, 1.0) <= 2 * MOST_MESHED:
+        least = f"{1e3 * math.sqrt(length * height / MOST_MESHED):.2g} mm"
+        raise MeshError(f"size: {size!r} makes too many particles of {length:g} x {height:g} m; give at least {least}")
 
 
 def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
@@ -29,11 +58,17 @@ def nearest_counts(length: float, height: float, size: float, row_height: float 
     cells, rows : int
         At least 1.
 
+    Raises
+    ------
+    MeshError
+        As of `check_box`.
+
     Examples
     --------
     >>> nearest_counts(0.2, 0.04, 0.011)
     (18, 4)
     """
+    check_box(length, height, size)
     return max(1, round(length / size)), max(1, round(height / (row_height * size)))
 
 
@@ -78,7 +113,11 @@ class MeshType(Declared):
         -------
         Mesh
         """
-        return self.function(length, height, size)
+        found = self.function(length, height, size)
+        if not isinstance(found, Mesh):
+            what = type(found).__name__
+            raise MeshError(f"mesh type {self.name!r} returns {what}; return springtune.Mesh(points, triangles)")
+        return found
 
     def stretch(self, length: float, height: float, size: float) -> float:
         """How much wider cells come out than high, over what they should be, as whole numbers of them fit a box [1].
@@ -168,6 +207,10 @@ def mesh_type(
     """
 
     def declare(function: Function) -> Function:
+        if corners not in SIDES:
+            raise ValueError(f"mesh type {name!r}: corners {corners!r}; cells have 3 or 4")
+        if not (isinstance(row_height, Real) and 0 < row_height < math.inf):
+            raise ValueError(f"mesh type {name!r}: row_height {row_height!r} is not a number above zero; give one")
         MESH_TYPES.declare(MeshType(name, function, order, corners, row_height, own_stretch))
         return function
 

@@ -1,6 +1,8 @@
 """Opening the dataset of a study."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,15 @@ SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 CHANGED = "+changes"
 """What `git_commit` ends with where files of the checkout differed from the commit."""
+
+
+REMEDY = "give the dataset.nc of a study, or run the study again"
+
+DEFLATED = 1100.0
+"""Bytes that one byte of a file can stand for, at most: deflate gets to 1032 [1]."""
+
+LONGEST_REASON = 200
+"""Most characters of an error that are shown."""
 
 
 def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
@@ -55,15 +66,119 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         raise FileNotFoundError(
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
-    remedy = "give the dataset.nc of a study, or run the study again"
     try:
         tree = xarray.open_datatree(file, engine="netcdf4")
-    except (OSError, RuntimeError, ValueError, KeyError) as error:
-        raise ValueError(f"{file}: cannot be read ({error}); {remedy}") from None
-    if "springtune_version" not in tree.attrs:
+    except Exception as error:  # of a damaged file the libraries raise whatever they trip over
+        raise ValueError(f"{file}: cannot be read ({_said(error)}); {REMEDY}") from None
+    try:
+        if "springtune_version" not in tree.attrs:
+            raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
+        check_size(file, sum(data.nbytes for node in tree.subtree for data in node.variables.values()))
+    except ValueError:
         tree.close()
-        raise ValueError(f"{file}: is not a dataset of springtune; {remedy}")
+        raise
     return tree
+
+
+def check_links(path: str | os.PathLike[str]) -> None:
+    """Refuse a file whose arrays do not tell their dimensions as netCDF does: its library ends this process on some.
+
+    So it does where another program has changed the attributes by which arrays and dimensions know each other.
+
+    Parameters
+    ----------
+    path : str or Path
+        A dataset, or its folder; nothing is said of one that is not there or is no HDF5 file: `open` does.
+
+    Raises
+    ------
+    ValueError
+    """
+    import h5py
+
+    found: list[str] = []
+
+    def look(name: bytes) -> None:
+        one = h5py.h5o.open(file.id, name)
+        if not isinstance(one, h5py.h5d.DatasetID):
+            return
+        rank = one.get_space().get_simple_extent_ndims()
+        for attribute, kind, shape in (
+            (b"DIMENSION_LIST", h5py.h5t.VLEN, (rank,)),
+            (b"_Netcdf4Coordinates", h5py.h5t.INTEGER, (rank,)),
+            (b"_Netcdf4Dimid", h5py.h5t.INTEGER, ()),
+            (b"CLASS", h5py.h5t.STRING, ()),
+        ):
+            if h5py.h5a.exists(one, attribute):
+                held = h5py.h5a.open(one, attribute)
+                if held.get_type().get_class() != kind or held.shape != shape:
+                    found.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
+
+    path = Path(path)
+    path = path / "dataset.nc" if path.is_dir() else path
+    try:
+        with guarded(path), h5py.File(path) as file:
+            h5py.h5o.visit(file.id, look)
+    except OSError:
+        return
+    if found:
+        raise ValueError(
+            f"{path}: is damaged, or changed by another program ({found[0]} is none of netCDF's); {REMEDY}"
+        )
+
+
+def check_size(path: Path, held: float) -> None:
+    """Refuse a file that says it holds more than any compression would let it: it is damaged.
+
+    Parameters
+    ----------
+    path : Path
+    held : float
+        Bytes of all arrays together, as it says.
+
+    Raises
+    ------
+    ValueError
+    """
+    size = path.stat().st_size
+    if held > DEFLATED * size:
+        said = f"it says that it holds {held / 1e9:.3g} GB in {size / 1e6:.3g} MB"
+        raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
+
+
+@contextmanager
+def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Context in which a dataset that is not as springtune writes it is refused, whatever is tripped over.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its file.
+
+    Raises
+    ------
+    ValueError
+        In place of errors that tell of code, not of the file; those for people pass as they are.
+
+    Examples
+    --------
+    >>> with guarded("dataset.nc"):
+    ...     {}["status"]
+    Traceback (most recent call last):
+    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); run the study again
+    """
+    try:
+        yield
+    except (AttributeError, ArithmeticError, LookupError, MemoryError, RuntimeError, TypeError) as error:
+        raise ValueError(
+            f"{path}: is damaged, or not as springtune writes it ({_said(error)}); run the study again"
+        ) from error
+
+
+def _said(error: Exception) -> str:
+    text = f"{type(error).__name__}: {error}" if not isinstance(error, OSError | ValueError) else str(error)
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST_REASON else f"{text[: LONGEST_REASON - 3]}..."
 
 
 def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
@@ -103,12 +218,19 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
 
     >>> network.to_netcdf("network.nc")
     """
+    if not hasattr(data, "children"):
+        raise ValueError(f"data: {type(data).__name__} is no dataset; give what springtune.open returns")
+    if "fields" not in data.children:
+        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
+    with guarded("the group '/fields'"):
+        return _field(data, labels)
+
+
+def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Dataset":
     import numpy as np
 
     from .selection import choose, group
 
-    if "fields" not in data.children:
-        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
     fields = group(data, "fields")
     if SPRING_NODES not in fields:
         raise ValueError(

@@ -20,7 +20,7 @@ class Beam:
     Raises
     ------
     ValueError
-        If a length is not above zero, or a text no length.
+        If a length is not above zero, a text no length, or the name no text.
 
     Examples
     --------
@@ -43,6 +43,8 @@ class Beam:
     def __post_init__(self) -> None:
         for side in ("length", "height", "thickness"):
             object.__setattr__(self, side, positive(getattr(self, side), "length", side))
+        if not isinstance(self.name, str):
+            raise ValueError(f"name: {self.name!r} is not a text; give one such as '200x40', or none")
         if not self.name:
             object.__setattr__(self, "name", f"{1e3 * self.length:g}x{1e3 * self.height:g}")
 

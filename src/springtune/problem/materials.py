@@ -25,7 +25,7 @@ class Material:
     Raises
     ------
     ValueError
-        If a quantity is not above zero or of another kind, or Poisson's ratio out of its range.
+        If a quantity is not above zero or of another kind, the name no text, or Poisson's ratio out of its range.
 
     Examples
     --------
@@ -50,6 +50,8 @@ class Material:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ValueError(f"name: {self.name!r} is not a text; give one such as 'steel', or none")
         set_ = object.__setattr__  # of a frozen class
         set_(self, "young_modulus", positive(self.young_modulus, "stress", "Young's modulus"))
         if self.density is not None:

@@ -39,8 +39,8 @@ def quantity(value: float | str, kind: str, name: str) -> float:
         except UnitError as error:
             raise ValueError(f"{name}: {error}") from None
     try:
-        number = float(value)
-    except (TypeError, ValueError):
+        number = math.nan if isinstance(value, bool | bytes | bytearray) else float(value)
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
         raise ValueError(f"{name}: {value!r} is not a finite number; {_remedy(kind)}")
@@ -62,12 +62,35 @@ def positive(value: float | str, kind: str, name: str) -> float:
     Raises
     ------
     ValueError
-        As `quantity`, and if it is not above zero.
+        As `quantity`, and if it is not above zero or beyond all measure.
     """
     number = quantity(value, kind, name)
     if not number > 0:
         raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")
+    if beyond(number, kind):
+        raise ValueError(f"{name}: {value!r} is beyond all measure; {_remedy(kind)}")
     return number
+
+
+LEAST, MOST = 1e-40, 1e40
+"""Quantities between which products of several stay numbers [SI units]; forces are what they are."""
+
+
+def beyond(number: float, kind: str) -> bool:
+    """Whether a quantity is so small or large that nothing can be computed with it.
+
+    Parameters
+    ----------
+    number : float
+        In SI units.
+    kind : str
+        Key of `springtune.units.QUANTITY_KINDS`.
+
+    Returns
+    -------
+    bool
+    """
+    return kind != "force" and not LEAST <= number <= MOST
 
 
 def _remedy(kind: str) -> str:

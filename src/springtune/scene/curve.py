@@ -24,6 +24,10 @@ RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 """Stiffnesses of a curve over E t [1], where none are given."""
 
 
+LEAST_RATIO = 1e-9
+"""Ratio above which stiffnesses have to be, and below one over which [1]."""
+
+
 def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
     """Equilibrium path of springs of one stiffness, as far as loads need it.
 
@@ -197,13 +201,18 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     >>> print(f"{curve.best_stiffness:.3g} N/m, closed form {curve.predicted_stiffness:.3g} N/m")
     1.6e+08 N/m, closed form 1.59e+08 N/m
     """
+    if not hasattr(scene, "follower"):
+        raise ValueError(f"scene: {scene!r} is not a Scene; give one such as springtune.Scene(beam, mesh, ...)")
     if scene.follower:
         raise ValueError(
             f"load: {scene.load!r} turns with its side, and stiffness enters as force over stiffness only where forces "
             "keep their direction; take 'pressure' or linear kinematics"
         )
-    ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
-    if not len(ratios) or not (np.isfinite(ratios) & (ratios > 0)).all():
+    try:
+        ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
+    except (TypeError, ValueError, OverflowError):
+        ratios = np.zeros(0)
+    if not len(ratios) or not ((ratios > LEAST_RATIO) & (ratios < 1 / LEAST_RATIO)).all():
         raise ValueError("stiffness_ratios: not all above zero; give stiffnesses over E t such as [0.5, 0.8, 1.1]")
     beam, kind, force = scene.beam, scene.kind, scene.force
     stiffness = ratios * scene.material.young_modulus * beam.thickness

@@ -2,10 +2,69 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
+from ..mesh.box import box_fault
 from ..problem.geometry import Beam
 from ..problem.quantities import positive
 from .sheet import chosen
+
+FILLED = 1e-6
+"""What a mesh may miss of its beam, over the beam's extent."""
+
+
+def is_a(value: object, wanted: type, name: str, example: str) -> None:
+    """Refuse an argument of another type.
+
+    Parameters
+    ----------
+    value : object
+    wanted : type
+    name : str
+        Of the argument.
+    example : str
+        How one is made.
+
+    Raises
+    ------
+    ValueError
+    """
+    if not isinstance(value, wanted):
+        raise ValueError(f"{name}: {value!r} is not a {wanted.__name__}; give one such as {example}")
+
+
+A_BEAM, A_MESH, A_MATERIAL = (
+    "springtune.Beam('200 mm', '40 mm')",
+    "springtune.make_mesh(beam, 'structured', '5 mm')",
+    "springtune.Material('210 GPa', 0.3)",
+)
+"""How arguments are made, for messages."""
+
+
+def check_filled(mesh: Mesh, beam: Beam) -> None:
+    """Refuse a mesh that does not fill its beam exactly once, as its reference does.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    beam : Beam
+
+    Raises
+    ------
+    ValueError
+    """
+    low, high, box = mesh.points.min(axis=0), mesh.points.max(axis=0), np.array([beam.length, beam.height])
+    remedy = "make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
+    if np.abs(np.concatenate([low, high - box])).max() > FILLED * box.max():
+        shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
+        raise ValueError(
+            f"mesh: extends over {shown} mm, its beam over {1e3 * beam.length:.6g} x {1e3 * beam.height:.6g} mm "
+            f"from the origin; {remedy}"
+        )
+    wrong = box_fault(mesh)
+    if wrong:
+        raise ValueError(f"mesh: does not fill its beam: {wrong}; or {remedy}")
 
 
 def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
@@ -35,6 +94,7 @@ def make_mesh(beam: Beam, mesh_type: str, size: float | str) -> Mesh:
     >>> len(mesh.points), len(mesh.edges)
     (415, 1143)
     """
+    is_a(beam, Beam, "beam", A_BEAM)
     make, edge = chosen(MESH_TYPES, mesh_type, "mesh type"), positive(size, "length", "mesh size")
     refusal = make.refusal(beam.length, beam.height, edge, f"beam {beam.name!r}")
     if refusal:
@@ -72,4 +132,5 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     >>> print(f"{1e6 * mesh.area:.0f} mm2")
     2000 mm2
     """
+    is_a(beam, Beam, "beam", A_BEAM)
     return read_beam_mesh(path, beam.length, beam.height, positive(unit, "length", "unit"))

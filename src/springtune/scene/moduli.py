@@ -6,6 +6,7 @@ from ..mechanics.moduli import PatchTest
 from ..mesh import Mesh
 from ..problem.materials import Material
 from ..springs import DefinitionError, Springs
+from .meshes import A_MATERIAL, A_MESH, is_a
 from .sheet import AnyDefinition, Sheet, definition_of, named
 
 
@@ -97,6 +98,8 @@ def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
         If the definition cannot live on the mesh or with the material, or is told a stiffness.
     SingularError
         If the network is singular or unstable at rest.
+    MeshError
+        If the mesh is no full strip, see `springtune.mechanics.moduli.strip_fault`.
 
     Notes
     -----
@@ -113,6 +116,8 @@ def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
     >>> f"{abs(found.young_modulus_error):.6f} {found.poisson_ratio:.4f} {abs(found.shear_modulus_error):.6f}"
     '0.000000 0.3333 0.000000'
     """
+    is_a(mesh, Mesh, "mesh", A_MESH)
+    is_a(material, Material, "material", A_MATERIAL)
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(

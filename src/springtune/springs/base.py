@@ -9,6 +9,7 @@ import numpy as np
 
 from ..mesh import Mesh
 from ..problem.materials import Material
+from ..problem.quantities import LEAST, MOST
 from ..registry import Declared, Registry
 
 
@@ -46,6 +47,11 @@ class Springs:
     linear_springs : ndarray of float, shape (n_edges,), or None
         Stiffness over the reference stiffness at rest of springs whose law is part of an energy [1].
 
+    Raises
+    ------
+    DefinitionError
+        If the reference stiffness is not above zero, or a stiffness is no finite number.
+
     Examples
     --------
     >>> import numpy as np
@@ -63,6 +69,14 @@ class Springs:
     lateral: float = 0.0
     evaluations: int = 0
     linear_springs: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        number = isinstance(self.reference, int | float | np.number) and not isinstance(self.reference, bool)
+        if not (number and 0 < self.reference < math.inf):
+            raise DefinitionError(f"reference stiffness {self.reference!r} is not a number above zero; give one in N/m")
+        relative = self.relative
+        if not (isinstance(relative, np.ndarray) and relative.ndim == 1 and np.isfinite(relative).all()):
+            raise DefinitionError(f"relative stiffnesses {relative!r} are not finite; give an array, one for each edge")
 
     @property
     def spring_ratio(self) -> float:
@@ -138,9 +152,25 @@ class Definition(Declared):
         >>> print(f"{found.reference:.4g} N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = {3 ** 0.5 / 2 * 210e9 * 1e-3:.4g}")
         1.819e+08 N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = 1.819e+08
         """
+        for one, kind, name in ((mesh, Mesh, "mesh"), (material, Material, "material")):
+            if not isinstance(one, kind):
+                raise DefinitionError(f"{name}: {one!r} is not a {kind.__name__}; give a springtune.{kind.__name__}")
+        told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
+        for name, value in told:
+            if isinstance(value, bool) or not (isinstance(value, int | float | np.number) and LEAST <= value <= MOST):
+                raise DefinitionError(f"{name}: {value!r} is not a number above zero; give one in SI units")
+        if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
+            raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
         arguments = (given,) if self.needs else ()
-        return self.function(mesh, material, thickness, *arguments)
+        found = self.function(mesh, material, thickness, *arguments)
+        if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):
+            what = f"{len(found.relative)} springs" if isinstance(found, Springs) else type(found).__name__
+            raise DefinitionError(f"returns {what}; return springtune.Springs, one for each of {len(mesh.edges)} edges")
+        return found
 
+
+NEEDS = ("", "stiffness", "cases")
+"""What a definition may be told besides mesh, material and thickness."""
 
 Function = TypeVar("Function", bound=Callable[..., Springs])
 
@@ -194,6 +224,10 @@ def definition(
     """
 
     def declare(function: Function) -> Function:
+        if not isinstance(cells, tuple | list | set) or not set(cells) <= {3, 4} or not cells:
+            raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
+        if needs not in NEEDS:
+            raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
         DEFINITIONS.declare(Definition(name, function, order, uniform, tuple(cells), uniaxial, needs))
         return function
 

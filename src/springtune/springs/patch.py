@@ -8,10 +8,10 @@ Derived here.
 
 from dataclasses import replace
 
-from ..mesh import Mesh
+from ..mesh import Mesh, MeshError
 from ..problem.materials import Material
 from . import area, lattice
-from .base import Springs, definition
+from .base import DefinitionError, Springs, definition
 
 
 @definition("patch", order=190)
@@ -36,6 +36,9 @@ def _scaled(found: Springs, mesh: Mesh, material: Material, thickness: float) ->
     from ..mechanics.moduli import axial_moduli  # here: see `springtune.springs`
 
     # The modulus in units of the reference stiffness: the scalar is a ratio of the two.
-    stiffness, _ = axial_moduli(mesh, found)
+    try:
+        stiffness, _ = axial_moduli(mesh, found)
+    except MeshError as error:
+        raise DefinitionError(f"{error}; or take 'lattice' or 'area', which need none") from None
     scalar = material.young_modulus * thickness / (stiffness * found.reference)
     return replace(found, reference=scalar * found.reference, evaluations=1)

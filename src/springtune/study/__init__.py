@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..registry import NAME, NAME_RULE
 from .checks import check_counts, check_definitions, check_meshes, check_names
 from .config import StudyConfig, expected_value, json_schema, sections, study_model
 from .expand import Declared, build, expand, files_of_meshes
-from .fields import NAME, NAME_RULE
 from .messages import Key, Problems, StudyError, show
 from .model import CurveSpec, MeshSpec, Reference, SceneSpec, Study, StudyKind
 from .yaml_lines import read_study

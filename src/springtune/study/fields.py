@@ -11,7 +11,8 @@ from pydantic_core import CoreSchema, core_schema
 from .. import units
 from ..mesh import MESH_TYPES
 from ..problem.loads import KINEMATICS, LOADS
-from ..problem.quantities import nearest
+from ..problem.quantities import beyond, nearest
+from ..registry import NAME, NAME_RULE
 from ..springs import DEFINITIONS
 from .messages import refuse, show
 from .model import FURTHER_REFERENCES
@@ -67,6 +68,8 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
             raise refuse(str(error)) from None
         if not number > 0:
             raise refuse(f"{show(value)} is not above zero; {negative}, such as '{example}'")
+        if beyond(number, kind):
+            raise refuse(f"{show(value)} is beyond all measure; give a {kind} such as '{example}'")
         return number
 
     schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
@@ -118,15 +121,6 @@ def _read_flag(value: str) -> bool:
         raise refuse(f"{show(value)} is neither true nor false; give one of them")
     return value.lower() == "true"
 
-
-LONGEST_NAME = 60
-"""Most characters of a name: the name of a file has at most 255, and may hold three names."""
-
-NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{LONGEST_NAME - 1}}}")
-NAME_RULE = (
-    f"use letters, digits, '.', '_' and '-', at most {LONGEST_NAME} of them, and no '.' in front: names become "
-    "parts of file names"
-)
 
 Length = Annotated[float, quantity("length")]
 Force = Annotated[float, quantity("force", "the load's name carries the sign: give a magnitude")]

@@ -42,7 +42,7 @@ def run(tasks, spent):
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path, spent.limits)
-        scenes = {_stored_key(scene, calibration): scene for scene in family["scenes"]}
+        scenes = {stored_key(scene, calibration): scene for scene in family["scenes"]}
         kept = {name: fields_key(name) for name in scenes} if family["keep_fields"] else {}
         missing = {name: scene for name, scene in scenes.items() if not {name, kept.get(name, name)} <= present}
         if not missing:
@@ -90,7 +90,7 @@ def lose(tasks, name, why, limits):
     """
     calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
-        if any(_stored_key(scene, calibration) == name for scene in family["scenes"]):
+        if any(stored_key(scene, calibration) == name for scene in family["scenes"]):
             path = Path(tasks["folder"]) / f"{family['name']}.h5"
             holes = {fields_key(name): {"limits": limits}} if family["keep_fields"] else {}
             if name not in store.stored(path, limits):  # else its fields alone are beyond them
@@ -102,7 +102,7 @@ def _hole(message, **limits):
     return limits | {"status": Status.FAILED, "message": message, "seconds": 0.0}
 
 
-def _stored_key(scene, calibration):
+def stored_key(scene, calibration):
     """Key of a scene's result; as `springtune.kinds.scenes.plan.solved_key`, from the task."""
     group = scene.get("calibration")
     return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]

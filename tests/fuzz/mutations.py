@@ -1,0 +1,135 @@
+"""Ways to spoil bytes and trees."""
+
+import copy
+
+WORDS = (
+    "nan",
+    "inf",
+    "-inf",
+    "-1",
+    "0",
+    "1e400",
+    "1e-400",
+    "1e9",
+    "9" * 30,
+    "",
+    " ",
+    "~",
+    "null",
+    "true",
+    "no",
+    "é",
+    "\u202e",
+    "x" * 300,
+    "*",
+    "&a",
+    "!!set",
+    "{{",
+    "[",
+    "|",
+    "\t",
+    "../../etc",
+    "/dev/null",
+    "1e-9 mm",
+    "1e9 mm",
+    "5 mm",
+    "5 m m",
+    "5 mm^9^9",
+    "200 GPa",
+    "1 kN",
+    "0x10",
+    "1_000",
+    "2001-99-99",
+    "<<",
+    "=",
+    "%",
+    "@",
+    "structured",
+    "free",
+    "traction",
+)
+"""Values that are seldom meant."""
+
+
+def spoil_bytes(random, content, words=()):
+    """Bytes with some of them changed, cut, doubled, swapped, or words put among them."""
+    content = bytearray(content)
+    for _ in range(random.choice((1, 1, 1, 2, 3, 8))):
+        at = random.randrange(len(content) + 1)
+        length = min(len(content) - at, random.choice((1, 1, 2, 4, 16, 64, 300)))
+        kind = random.randrange(8)
+        if kind == 0 and at < len(content):
+            content[at] ^= 1 << random.randrange(8)
+        elif kind == 1:
+            content[at : at + length] = random.randbytes(length)
+        elif kind == 2:
+            del content[at : at + length]
+        elif kind == 3:
+            del content[at:]
+        elif kind == 4:
+            content[at:at] = content[at : at + length] * random.choice((1, 1, 2, 40))
+        elif kind == 5 and len(content) > length:
+            other = random.randrange(len(content) - length)
+            content[at : at + length] = content[other : other + length]
+        elif kind == 6 and words:
+            content[at : at + random.choice((0, length))] = random.choice(words).encode()
+        elif kind == 7:
+            content[at : at + length] = bytes(length)
+        if not content:
+            break
+    return bytes(content)
+
+
+def places(tree, path=()):
+    """Paths to all that a tree holds."""
+    found = [path]
+    items = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
+    for key, value in items:
+        found += places(value, (*path, key))
+    return found
+
+
+def spoil_tree(random, tree):
+    """Tree of dicts, lists and texts with some of what it holds taken out, doubled, swapped or replaced."""
+    tree = copy.deepcopy(tree)
+    for _ in range(random.choice((1, 1, 2, 2, 4))):
+        known = places(tree)
+        path = random.choice(known)
+        if not path:
+            continue
+        holder = tree
+        for key in path[:-1]:
+            holder = holder[key]
+        key, kind = path[-1], random.randrange(10)
+        value = holder[key]
+        if kind == 0:
+            del holder[key]
+        elif kind == 1:
+            holder[key] = random.choice(WORDS)
+        elif kind == 2:
+            holder[key] = [value] * random.choice((0, 1, 2, 30))
+        elif kind == 3:
+            holder[key] = {random.choice(WORDS): value}
+        elif kind == 4 and isinstance(holder, dict):
+            holder[random.choice(WORDS)] = value
+        elif kind == 5:
+            other = tree
+            for step in random.choice(known):
+                try:
+                    other = other[step]
+                except (KeyError, IndexError, TypeError):
+                    break
+            holder[key] = copy.deepcopy(other)
+        elif kind == 6:
+            holder[key] = [f"{1 + number / 1000:g} mm" for number in range(random.choice((3, 300, 3000, 30000)))]
+        elif kind == 7 and isinstance(value, str):
+            holder[key] = value.replace(random.choice("0123456789 "), random.choice(WORDS))
+        elif kind == 8:
+            for _ in range(random.choice((5, 40, 200))):
+                value = [value]
+            holder[key] = value
+        else:
+            holder[key] = None
+        if len(places(tree)) > 40_000:
+            break
+    return tree

@@ -1,0 +1,17 @@
+"""The short form of `make test-fuzz`: some inputs of each target."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+INPUTS = 150
+
+
+def test_no_input_ends_in_a_traceback_or_in_a_wrong_number():
+    command = [sys.executable, str(Path(__file__).parent), str(INPUTS), "7"]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "; 0 faults" in done.stdout
+    counted = int(done.stdout.splitlines()[-1].split(" inputs")[0])
+    assert counted >= INPUTS
