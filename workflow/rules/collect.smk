@@ -15,7 +15,7 @@ rule collect:
         done=JOBS["collect"].record,
     params:
         config=str(CONFIG),
-        folder=str(RESULTS),
+        folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
     log:
         RESULTS / "logs/collect.log",

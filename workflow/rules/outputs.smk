@@ -18,7 +18,7 @@ for job, made in MADE.items():
             *REPORTED[job],
             done=JOBS[job].record,
         params:
-            folder=str(RESULTS),
+            folder=lambda wildcards, output: str(Path(output.done).parents[1]),
             digest=JOBS[job].digest,
             outputs=[one.name for one in made],
         log:

@@ -46,7 +46,7 @@ rule paper:
         done="results/paper/done/paper.json",
     params:
         source=str(PAPER_SOURCE),
-        folder="results/paper/paper",
+        folder=lambda wildcards, output: str(Path(output.paper).with_suffix("")),
         digest=PAPER.digest if PAPER_WANTED else "none",
     log:
         "results/paper/logs/paper.log",

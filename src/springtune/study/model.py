@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -37,6 +38,14 @@ class MeshSpec:
     mesh_size: float
     file: Path | None = None
     unit: float = 1.0
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.beam, self.mesh_type, self.mesh_size, self.file, self.unit))
+
+    def __hash__(self) -> int:
+        # Plans look meshes up a hundred thousand times.
+        return self._hash
 
     @property
     def name(self) -> str:

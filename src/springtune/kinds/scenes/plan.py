@@ -4,6 +4,7 @@ import hashlib
 from collections import defaultdict
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any
 
 from ...jobs.hashing import hash_of
 from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
@@ -19,11 +20,20 @@ def particles(mesh):
     return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
 
 
+_grouped: dict[int, tuple[Any, Any]] = {}
+
+
 def by_mesh(items):
-    """Scenes or curves by their mesh."""
-    groups = defaultdict(list)
-    for item in items:
-        groups[item.mesh].append(item)
+    """Scenes or curves of a study by their mesh."""
+    # Every bundle asks: the tuple of a study is known by its place, since comparing 10,000 scenes is no way to find it.
+    if len(_grouped) > 8:
+        _grouped.clear()
+    known, groups = _grouped.get(id(items), (None, None))
+    if known is not items:
+        groups = defaultdict(list)
+        for item in items:
+            groups[item.mesh].append(item)
+        _grouped[id(items)] = items, groups
     return groups
 
 
@@ -254,12 +264,12 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
-    scenes = by_mesh(study.scenes)
+    scenes, shown = by_mesh(study.scenes), shown_meshes(study)
     families = [
         {
             "name": stem(mesh),
             "thickness": mesh.beam.thickness,
-            "keep_fields": mesh in shown_meshes(study),
+            "keep_fields": mesh in shown,
             "scenes": [_scene(study, scene) for scene in scenes[mesh]],
         }
         for meshes in members
