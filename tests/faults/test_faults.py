@@ -5,10 +5,12 @@ one: the same bits apart from times, and no file besides.
 """
 
 import os
+import re
 import resource
 import shutil
 import signal
 from functools import partial
+from pathlib import Path
 
 import driven
 import pytest
@@ -101,6 +103,8 @@ def test_some_operations_fail_once(whole, counted, tmp_path):
     assert whole.steps == STEPS
     every = [(step, number) for step in STEPS for number in range(1, len(counted(step)) + 1)]
     print(f"{len(every)} operations in {len(STEPS)} steps: {' '.join(f'{s} {len(counted(s))}' for s in STEPS)}")
+    told = re.search(r"some\s(\d+) openings", (Path(__file__).parents[2] / "docs/robustness.md").read_text())
+    assert abs(len(every) - int(told[1])) <= 20, f"docs/robustness.md tells of {told[1]} operations: {len(every)}"
     names = {name for step in STEPS for name, _ in counted(step)}
     assert names >= {"open", "write", "fsync", "replace", "mkdir", "library"}, names
     complaints = []
