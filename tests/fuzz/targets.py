@@ -297,6 +297,7 @@ def read_dataset(made):
         if how == 0:
             page(path)
             return "accepted"
+        reading.check_opens(path)
         with reading.open(path) as tree, reading.guarded(path):
             if how == 1:
                 info_text(tree, path)
