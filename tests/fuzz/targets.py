@@ -294,10 +294,10 @@ def read_dataset(made):
     """Open a dataset and say what it holds, export it, or make its page."""
     path, how = made
     try:
+        reading.check_opens(path)
         if how == 0:
             page(path)
             return "accepted"
-        reading.check_opens(path)
         with reading.open(path) as tree, reading.guarded(path):
             if how == 1:
                 info_text(tree, path)
