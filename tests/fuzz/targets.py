@@ -294,6 +294,7 @@ def read_dataset(made):
     """Open a dataset and say what it holds, export it, or make its page."""
     path, how = made
     try:
+        reading.check_opens(path)
         if how == 0:
             page(path)
             return "accepted"

@@ -22,8 +22,10 @@ def browse(dataset: Path, port: int, no_open: bool) -> None:
     DATASET is results/<study>/dataset.nc, or its folder. The address holds a token, anew each time.
     """
     from ..browse.server import Server  # here, so that --help does not wait for it
+    from ..output.reading import check_opens
 
     try:
+        check_opens(dataset)
         server = Server(dataset, port)
     except (OSError, ValueError) as error:
         raise click.ClickException(str(error)) from None

@@ -33,6 +33,7 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
 
     names = [name.strip() for name in variables.split(",") if name.strip()]
     try:
+        reading.check_opens(path)
         with reading.open(path) as tree, reading.guarded(path):
             click.echo(write(tree, target, group, names, selected(pairs), force))
     except (OSError, ValueError) as error:

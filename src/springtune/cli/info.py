@@ -30,6 +30,7 @@ def info(path: Path) -> None:
     from ..output import reading
 
     try:
+        reading.check_opens(path)
         with reading.open(path) as tree, reading.guarded(path):
             click.echo(info_text(tree, path / "dataset.nc" if path.is_dir() else path))
     except (OSError, ValueError) as error:

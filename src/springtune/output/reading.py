@@ -1,6 +1,8 @@
 """Opening the dataset of a study."""
 
 import os
+import signal
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +24,9 @@ REMEDY = "give the dataset.nc of a study, or run the study again"
 
 DEFLATED = 1100.0
 """Bytes that one byte of a file can stand for, at most: deflate gets to 1032 [1]."""
+
+OPENED_WITHIN = 4
+"""Seconds of the processor after which a file that is not open yet is taken to be damaged."""
 
 LONGEST_REASON = 200
 """Most characters of an error that are shown."""
@@ -79,6 +84,42 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         tree.close()
         raise
     return tree
+
+
+def check_opens(path: str | os.PathLike[str]) -> None:
+    """Refuse a file on which the library of netCDF ends a process or never comes to an end: a child opens it first.
+
+    Commands can afford to know that; `open` cannot, in a process with threads and data of its user. Nothing is checked
+    where processes cannot be forked.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    ValueError
+    """
+    if not hasattr(os, "fork"):
+        return
+    import resource
+
+    import xarray  # noqa: F401  # once, not in the child and again here
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of numpy's threads, which a child that opens a file does not need
+        child = os.fork()
+    if not child:
+        try:
+            used = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime)
+            resource.setrlimit(resource.RLIMIT_CPU, (used + OPENED_WITHIN, used + OPENED_WITHIN))
+            open(path)
+        finally:
+            os._exit(0)
+    status = os.waitpid(child, 0)[1]
+    if os.WIFSIGNALED(status):
+        name = signal.Signals(os.WTERMSIG(status)).name
+        raise ValueError(f"{path}: is damaged (the library of netCDF ends by {name} on it); {REMEDY}")
 
 
 def check_links(path: Path) -> None:
