@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -24,7 +24,7 @@ paper: $(VENV)/.run
 
 # Files in this order, those that take longest first: at the end no core waits for the other.
 test: $(VENV)/.test
-	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/physics tests/faults tests/unit src
+	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
@@ -45,8 +45,12 @@ test-fuzz: $(VENV)/.test
 test-versions: $(VENV)/.test
 	pytest -rs tests/versions
 
+# A table of changes: which jobs run then, what they compute, and that the dataset is that of a fresh run.
+test-reruns: $(VENV)/.test
+	pytest -n 2 tests/reruns
+
 slow: $(VENV)/.test
-	pytest -n 2 -m slow
+	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 lint: $(VENV)/.test

@@ -18,6 +18,7 @@ from springtune.jobs import records, run_tasks, sealed
 from springtune.jobs.dependencies import CODE_FILE, OURS
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
+from springtune.kinds.scenes import plan as scenes
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 
@@ -39,6 +40,8 @@ class Run:
     """The study of this folder, as it is to be run now."""
 
     def __init__(self, cores=1):
+        for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
+            cache.cache_clear()
         self.study = load_study(CONFIG)
         self.plan = plan(self.study, FOLDER, cores)
         self.jobs = due.jobs(self.study, self.plan)

@@ -224,7 +224,8 @@ STUDY = {
     "density changed": Row(text(("7850", "7800")), f"stability {AFTER}", {"contrast": 1}),
     "force changed": Row(text(*FORCES), CURVES, SCENES | {"curve": 16}),
     "stated stiffness changed": Row(text(("170e6", "171e6")), f"solve {AFTER}", {"linear": 8, "nonlinear": 8}),
-    "ratios of curves changed": Row(text(("points: 9", "points: 11")), CURVES, {"curve": 16}),
+    # On a bent curve the best stiffness is met from other points: it is another one in its last digits.
+    "ratios of curves changed": Row(text(("points: 9", "points: 11")), CURVES, {"curve": 16, "nonlinear": 8}),
     "calibrating beam changed": Row(
         text(("calibrated: {beam: a,", "calibrated: {beam: b,")),
         f"calibrate solve {AFTER}",
@@ -250,21 +251,21 @@ STUDY = {
 }
 
 FILES = {
-    "mesh": ("meshes/20x10_structured_5mm.vtu", "mesh", {"mesh": 1}),
-    "mesh notes": ("meshes/20x10_structured_5mm.json", "mesh", {"mesh": 1}),
-    "curve": ("curves/20x10_structured_5mm.h5", "sensitivity", {"curve": 4}),
-    "solution": ("solutions/20x10_structured_5mm.h5", "solve", {"linear": 6, "nonlinear": 6}),
-    "reference": ("references/*.h5", "reference", {"reference": 1}),
-    "moduli": ("moduli/structured_5mm.h5", "moduli", {"moduli": 1}),
-    "laying": ("laying/*.h5", "laying", {"laying": 1}),
-    "stability": ("stability/*.h5", "stability", {"contrast": 1}),
-    "record": ("done/solve_0.json", "solve", {}),
+    "mesh": ("meshes/20x10_structured_5mm.vtu", f"mesh {CURVES}", {"mesh": 1}),
+    "mesh notes": ("meshes/20x10_structured_5mm.json", f"mesh {CURVES}", {"mesh": 1}),
+    "curve": ("curves/20x10_structured_5mm.h5", CURVES, {"curve": 4}),
+    "solution": ("solutions/20x10_structured_5mm.h5", f"solve {AFTER}", {"linear": 6, "nonlinear": 6}),
+    "reference": ("references/*.h5", f"reference {CURVES}", {"reference": 1}),
+    "moduli": ("moduli/structured_5mm.h5", f"moduli {AFTER}", {"moduli": 1}),
+    "laying": ("laying/*.h5", f"laying {AFTER}", {"laying": 1}),
+    "stability": ("stability/*.h5", f"stability {AFTER}", {"contrast": 1}),
+    "record": ("done/solve_0.json", f"solve {AFTER}", {}),
     "dataset": ("dataset.nc", AFTER, {}),
     "summary": ("summary.txt", AFTER, {}),
     "figure": ("figures/*.png", "present_scenes", {}),
     "page": ("index.html", "browse", {}),
 }
-"""Files by what they hold, the job that makes them, and what it computes to make one again."""
+"""Files by what they hold, the jobs that run to make one again, and what they compute."""
 
 STORED = (
     {
