@@ -128,7 +128,7 @@ def _told(folder: Path, note: dict[str, Any], where: str) -> str:
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(note["start"]))
     remedy = f"wait for its end, or stop it: kill {note['pid']}"
     if note["host"] != platform.node():
-        remedy = f"wait for its end; if it is gone: snakemake --unlock, and remove {RUNS}"
+        remedy = f"wait for its end; if it is gone: rm -r {LOCKS}"
     return f"{folder}: process {note['pid']} {where} computes it since {since} ({note['command']}); {remedy}"
 
 
