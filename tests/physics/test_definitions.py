@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.jobs import atomic, store
+from springtune.jobs import store
+from springtune.jobs.spent import Spent
 from springtune.kinds.moduli import stage as moduli
 from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
 from springtune.mechanics.network import Network
@@ -301,8 +302,7 @@ def test_stage_measures_the_mesh_that_is_made(tmp_path, mesh_type):
     box = {"length": 0.1, "height": HEIGHT}
     asked = [{"key": "one", "definition": "lattice", "poisson_ratio": 0.3}]
     task = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "measurements": asked}
-    atomic.write_json(tmp_path / "tasks.json", {"folder": str(tmp_path), "patches": [task]})
-    moduli.run(tmp_path / "tasks.json", tmp_path / "done.json")
+    moduli.run({"folder": str(tmp_path), "patches": [task]}, Spent())
     found = store.read(tmp_path / "one.h5", ["one"])["one"]
     young, ratio, shear = errors("lattice", MESH_TYPES[mesh_type](**box, size=SIZE), 0.3)
     measured = found["young_modulus_error"], found["effective_poisson_ratio"], found["shear_modulus_error"]

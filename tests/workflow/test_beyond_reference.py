@@ -97,7 +97,7 @@ def test_nothing_is_calibrated_beyond_the_linear_reference(tree):
     cell = root.sel(place | {"definition": "calibrated"})
     assert np.isnan(cell.displacement.sel(kinematics="nonlinear")) and cell.status.sel(kinematics="linear") == 1
     message = cell.message.sel(kinematics="nonlinear").item()
-    assert "slender_structured_2mm in bending of 0.0020833 N" in message and "turns by 0.5 rad" in message
+    assert "200x10_structured_2mm in bending of 0.0020833 N" in message and "turns by 0.5 rad" in message
 
 
 def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):

@@ -169,7 +169,7 @@ def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp
     assert not (run.folder / "results/broken/dataset.nc").exists()
     from springtune.jobs import store
 
-    assert len(store.stored(run.folder / "results/broken/solutions/small_structured_5mm.h5")) == 2
+    assert len(store.stored(run.folder / "results/broken/solutions/50x20_structured_5mm.h5")) == 2
 
 
 def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run):
