@@ -3,10 +3,13 @@
 import ast
 from collections import defaultdict
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from importlib.util import resolve_name
 from pathlib import Path
 
 import pytest
+
+from springtune.kinds import kinds
 
 REPOSITORY = Path(__file__).parents[2]
 SOURCE = REPOSITORY / "src/springtune"
@@ -213,3 +216,13 @@ def test_tests_use_what_everybody_may_use(path):
                 (node.lineno, f"{root(target)}.{target.attr} = ...") for target in targets if root(target) in names
             ]
     assert not found, "\n".join(f"{path.relative_to(REPOSITORY)}:{line}: {what}" for line, what in found)
+
+
+@pytest.mark.parametrize("stage", [one for kind in kinds() for one in kind.stages], ids=lambda one: one.name)
+def test_stages_say_what_is_lost_to_limits(stage):
+    """Those that attempt tasks; what has no tasks loses none."""
+    module = import_module(f"springtune.{stage.module}")
+    assert callable(module.run)
+    assert (
+        hasattr(module, "lose") == ("spent.attempt" in Path(module.__file__).read_text()) == (stage.name != "calibrate")
+    )

@@ -84,6 +84,18 @@ def test_what_a_task_may_take_is_on_top_of_what_is_there(tmp_path):
     assert len(kept) == 3 * 10**8
 
 
+def test_a_limit_of_the_whole_job_is_kept(tmp_path):
+    """As clusters set it (ulimit -v): what a task may take on top would be more."""
+    program = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9, 3 * 10**9))\n"
+        "from springtune.jobs.guard import Watch\n"
+        "with Watch({'seconds': 60.0, 'memory': 4e9}).over('key'):\n"
+        "    print(resource.getrlimit(resource.RLIMIT_AS))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "(3000000000, 3000000000)\n", done.stderr
+
+
 def test_a_crash_is_a_hole(tmp_path):
     found = Job(tmp_path, {"a": lambda: 1, "crash": crash, "b": lambda: 2})()
     assert (found["a"], found["b"]) == ("1", "2") and found["crash"].startswith("the program was ended by SIGSEGV")
@@ -127,6 +139,10 @@ guarded(sleep, Watch({"seconds": 60.0, "memory": 4e9}), print)
 """
 
 
+POLLS = 12_000
+"""Looks at a process before something is wrong: minutes, where it takes milliseconds."""
+
+
 def gone(pid):
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
@@ -138,11 +154,16 @@ def gone(pid):
 def test_the_child_goes_with_the_job(tmp_path, number):
     started = tmp_path / "child"
     job = subprocess.Popen([sys.executable, "-c", SLEEPER, started], stderr=subprocess.DEVNULL)
-    while not (started.exists() and started.read_text()):
+    for _ in range(POLLS):
+        if started.exists() and started.read_text():
+            break
         assert job.poll() is None
         time.sleep(0.01)
     child = int(started.read_text())
     job.send_signal(number)
     assert job.wait() != 0
-    while not gone(child):  # the kernel's signal is on its way
+    for _ in range(POLLS):  # the kernel's signal is on its way
+        if gone(child):
+            return
         time.sleep(0.01)
+    pytest.fail("the child lives")

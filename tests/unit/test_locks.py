@@ -1,7 +1,6 @@
 """Locks of runs: whose they are, and whether that process lives."""
 
 import os
-import platform
 import re
 from pathlib import Path
 
@@ -27,7 +26,7 @@ def lock(tmp_path, monkeypatch):
 def note(**changed):
     """A run of this process, or another one."""
     process = psutil.Process()
-    known = {"host": platform.node(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
+    known = {"host": locks.this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
              "folders": [str(STUDY)]}  # fmt: skip
     sealed.write(locks.RUNS / "of_a_test.json", known | changed)
 

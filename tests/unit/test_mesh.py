@@ -1,5 +1,6 @@
 """Meshes: geometry that holds for any size, quality figures, and files."""
 
+import hashlib
 import subprocess
 import sys
 
@@ -251,10 +252,24 @@ class TestSlits:
         points, cells, _ = part(self.MESH, lambda at: at[:, 0] > 0.05, lambda at: self.MESH.points[at, 1] < 0.011)
         path = save(tmp_path / "slit.vtu", points, cells)
         with pytest.raises(MeshError, match="merge duplicate points"):  # a study's mesh file
-            make({"length": 0.1, "height": 0.02, "file": str(path), "unit": 1.0})
+            content = hashlib.sha256(path.read_bytes()).hexdigest()
+            make({"length": 0.1, "height": 0.02, "file": str(path), "unit": 1.0, "content": content})
         asked = ["predict", "--beam", "100x20", "--mesh", str(path), "--material", "steel"]
         result = CliRunner().invoke(main, asked)
         assert result.exit_code == 1 and "merge duplicate points" in result.stderr and result.stdout == ""
+
+    def test_a_file_that_changes_during_a_run_is_not_read(self, tmp_path):
+        """Its mesh would be stored under the key of what it held before."""
+        path = save(tmp_path / "own.vtu", self.MESH.points, {3: self.MESH.triangles})
+        with pytest.raises(SystemExit, match="was changed while the study ran; call the same command again"):
+            make({"length": 0.1, "height": 0.02, "file": str(path), "unit": 1.0, "content": "that of before"})
+
+    @pytest.mark.parametrize("name", ["own.xdmf", "own.inp"])
+    def test_parts_in_other_files_are_refused(self, tmp_path, name):
+        path = tmp_path / name
+        path.write_text("*NODE\n*INCLUDE, INPUT=points.inp\n")
+        with pytest.raises(MeshError, match="in other files, whose changes would not be seen; write it as one"):
+            read_beam_mesh(path, 0.1, 0.02)
 
     def test_parts_of_different_edges(self, tmp_path):
         left, right_ = MESH_TYPES["right"](0.05, 0.02, 5e-3), MESH_TYPES["right"](0.05, 0.02, 4e-3)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from springtune.jobs import records, run_tasks, sealed, store
 from springtune.jobs.damage import ASIDE, DamagedError
+from springtune.jobs.guard import Watch
 from springtune.jobs.spent import Spent
 
 JSON = st.recursive(
@@ -103,6 +104,12 @@ class TestStore:
         assert caught.value.whole
         store.add(path, {"one": self.RESULT})
         assert store.stored(path) == {"one", "other"}
+
+    def test_what_is_computed_is_stored_whatever_comes(self, tmp_path):
+        with pytest.raises(ZeroDivisionError), store.Keeper(tmp_path / "results.h5") as keeper:
+            keeper["one"] = self.RESULT
+            keeper["two"] = {"displacement": 1 / 0}
+        assert store.stored(tmp_path / "results.h5") == {"one"}
 
     def test_files_from_before_there_were_checksums_hold_nothing(self, tmp_path, capsys):
         path = tmp_path / "results.h5"
@@ -210,6 +217,28 @@ class TestRunTasks:
         # What waited for that job has no reason to run again.
         assert done.stat().st_mtime_ns == time
         assert records.fault(done, "digest", [path], wholly=True) == ""
+
+    def test_who_makes_it_again_keeps_limits_and_what_was_lost_to_them(self, study):
+        """One that is lost to the same limits stays lost, however its neighbours are mended."""
+        tasks, done = study / "tasks/reference_0.json", study / "done/reference_0.json"
+        note = sealed.read(tasks)
+        note["content"]["references"].append({"key": "lost", "problem": [5.0, 0.3, "axial"]})
+        note["products"].append(str(study / "references/lost.h5"))
+        sealed.write(tasks, note)
+        store.lose(study / "references", "lost", {"message": "not done", "seconds": 0.0}, Watch(note["limits"]).words)
+        (study / "references/one.h5").unlink()
+        run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
+        assert store.read_one(study / "references", "lost")["message"] == "not done"
+        assert sealed.read(done)["work"]["reference"][0] == 1
+
+    def test_an_edit_of_the_program_during_a_run_ends_its_jobs(self, study, monkeypatch):
+        """Results would be stored under keys of the code of before."""
+        monkeypatch.setenv(run_tasks.STATE, run_tasks.source_state())
+        arguments = str(study / "tasks/reference_0.json"), str(study / "done/reference_0.json"), "digest"
+        run_tasks.main(*arguments)
+        monkeypatch.setenv(run_tasks.STATE, "that of before")
+        with pytest.raises(SystemExit, match="was edited while the study ran; call the same command again"):
+            run_tasks.main(*arguments)
 
     def test_what_no_job_makes_ends_the_reader(self, study):
         with pytest.raises(SystemExit, match="no job makes it"):

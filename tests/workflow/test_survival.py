@@ -1,11 +1,11 @@
 """What a run survives, and what it says: other runs, kills, broken programs, scenes beyond limits."""
 
 import os
-import platform
 import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 
 import springtune
+from springtune.campaign.locks import this_host
 from springtune.jobs import sealed, store
 
 STUDY = """
@@ -79,7 +80,7 @@ def test_the_lock_of_a_process_that_is_gone_is_removed_with_a_word(finished):
 
 def test_a_study_that_another_process_computes_is_left_to_it(finished):
     process = psutil.Process()
-    note = {"host": platform.node(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
+    note = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
             "folders": ["results/survival"]}  # fmt: skip
     path = finished.folder / ".snakemake/springtune/of_a_test.json"
     sealed.write(path, note)
@@ -114,35 +115,63 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     assert not list(run.folder.rglob("*.unfinished"))
 
 
+LINE = "        problem, load = self.problem(kind, springs, follower), force / springs.reference\n"
+"""Of the package, in `springtune.scene.sheet.Sheet.solve`."""
+
+
+def edited(folder, more):
+    """A copy of the package in which solving a scene begins with more than it does."""
+    shutil.copytree(Path(springtune.__file__).parent, folder / "springtune")
+    path = folder / "springtune/scene/sheet.py"
+    assert path.read_text().count(LINE) == 1
+    path.write_text(path.read_text().replace(LINE, f"{LINE}        {more}\n"))
+    return str(folder)
+
+
 def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp_path, monkeypatch):
     """The package in a copy, with an error that scenes in traction run into."""
-    shutil.copytree(Path(springtune.__file__).parent, tmp_path / "springtune")
-    path = tmp_path / "springtune/scene/sheet.py"
-    line = "        problem, load = self.problem(kind, springs, follower), force / springs.reference\n"
-    assert path.read_text().count(line) == 1
-    path.write_text(path.read_text().replace(line, f"{line}        None if force < 0 else None + force\n"))
     run.write("broken.yaml", STUDY)
     with monkeypatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(tmp_path))
+        patch.setenv("PYTHONPATH", edited(tmp_path, "None if force < 0 else None + force"))
         code, output = run.snakemake("broken.yaml")
     assert code == 1 and "Traceback" not in output
-    broken = re.findall(r"\n  the program is broken: (\d) of this job's tasks raised TypeError: unsupported op", output)
+    broken = re.findall(r"\n  (\d) of this job's tasks could not be done: TypeError: unsupported op", output)
     assert sum(map(int, broken)) == 4, output
     assert "Traceback" in (run.folder / "results/broken/logs/solve_0.log").read_text()
     assert not (run.folder / "results/broken/dataset.nc").exists()
     assert len(store.stored(run.folder / "results/broken/solutions/50x20_structured_5mm.h5")) == 2
 
 
-def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run):
-    """A second of the processor is much for one mesh and little for the other, by a factor of a hundred each."""
-    text = STUDY.replace("[10 mm, 5 mm]", "[10 mm, 0.2 mm]").replace("kinematics: linear", "kinematics: nonlinear")
-    text = text.replace("load: [traction, compression]", "load: traction").replace("[lattice, delingette]", "evolved")
+def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run, tmp_path, monkeypatch):
+    """The package in a copy, in which scenes in compression have no end."""
+    text = STUDY.replace("[10 mm, 5 mm]", "10 mm").replace("[lattice, delingette]", "lattice")
+    monkeypatch.setenv("PYTHONPATH", edited(tmp_path, "while force < 0: pass"))
     run.write("limits.yaml", text.replace("grids:", "limits: {seconds: 1, memory: 1 GB}\ngrids:"))
     code, output = run.snakemake("limits.yaml", "--until", "collect")
     assert code == 0, output
-    assert "scenes, failed: 1 of 2\n  small, structured, 0.2 mm, steel, traction, evolved, nonlinear: " in output
+    assert "scenes, failed: 1 of 2\n  small, structured, 10 mm, steel, compression, lattice, linear: not done" in output
     assert "at most 1 s and 1 GB for each (`limits` of the study)" in output
+    assert "solve 2 of 2" in output
     run.write("limits.yaml", text.replace("grids:", "limits: {seconds: 2, memory: 1 GB}\ngrids:"))
     code, output = run.snakemake("limits.yaml", "--until", "collect")
     assert code == 0 and "at most 2 s and 1 GB" in output, output
-    assert "sensitivity 1 of 2, solve 1 of 2; the others were stored before" in output
+    assert "new      solve 1 of 2; the others were stored before" in output
+
+
+def test_a_study_that_is_edited_during_its_run_makes_no_dataset_of_another_one(run):
+    """Its jobs did what was asked for when the run began; the dataset would be of what is asked for now."""
+    run.write("edited.yaml", STUDY)
+    code, output = run.snakemake("edited.yaml", "--until", "solve")
+    assert code == 0, output
+    told = [
+        sys.executable,
+        "-m",
+        "springtune.campaign.collect",
+        "edited.yaml",
+        "results/edited",
+        "dataset.nc",
+        "d.json",
+    ]
+    done = subprocess.run([*told, "of before"], cwd=run.folder, capture_output=True, text=True)
+    assert done.returncode == 1 and "edited.yaml was changed while the study ran; call the same" in done.stderr
+    assert not (run.folder / "dataset.nc").exists()

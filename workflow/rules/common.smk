@@ -13,6 +13,7 @@ from springtune.campaign import due, locks
 from springtune.campaign.plan import plan, stages
 from springtune.jobs.atomic import remove_unfinished
 from springtune.jobs.dependencies import CODE_FILE, OURS
+from springtune.jobs.run_tasks import STATE, source_state
 from springtune.kinds import load_study
 from springtune.kinds.base import FORMATS
 from springtune.study import StudyError
@@ -50,6 +51,9 @@ def loaded_study():
         print(error, file=sys.stderr)
         sys.exit(1)
 
+
+# What a run begins with is what its jobs are to work by.
+os.environ.setdefault(STATE, source_state())
 
 CONFIG = chosen_config()
 STUDY = loaded_study()
@@ -133,6 +137,15 @@ def begin():
     tell_start()
 
 
+LOOKING = {
+    "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--filegraph", "--lc", "--li", "--lint", "--list",
+    "--list-changes", "--list-code-changes", "--list-input-changes", "--list-params-changes", "--list-rules",
+    "--list-target-rules", "--list-targets", "--list-untracked", "--lp", "--lt", "--lu", "--report", "--rulegraph", "--summary",
+    "--unlock", "-D", "-S", "-l",
+}  # fmt: skip
+"""Options of Snakemake by which nothing is computed."""
+
+
 def release():
     """Remove the lock of a run that was killed; who only looks leaves it where it is."""
     state = Path(".snakemake")
@@ -141,6 +154,7 @@ def release():
         print(f"{why}; `springtune info`, `browse` and `verify` do not: call these", file=sys.stderr)
         sys.exit(1)
     looking = any(handler.common_settings.dryrun for handler in HANDLERS if hasattr(handler, "common_settings"))
+    looking |= any(word.partition("=")[0] in LOOKING for word in sys.argv[1:])
     if looking or not workflow.is_main_process:
         return
     try:

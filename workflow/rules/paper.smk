@@ -4,6 +4,7 @@ from springtune.publication import PaperError
 from springtune.publication.build import check_typst
 
 PAPER_SOURCE = Path(workflow.basedir, "workflow/paper")
+PAPER_DATASETS = [Path("results") / name / due.DATASET for name in due.PAPER_STUDIES]
 
 
 # Snakemake tells the targets after the Snakefile was read. Who wants neither the paper nor a job of a study that it reads
@@ -12,7 +13,7 @@ WORDS = sys.argv[1:]
 PAPER_WANTED = any(word == "paper" or Path(word).name == "paper.pdf" for word in WORDS)
 
 if PAPER_WANTED:
-    PAPER = due.paper_job(PAPER_SOURCE, Path("results"), Path("results/paper"))
+    PAPER = due.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
     try:  # now, and not when the studies are done
         check_typst()
     except PaperError as error:
@@ -37,7 +38,7 @@ rule paper:
     message:
         "Setting the paper from the datasets of its studies"
     input:
-        datasets=[Path("results") / name / "dataset.nc" for name in due.PAPER_STUDIES],
+        datasets=PAPER_DATASETS,
         again=looked_at({due.PAPER: PAPER}, due.PAPER) if PAPER_WANTED else [],
     output:
         paper=report(

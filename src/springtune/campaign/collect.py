@@ -11,8 +11,8 @@ from ..jobs import atomic, bundles, records
 from ..jobs.run_tasks import RECORDS, mended
 from ..kinds import kinds, load_study, outputs
 from ..output import dataset
-from . import provenance, summary
-from .plan import COSTS_FILE, usual_costs
+from . import due, provenance, summary
+from .plan import COSTS_FILE, plan, usual_costs
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -59,6 +59,9 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     digest : str
         Of what is asked for.
     """
+    study = load_study(config)
+    if due.jobs(study, plan(study, Path(folder), 1))[due.COLLECT].digest != digest:
+        raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     records.write(record, digest, run(config, folder, output))
 
 

@@ -51,6 +51,8 @@ class Job:
         What it has done.
     reads : str
         Job whose first product it is made from; empty for stages, whose results are known by their keys.
+    inputs : tuple of str
+        Files that it is made from, where several jobs make them.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Job:
     products: tuple[str, ...]
     record: Path
     reads: str = ""
+    inputs: tuple[str, ...] = ()
 
 
 def output_jobs(study: "Study") -> "dict[str, list[Output]]":
@@ -174,25 +177,27 @@ def _browse_digest(study: "Study") -> str:
     return hash_of(linked(study), [stage_key(name) for name in ("campaign.browse", *views)], assets)
 
 
-def paper_job(source: Path, results: Path, folder: Path) -> Job:
+def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
     """The job that sets the paper.
 
     Parameters
     ----------
     source : Path
         Folder of its source.
-    results, folder : Path
-        Where all studies' results are, and where the paper goes.
+    datasets : iterable of Path
+        That it reads; those that are made again in the same run come before it anyway.
+    folder : Path
+        Where the paper goes.
 
     Returns
     -------
     Job
-        It reads more than one dataset, so none is named.
     """
     texts = {path.name: records.checksum(path) for path in sorted(source.iterdir()) if path.is_file()}
     used = ["publication.build", *(one.module for one in outputs().values() if one.module)]
     digest = hash_of(texts, [stage_key(name) for name in dict.fromkeys(used)])
-    return Job(PAPER, digest, (str(folder / PAPER_FILE),), folder / RECORDS / f"{PAPER}.json")
+    record = folder / RECORDS / f"{PAPER}.json"
+    return Job(PAPER, digest, (str(folder / PAPER_FILE),), record, inputs=tuple(map(str, datasets)))
 
 
 def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
@@ -214,7 +219,13 @@ def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
     why = records.fault(job.record, job.digest, job.products, wholly)
     if not why and job.reads and not _is_up_to_date(job, found[job.reads]):
         return f"{found[job.reads].products[0]} is another one"
+    if not why and job.inputs and sealed.read(job.record)["read"] != [_checksum(path) for path in job.inputs]:
+        return "a dataset that it reads is another one"
     return why
+
+
+def _checksum(path: str) -> str:
+    return records.checksum(path) if Path(path).exists() else ""
 
 
 def _is_up_to_date(job: Job, before: Job) -> bool:

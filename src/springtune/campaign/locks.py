@@ -35,13 +35,16 @@ def begin(folders: Iterable[Path]) -> None:
     """
     import psutil
 
-    process = psutil.Process()
+    process, named = psutil.Process(), {str(folder) for folder in folders}
+    for path, other in _notes(Path()):  # of runs that are gone: this one has the lock
+        if named & {*other["folders"]}:
+            path.unlink(missing_ok=True)
     note = {
-        "host": platform.node(),
+        "host": this_host(),
         "pid": process.pid,
         "start": process.create_time(),
         "command": " ".join(sys.argv),
-        "folders": [str(folder) for folder in folders],
+        "folders": sorted(named),
     }
     sealed.write(_note(), note)
 
@@ -49,6 +52,19 @@ def begin(folders: Iterable[Path]) -> None:
 def end() -> None:
     """Note that this process is at its end."""
     _note().unlink(missing_ok=True)
+
+
+def this_host() -> str:
+    """Name of the machine, or the container, in which a process's number says something.
+
+    Returns
+    -------
+    str
+    """
+    try:
+        return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
+    except OSError:
+        return platform.node()
 
 
 def _note() -> Path:
@@ -80,9 +96,9 @@ def is_held(folder: Path) -> bool:
         if Path(folder.parent.name, folder.name) not in map(Path, note["folders"]):
             continue
         noted = True
-        if note["host"] != platform.node() and locked:
+        if note["host"] != this_host() and locked:
             raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
-        if note["host"] == platform.node() and _is_alive(note):
+        if note["host"] == this_host() and _is_alive(note):
             raise LockedError(_told(folder, note, "on this machine"))
     if not locked:
         return False
@@ -119,7 +135,7 @@ def release(folder: Path) -> str:
         if _is_on(path, folder):
             path.unlink(missing_ok=True)
     for path, note in _notes(place):
-        if note["host"] == platform.node() and not _is_alive(note):
+        if note["host"] == this_host() and not _is_alive(note):
             path.unlink(missing_ok=True)
     return f"{folder}: the run before was killed and left its lock; the lock is removed"
 
@@ -127,7 +143,7 @@ def release(folder: Path) -> str:
 def _told(folder: Path, note: dict[str, Any], where: str) -> str:
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(note["start"]))
     remedy = f"wait for its end, or stop it: kill {note['pid']}"
-    if note["host"] != platform.node():
+    if note["host"] != this_host():
         remedy = f"wait for its end; if it is gone: rm -r {LOCKS}"
     return f"{folder}: process {note['pid']} {where} computes it since {since} ({note['command']}); {remedy}"
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..jobs import atomic, records, sealed
 from ..jobs.damage import ASIDE
+from ..jobs.guard import LIMITS_TOLD
 from ..jobs.keys import installed
 from ..jobs.spent import Spent
 from ..kinds import kinds, load_study
@@ -162,7 +163,9 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
         config = Path(temporary) / f"{root.attrs['study']}.yaml"
         atomic.write_text(config, root.attrs["config"])
         study = load_study(config, beside)
-        drawn = random.Random(seed).sample(study.scenes, min(number, len(study.scenes)))
+        # What was lost to limits would take as much again.
+        held = [scene for scene in study.scenes if LIMITS_TOLD not in str(root.message.sel(_labels(scene)).item())]
+        drawn = random.Random(seed).sample(held, min(number, len(held)))
         part = _part(study, drawn)
         made = _made(part, Path(temporary) / "results" / study.name)
     software = json.loads(root.attrs["software"])
@@ -211,12 +214,16 @@ def _made(study: "Study", folder: Path) -> "xr.Dataset":
     return found
 
 
-def _compared(scene: "SceneSpec", before: "xr.Dataset", after: "xr.Dataset", limit: float) -> Again:
-    labels = {
+def _labels(scene: "SceneSpec") -> dict[str, str | float]:
+    return {
         "beam": scene.mesh.beam.name, "mesh_type": scene.mesh.mesh_type, "mesh_size": scene.mesh.mesh_size,
         "material": scene.material.name, "load": scene.load, "definition": scene.definition,
         "kinematics": scene.kinematics,
     }  # fmt: skip
+
+
+def _compared(scene: "SceneSpec", before: "xr.Dataset", after: "xr.Dataset", limit: float) -> Again:
+    labels = _labels(scene)
     cells = [data.sel({name: label for name, label in labels.items() if name in data.dims}) for data in (before, after)]
     differences = [0.0]
     for name in COMPARED:

@@ -7,7 +7,7 @@ import click
 
 from ..output.text import bytes_text
 from .examples import examples
-from .folders import studies
+from .folders import idle, studies
 
 LISTED = 12
 """Files of a folder that are listed by name."""
@@ -32,7 +32,7 @@ def clean(study: Path | None, remove: bool) -> None:
     except StudyError as error:
         raise click.ClickException(f"{error}; nothing is listed or removed") from None
     for folder in found if remove else ():
-        _idle(folder)
+        idle(folder)
     total, count = 0, 0
     for folder, paths in found.items():
         size = sum(path.stat().st_size for path in paths)
@@ -58,13 +58,3 @@ def clean(study: Path | None, remove: bool) -> None:
             if not any(parent.iterdir()):
                 parent.rmdir()
     click.echo(f"removed {count} files, {bytes_text(total)}")
-
-
-def _idle(folder: Path) -> None:
-    """Refuse to remove anything under a run."""
-    from ..campaign.locks import LockedError, is_held
-
-    try:
-        is_held(folder)
-    except LockedError as error:
-        raise click.ClickException(f"{error}; nothing is removed") from None

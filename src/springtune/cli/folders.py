@@ -50,3 +50,24 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
             raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
         else:
             click.echo(f"{folder}: left alone, there is no {config}; give the study's YAML file, or remove it by hand")
+
+
+def idle(folder: Path) -> None:
+    """Refuse to remove anything under a run.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the study's results are.
+
+    Raises
+    ------
+    click.ClickException
+        If a process computes it.
+    """
+    from ..campaign.locks import LockedError, is_held
+
+    try:
+        is_held(folder)
+    except LockedError as error:
+        raise click.ClickException(f"{error}; nothing is removed") from None

@@ -52,6 +52,8 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
     if late:
         raise click.UsageError(f"name the study first: springtune run {late[0]} {options[0]}")
+    if strict and {"-n", "--dry-run", "--dryrun"} & {*options}:
+        raise click.UsageError("--strict asks what became of scenes, and a dry run solves none; leave one of them out")
     checkout = _checkout()
     path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
     shown = Path(arguments[0]) if named else path

@@ -7,7 +7,7 @@ import click
 
 from ..output.text import aligned
 from .examples import examples
-from .folders import studies
+from .folders import idle, studies
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -40,6 +40,9 @@ def verify(study: Path | None, scenes: int, seed: int, set_aside: bool) -> None:
 
 def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: bool) -> int:
     """Tell of a study; the number of its faults."""
+    place = folder.parent.parent
+    if place.resolve() != Path.cwd():
+        raise click.ClickException(f"{folder}: files are named from where the study was run; call it there: cd {place}")
     from ..campaign import verify
     from ..study import StudyError
 
@@ -50,6 +53,8 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
         click.echo(aligned(rows[:TOLD], 2))
         if len(rows) > TOLD:
             click.echo(f"  and {len(rows) - TOLD} more")
+        if set_aside:
+            idle(folder)
         for path in verify.set_aside(found) if set_aside else ():
             click.echo(f"  set aside: {path}")
         first = "" if set_aside else f"`springtune verify {study.path} --set-aside`, then "

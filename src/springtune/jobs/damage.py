@@ -1,6 +1,7 @@
 """Stored files that are not what was written."""
 
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 ASIDE = ".damaged"
@@ -37,6 +38,7 @@ def set_aside(error: DamagedError) -> None:
     told = "computed again"
     if error.path.exists() and not error.whole:
         aside = error.path.with_name(error.path.name + ASIDE)
-        error.path.replace(aside)
+        with suppress(FileNotFoundError):  # another job was quicker
+            error.path.replace(aside)
         told = f"set aside as {aside.name}, and computed again"
     print(f"{error}; {told}", file=sys.stderr)

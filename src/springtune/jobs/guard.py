@@ -21,6 +21,9 @@ PLACES = 4096
 STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """Signals by which somebody ends a job; all others a task brings upon itself."""
 
+LIMITS_TOLD = "(`limits` of the study)"
+"""How limits end in words."""
+
 PARENT_DEATH = 1
 """Linux's number for the signal of a process whose parent is gone (prctl)."""
 
@@ -43,7 +46,7 @@ class Watch:
 
     def __init__(self, limits: Mapping[str, float]) -> None:
         self.seconds, self.memory = limits["seconds"], limits["memory"]
-        self.words = f"at most {self.seconds:g} s and {self.memory / 1e9:g} GB for each (`limits` of the study)"
+        self.words = f"at most {self.seconds:g} s and {self.memory / 1e9:g} GB for each {LIMITS_TOLD}"
         self.lost = 0
         self._name = mmap.mmap(-1, PLACES)  # shared with the child
 
@@ -59,7 +62,9 @@ class Watch:
         before = resource.getrlimit(resource.RLIMIT_AS)
         used = _virtual_memory()
         if used:
-            resource.setrlimit(resource.RLIMIT_AS, (used + int(self.memory), before[1]))
+            # A limit that the user, or a cluster, has set for the whole job is kept.
+            most = [limit for limit in before if limit != resource.RLIM_INFINITY]
+            resource.setrlimit(resource.RLIMIT_AS, (min([used + int(self.memory), *most]), before[1]))
         signal.setitimer(signal.ITIMER_PROF, self.seconds)
         try:
             yield
@@ -82,6 +87,12 @@ def _virtual_memory() -> int:
         return int(Path("/proc/self/statm").read_text().split()[0]) * mmap.PAGESIZE
     except OSError:
         return 0
+
+
+def go_with_parent() -> None:
+    """Let the kernel end this process when the one that forked it ends; where it can."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGKILL)
 
 
 def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str], None]) -> None:
@@ -130,8 +141,7 @@ def _begin(function: Callable[[], None]) -> int:
         return child
     code = 1
     try:
-        if sys.platform == "linux":
-            ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGKILL)
+        go_with_parent()
         if os.getppid() == parent:
             function()
             code = 0

@@ -8,6 +8,7 @@ its limits is lost, and the others are done; a program that is broken ends the j
 import os
 import sys
 import traceback
+from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -16,12 +17,21 @@ from typing import Any, TypeVar
 from . import records, sealed
 from .damage import DamagedError, set_aside
 from .guard import Watch, guarded
+from .hashing import hash_of
 from .spent import Spent
 
 Made = TypeVar("Made")
 
 TASKS, RECORDS = "tasks", "done"
 """Folders of a study: what each job of a stage is to do, and what each job has done."""
+
+PACKAGE = Path(__file__).parents[1]
+
+STATE = "SPRINGTUNE_SOURCE_STATE"
+"""Variable of the environment by which a run tells its jobs the `source_state` that it began with."""
+
+TRIES = 2
+"""So often a file is made again that is damaged: another job may set aside what was just made."""
 
 TRACEBACKS = 3
 """Most tracebacks of one job's log; tasks that are alike fail alike."""
@@ -42,12 +52,27 @@ def main(tasks: str, done: str, digest: str) -> None:
     """
     note = sealed.read(tasks)
     if note is None or note["digest"] != digest:
-        raise SystemExit(f"{tasks}: not what this job is to do; call the same command again, it writes it anew")
+        raise SystemExit(
+            f"{tasks}: not what this job is to do; call the same command again, it writes it anew (without --no-hooks)"
+        )
+    if os.environ.get(STATE, source_state()) != source_state():
+        raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
+    _run(note, done, Path(tasks).parents[1])
+
+
+def source_state() -> str:
+    """Sizes and times of all files of the package: results are stored under keys of the code that a run began with."""
+    states = [(str(path), path.stat()) for path in sorted(PACKAGE.rglob("*.py"))]
+    return hash_of([[name, state.st_size, state.st_mtime_ns] for name, state in states])
+
+
+def _run(note: dict[str, Any], done: str | Path, folder: Path) -> None:
+    """Do the tasks of a note within their limits."""
     module = import_module(f"springtune.{note['module']}")
     watch = Watch(note["limits"])
     spent = Spent(watch)
     guarded(
-        lambda: mended(lambda: _do(note, done, spent), Path(tasks).parents[1]),
+        lambda: mended(lambda: _do(note, done, spent), folder),
         watch,
         lambda key, why: module.lose(note["content"], key, why, watch.words),
     )
@@ -59,7 +84,7 @@ def _do(note: dict[str, Any], done: str | Path, spent: Spent) -> None:
         for error in spent.broken[:TRACEBACKS]:
             traceback.print_exception(error)
         first = traceback.format_exception_only(spent.broken[0])[-1].strip()
-        raise SystemExit(f"the program is broken: {len(spent.broken)} of this job's tasks raised {first}")
+        raise SystemExit(f"{len(spent.broken)} of this job's tasks could not be done: {first}")
     records.write(done, note["digest"], note["products"], **spent.summary())
 
 
@@ -78,14 +103,14 @@ def mended(function: Callable[[], Made], folder: Path) -> Made:
     object
         What it returns.
     """
-    again: set[Path] = set()
+    again: Counter[Path] = Counter()
     while True:
         try:
             return function()
         except DamagedError as error:
-            if error.path in again:
+            again[error.path] += 1
+            if again[error.path] > TRIES:
                 raise SystemExit(f"{error}, and making it again did not help") from None
-            again.add(error.path)
             set_aside(error)
             _make_again(error.path, folder)
 
@@ -97,7 +122,7 @@ def _make_again(product: Path, folder: Path) -> None:
         if note is not None and str(product) in note["products"]:
             done = folder / RECORDS / path.name
             before = done.stat() if done.exists() else None
-            mended(lambda note=note, done=done: _do(note, done, Spent()), folder)  # type: ignore[misc]
+            _run(note, done, folder)
             if before:  # what waited for it has no reason to run again
                 os.utime(done, ns=(before.st_atime_ns, before.st_mtime_ns))
             return

@@ -10,9 +10,10 @@ read, before HDF5 sees it.
 
 import hashlib
 import json
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import h5py
 import numpy as np
@@ -172,6 +173,37 @@ def missing(
         path = Path(folder) / f"{task['key']}.h5"
         if task["key"] not in stored(path, limits):
             yield path, task
+
+
+KEPT_BACK = 5.0
+"""Seconds for which a `Keeper` has results in memory: writing them costs as much as computing small ones."""
+
+
+class Keeper:
+    """Context that adds results to a file now and then, and at its end: what is computed is not lost to what comes.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path, self.results, self.since = path, dict[str, Mapping[str, Any]](), time.perf_counter()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._write()
+
+    def __setitem__(self, key: str, result: Mapping[str, Any]) -> None:
+        self.results[key] = result
+        if time.perf_counter() > self.since + KEPT_BACK:
+            self._write()
+
+    def _write(self) -> None:
+        add(self.path, self.results)
+        self.results, self.since = {}, time.perf_counter()
 
 
 def lose(folder: str | Path, key: str, hole: Mapping[str, Any], limits: str) -> None:

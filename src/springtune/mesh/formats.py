@@ -18,6 +18,9 @@ CELLS = {"triangle": 3, "quad": 4}
 LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
+COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
+"""Endings of files that have a part of a mesh."""
+
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
 
@@ -109,6 +112,10 @@ def _content(path: str | Path) -> Any:
         raise MeshError(
             f"{path}: {size / 1e6:.0f} MB, and at most {most} are read; write a coarser mesh, or binary VTU"
         )
+    if Path(path).suffix.lower() in COMPANIONS or b"*include" in Path(path).read_bytes().lower():
+        raise MeshError(
+            f"{path}: parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
+        )
     import meshio
 
     told = io.StringIO()
@@ -117,6 +124,8 @@ def _content(path: str | Path) -> Any:
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             return meshio.read(path)
+    except (OSError, MemoryError):  # the machine's faults are not the file's
+        raise
     except (Exception, SystemExit) as error:
         said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
         said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()

@@ -5,7 +5,6 @@ users run it, in a folder of its own.
 """
 
 import re
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable
@@ -14,13 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from ..problem.materials import Material
-
-PROGRAM = "ccx"
+from .program import PROGRAM, program
 
 
 def installed() -> bool:
     """Whether the program is on the machine."""
-    return shutil.which(PROGRAM) is not None
+    return bool(program())
 
 
 def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarray, np.ndarray]:

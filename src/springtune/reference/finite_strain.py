@@ -45,6 +45,10 @@ MOST_LONG = 10
 SMALLEST_STEP = 1 / 64
 
 
+class IncompressibleError(ValueError):
+    """A material that displacements alone cannot describe."""
+
+
 class FiniteStrainError(RuntimeError):
     """A reference that did not converge; the message says how far it came."""
 
@@ -98,14 +102,16 @@ def solve_neo_hooke(
 
     Raises
     ------
-    ValueError
+    IncompressibleError
         For an incompressible material in plane strain, which displacements alone cannot describe.
     FiniteStrainError
         If Newton's method does not converge in small load steps.
     """
     nu = material.poisson_ratio
     if plane == "strain" and nu >= 0.5:
-        raise ValueError(f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999")
+        raise IncompressibleError(
+            f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999"
+        )
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, nu, count, kind, plane, follower) for count in COUNTS]
     coarse, fine = (sheet.solve(stress, f"{beam.name}, {material.name}") for sheet in sheets)

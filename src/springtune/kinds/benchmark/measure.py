@@ -7,6 +7,7 @@ the approach needs, is told apart. The machine's load and the largest memory are
 import multiprocessing
 import os
 import resource
+import signal
 import statistics
 import time
 import traceback
@@ -16,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...jobs.failures import own_reason
+from ...jobs.guard import go_with_parent
 from ...linalg import SOLVERS, factors
 from ...mechanics.network import Network
 from ...mechanics.series import trace
@@ -178,7 +180,8 @@ def _in_process(scene, approach, size, meshes, once=False):
         mesh, meshing = meshes[mesh_type, size]
     context = multiprocessing.get_context("fork")
     receive, send = context.Pipe(duplex=False)
-    process = context.Process(target=_repeat, args=(send, scene, approach, size, mesh, meshing, once))
+    left = signal.getitimer(signal.ITIMER_PROF)[0]  # of the task's limit, which a new process does not have
+    process = context.Process(target=_repeat, args=(send, scene, approach, size, mesh, meshing, once, left))
     process.start()
     send.close()
     try:
@@ -187,12 +190,17 @@ def _in_process(scene, approach, size, meshes, once=False):
             raise found
         return found
     except EOFError:
-        return {"status": Status.FAILED, "message": "the process died, of lack of memory most likely"}
+        return {
+            "status": Status.FAILED,
+            "message": "its process was ended: by the limits of the study, or for lack of memory",
+        }
     finally:
         process.join()
 
 
-def _repeat(send, scene, approach, size, mesh, meshing, once):
+def _repeat(send, scene, approach, size, mesh, meshing, once, left):
+    go_with_parent()
+    signal.setitimer(signal.ITIMER_PROF, left)
     base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     seconds, parts = [], []
     try:

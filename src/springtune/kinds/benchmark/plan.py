@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ...jobs.hashing import hash_of
 from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...reference.program import program
 from ..base import Stage
 
 
@@ -16,7 +17,8 @@ def case_key(case, first):
     definitions, mesh_types = definitions | {"delingette", "lattice"}, mesh_types | {"structured"}
     springs = [definition_key(name) for name in sorted(definitions)]
     meshes = [mesh_type_key(name) for name in sorted(mesh_types)]
-    return hash_of(_parameters(case), first, stage_key("kinds.benchmark.stage"), springs, meshes)
+    others = program() if any(approach.startswith("calculix") for approach in case.approaches) else ""
+    return hash_of(_parameters(case), first, stage_key("kinds.benchmark.stage"), springs, meshes, others)
 
 
 def _parameters(case):

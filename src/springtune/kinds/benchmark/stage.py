@@ -1,10 +1,14 @@
 """Stage `benchmark`: run time against error."""
 
 import time
+from functools import partial
+
+import numpy as np
 
 from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.materials import Material
+from ...problem.status import Status
 from . import measure as benchmark
 
 CURVE_SIZE = 1e-3
@@ -24,8 +28,33 @@ def run(tasks, spent):
     """
     for path, task in store.missing(tasks["folder"], tasks["cases"], spent.limits):
         begin = time.perf_counter()
-        store.add(path, {task["key"]: _case(task)})
-        spent.add("benchmark", 0, time.perf_counter() - begin)
+        result = spent.attempt(task["key"], partial(_case, task), partial(_hole, task))
+        if result is not None:
+            store.add(path, {task["key"]: result})
+            spent.add("benchmark", 0, time.perf_counter() - begin)
+
+
+def lose(tasks, key, why, limits):
+    """Store that a scene is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the scene; what became of it; the limits.
+    """
+    task = next(one for one in tasks["cases"] if one["key"] == key)
+    store.lose(tasks["folder"], key, _hole(task, why), limits)
+
+
+def _hole(task, why):
+    """Result of a scene of which nothing is measured."""
+    shape = len(task["approaches"]), len(task["mesh_sizes"])
+    return {
+        "status": np.full(shape, Status.FAILED, dtype=np.int8),
+        "message": np.full(shape, why, dtype=object).tolist(),
+    }
 
 
 def _case(task):

@@ -39,18 +39,17 @@ def run(tasks, spent):
                 spent.add(REFUSED, 0, 0.0)
             continue
         moduli = MeshModuli(mesh)
-        results = {}
-        for measurement in missing:
-            begin = time.perf_counter()
-            result = spent.attempt(measurement["key"], partial(_measured, moduli, measurement), _hole)
-            if result is None:
-                continue
-            results[measurement["key"]] = result
-            seconds = time.perf_counter() - begin
-            of_definition = result.get("definition_seconds", 0.0)
-            spent.add("moduli", len(mesh.points), seconds - of_definition)
-            spent.add(measurement["definition"], len(mesh.points), of_definition)
-        store.add(path, results)
+        with store.Keeper(path) as keeper:
+            for measurement in missing:
+                begin = time.perf_counter()
+                result = spent.attempt(measurement["key"], partial(_measured, moduli, measurement), _hole)
+                if result is None:
+                    continue
+                keeper[measurement["key"]] = result
+                seconds = time.perf_counter() - begin
+                of_definition = result.get("definition_seconds", 0.0)
+                spent.add("moduli", len(mesh.points), seconds - of_definition)
+                spent.add(measurement["definition"], len(mesh.points), of_definition)
 
 
 def lose(tasks, name, why, limits):

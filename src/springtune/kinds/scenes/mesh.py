@@ -1,6 +1,8 @@
 """Stage `mesh`: one VTU file a mesh, with its quality figures in a note beside it."""
 
+import hashlib
 import time
+from pathlib import Path
 
 from ...mesh import MESH_TYPES, quality, read_beam_mesh
 from . import stored_mesh
@@ -56,5 +58,8 @@ def make(source):
     """Mesh from ``length``, ``height`` and ``mesh_type`` and ``mesh_size``, or ``file`` and its ``unit``."""
     box = source["length"], source["height"]
     if "file" in source:
+        content = hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest()
+        if content != source["content"]:
+            raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
         return read_beam_mesh(source["file"], *box, source["unit"])
     return MESH_TYPES[source["mesh_type"]](*box, source["mesh_size"])

@@ -7,7 +7,7 @@ from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
-from ...reference.small_strain import solve_unit
+from ...reference.small_strain import ReferenceNotConvergedError, solve_unit
 
 
 def run(tasks, spent):
@@ -55,7 +55,7 @@ def _unit(task):
     aspect_ratio, nu, kind = task["problem"]
     try:
         solution = solve_unit(aspect_ratio, nu, LOAD_KINDS[kind])
-    except RuntimeError as error:
+    except ReferenceNotConvergedError as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
@@ -63,13 +63,13 @@ def _unit(task):
 
 def _finite(task):
     """Result at finite strain."""
-    from ...reference.finite_strain import solve_neo_hooke  # here, since few studies need it
+    # Here, since few studies need it.
+    from ...reference.finite_strain import FiniteStrainError, IncompressibleError, solve_neo_hooke
 
+    beam, material, kind = Beam(**task["beam"]), Material(**task["material"]), LOAD_KINDS[task["load"]]
     try:
-        beam, material = Beam(**task["beam"]), Material(**task["material"])
-        kind = LOAD_KINDS[task["load"]]
         solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
-    except (RuntimeError, ValueError) as error:
+    except (FiniteStrainError, IncompressibleError) as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
     return {name: getattr(solution, name) for name in names} | {"message": ""}

@@ -48,15 +48,14 @@ def run(tasks, spent):
                 spent.add(stored_mesh.REFUSED, 0, 0.0)
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
-        results = {}
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone
-        for curve in missing:
-            traced = partial(_traced, sheet, curve, tasks["references"])
-            result = spent.attempt(curve["key"], traced, partial(_hole, curve))
-            if result is not None:
-                results[curve["key"]] = result
-                spent.add("curve", len(mesh.points), result["seconds"])
-        store.add(path, results)
+        with store.Keeper(path) as keeper:
+            for curve in missing:
+                traced = partial(_traced, sheet, curve, tasks["references"])
+                result = spent.attempt(curve["key"], traced, partial(_hole, curve))
+                if result is not None:
+                    keeper[curve["key"]] = result
+                    spent.add("curve", len(mesh.points), result["seconds"])
 
 
 def lose(tasks, key, why, limits):

@@ -18,9 +18,6 @@ from . import stored_mesh
 from . import stored_reference as references
 from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key, packed
 
-KEPT_BACK = 5.0
-"""Seconds for which results are not stored: writing them costs as much as solving small scenes."""
-
 
 def run(tasks, spent):
     """Solve the scenes of a bundle that are not stored yet.
@@ -58,24 +55,20 @@ def run(tasks, spent):
         fields = References(tasks["references"], mesh)
         sheet = Sheet(mesh, family["thickness"])
         order = sorted(missing, key=lambda name: _turn(missing[name]))
-        results, since = {}, time.perf_counter()
-        for name in order:
-            scene, derived = missing[name], sheet.deriving
-            solved = partial(solve, sheet, scene, fields.field, calibration, family["keep_fields"])
-            result = spent.attempt(name, solved, _hole)
-            if result is None:
-                continue
-            if name in kept:
-                results[kept[name]] = packed(result)
-            if name not in present:
-                results[name] = {label: value for label, value in result.items() if label not in FIELD_ARRAYS}
-            work = "fields" if name in present else scene["kinematics"]
-            spent.add(work, len(mesh.points), result["seconds"])
-            spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
-            if time.perf_counter() > since + KEPT_BACK:  # what is solved is not to be lost to what comes
-                store.add(path, results)
-                results, since = {}, time.perf_counter()
-        store.add(path, results)
+        with store.Keeper(path) as keeper:
+            for name in order:
+                scene, derived = missing[name], sheet.deriving
+                solved = partial(solve, sheet, scene, fields.field, calibration, family["keep_fields"])
+                result = spent.attempt(name, solved, _hole)
+                if result is None:
+                    continue
+                if name in kept:
+                    keeper[kept[name]] = packed(result)
+                if name not in present:
+                    keeper[name] = {label: value for label, value in result.items() if label not in FIELD_ARRAYS}
+                work = "fields" if name in present else scene["kinematics"]
+                spent.add(work, len(mesh.points), result["seconds"])
+                spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
 
 
 def lose(tasks, name, why, limits):
