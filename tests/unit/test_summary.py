@@ -15,8 +15,9 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 
 from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
-from springtune.campaign import plan, summary, workload
-from springtune.jobs import records
+from springtune.campaign import due, plan, summary, workload
+from springtune.jobs import bundles, records, sealed
+from springtune.jobs.dependencies import CODE_FILE, Code
 from springtune.kinds import load_study
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output.dataset import Filler
@@ -132,6 +133,37 @@ def planned(tmp_path):
     study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
     made = plan.plan(study, folder, 2)
     return study, made, list(made.jobs)
+
+
+def test_notes_that_are_another_ones_are_as_good_as_none(planned):
+    study, made, names = planned
+    folder = made.folder
+    made.write()
+    for path in (folder / plan.BUNDLES_FILE, folder.parent / plan.COSTS_FILE, folder.parent / CODE_FILE):
+        sealed.write(path, {"seconds": 0.25})
+    Code().recall(folder.parent / CODE_FILE)
+    bundles.remember(folder.parent / plan.COSTS_FILE, [], {})
+    again = plan.plan(study, folder, 2)
+    assert again.jobs == made.jobs
+    found = due.jobs(study, again)
+    for name in names:  # what a job is to do has its digest, too
+        found[name].record.parent.mkdir(exist_ok=True)
+        found[name].record.write_bytes(made.tasks(name).read_bytes())
+        assert due.fault(found[name], found).endswith("is damaged")
+    sealed.write(found[due.COLLECT].record, {"seconds": 0.25})
+    assert due.fault(found[due.COLLECT], found).endswith("is damaged")
+    page = found[due.BROWSE]
+    records.write(page.record, page.digest, page.products, read="")
+    assert not due.fault(page, found)
+
+
+def test_outputs_without_files_have_no_job(planned, tmp_path):
+    (tmp_path / "none.yaml").write_text(STUDY.replace("[lattice, patch]}", "lattice, sensitivity: false}"))
+    study = load_study(tmp_path / "none.yaml")
+    assert "sensitivity" in study.outputs
+    found = due.jobs(study, plan.plan(study, tmp_path / "results/none", 1))
+    assert all(job.products for name, job in found.items() if name.startswith(due.PRESENT))
+    assert not any("sensitivity" in name for name in found if name.startswith(due.PRESENT))
 
 
 class TestWorkload:
@@ -331,3 +363,12 @@ class TestDisplay:
             assert display.jobs[1].made() == 1
         finally:
             display.stop()
+
+
+def test_a_job_without_a_word_on_a_full_disk(tmp_path, monkeypatch):
+    log = tmp_path / "solve_0.log"
+    log.touch()
+    for room, said in ((5, "it said nothing"), (0, "it could say nothing: the disk is full; make room")):
+        state = SimpleNamespace(f_blocks=100, f_bavail=room)
+        monkeypatch.setattr(summary.os, "statvfs", lambda folder, state=state: state)
+        assert summary._last(log) == said

@@ -128,6 +128,7 @@ def begin():
             one.write()
         OURS.remember(RESULTS.parent / CODE_FILE)
     except OSError as error:
+        locks.end()
         remedy = "make room or give leave to write there, then call the same command again"
         raise WorkflowError(f"{error.filename or RESULTS} cannot be written: {error.strerror}; {remedy}") from None
     tell_start()

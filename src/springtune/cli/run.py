@@ -64,7 +64,7 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     # A list of targets would take a path that follows it for one more of them, and so would --configfile.
     command = [*_snakemake(), *options, "--configfile", str(path)]
     os.chdir(checkout)
-    if not strict:
+    if not strict or {"-n", "--dry-run", "--dryrun"} & {*options}:
         os.execv(command[0], command)
     code = _called(command)
     holes = 0 if code else _unsolved(Path("results") / study.name / "dataset.nc")
