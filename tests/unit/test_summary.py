@@ -19,6 +19,7 @@ from springtune.campaign import due, plan, summary, workload
 from springtune.jobs import bundles, records, sealed
 from springtune.jobs.dependencies import CODE_FILE, Code
 from springtune.kinds import load_study
+from springtune.kinds.scenes.plan import by_mesh
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output.dataset import Filler
 from springtune.problem.status import Status
@@ -155,6 +156,19 @@ def test_notes_that_are_another_ones_are_as_good_as_none(planned):
     page = found[due.BROWSE]
     records.write(page.record, page.digest, page.products, read="")
     assert not due.fault(page, found)
+
+
+def test_planning_adds_no_mesh_to_those_that_have_curves(tmp_path):
+    first, second = (
+        "mesh_type: structured, mesh_size: [2 mm, 5 mm]",
+        "mesh_type: right, mesh_size: 2 mm, sensitivity: false",
+    )
+    other = STUDY[STUDY.index("  one:") :].replace("one:", "two:").replace(first, second)
+    (tmp_path / "some.yaml").write_text(STUDY + other)
+    study = load_study(tmp_path / "some.yaml")
+    plan.plan(study, tmp_path / "results/some", 1)
+    groups = by_mesh(study.curves)
+    assert len(groups) == 2 < len(study.meshes) and all(groups.values())
 
 
 def test_outputs_without_files_have_no_job(planned, tmp_path):
