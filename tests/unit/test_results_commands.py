@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ import springtune as st
 from springtune.campaign import locks
 from springtune.campaign.orphans import orphans
 from springtune.cli import main
+from springtune.jobs import sealed
 from springtune.kinds import load_study
 from springtune.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
 from springtune.output import dataset
@@ -313,6 +315,15 @@ class TestClean:
         Path("config/two.yaml").write_text("title: none\n")
         assert run("clean", "config/two.yaml", "--remove").exit_code == 1
         assert self.there() == before
+
+    def test_notes_of_runs_that_are_gone_do_not_pile_up(self, left):
+        gone = subprocess.Popen([sys.executable, "-c", "pass"])
+        gone.wait()
+        note = {"host": platform.node(), "pid": gone.pid, "start": 1.0, "command": "", "folders": ["results/two"]}
+        sealed.write(locks.RUNS / "gone.json", note)
+        locks.begin([Path("results/two")])
+        assert len(list(locks.RUNS.iterdir())) == 1 and not (locks.RUNS / "gone.json").exists()
+        locks.end()
 
     def test_a_folder_without_its_study_is_left_alone(self, left):
         Path("config/two.yaml").unlink()

@@ -46,6 +46,15 @@ def test_broken_file_holds_nothing_and_is_replaced(tmp_path):
     assert h5py.is_hdf5(path)
 
 
+def test_a_folder_in_the_place_of_a_file_is_set_aside(tmp_path):
+    path = tmp_path / "results.h5"
+    path.mkdir()
+    assert store.stored(path) == set()
+    store.add(path, {"one": {"value": 1.0}})
+    assert store.stored(path) == {"one"}
+    assert (tmp_path / "results.h5.damaged").is_dir()
+
+
 def test_keys_depend_on_values_not_on_their_order():
     assert hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
     assert hash_of({"a": 1.0}) != hash_of({"a": 1.0000000000000002})

@@ -15,9 +15,11 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 
 from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
-from springtune.campaign import plan, summary, workload
-from springtune.jobs import records
+from springtune.campaign import due, plan, summary, workload
+from springtune.jobs import bundles, records, sealed
+from springtune.jobs.dependencies import CODE_FILE, Code
 from springtune.kinds import load_study
+from springtune.kinds.scenes.plan import by_mesh
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output.dataset import Filler
 from springtune.problem.status import Status
@@ -132,6 +134,50 @@ def planned(tmp_path):
     study, folder = load_study(tmp_path / "two.yaml"), tmp_path / "results/two"
     made = plan.plan(study, folder, 2)
     return study, made, list(made.jobs)
+
+
+def test_notes_that_are_another_ones_are_as_good_as_none(planned):
+    study, made, names = planned
+    folder = made.folder
+    made.write()
+    for path in (folder / plan.BUNDLES_FILE, folder.parent / plan.COSTS_FILE, folder.parent / CODE_FILE):
+        sealed.write(path, {"seconds": 0.25})
+    Code().recall(folder.parent / CODE_FILE)
+    bundles.remember(folder.parent / plan.COSTS_FILE, [], {})
+    again = plan.plan(study, folder, 2)
+    assert again.jobs == made.jobs
+    found = due.jobs(study, again)
+    for name in names:  # what a job is to do has its digest, too
+        found[name].record.parent.mkdir(exist_ok=True)
+        found[name].record.write_bytes(made.tasks(name).read_bytes())
+        assert due.fault(found[name], found).endswith("is damaged")
+    sealed.write(found[due.COLLECT].record, {"seconds": 0.25})
+    assert due.fault(found[due.COLLECT], found).endswith("is damaged")
+    page = found[due.BROWSE]
+    records.write(page.record, page.digest, page.products, read="")
+    assert not due.fault(page, found)
+
+
+def test_planning_adds_no_mesh_to_those_that_have_curves(tmp_path):
+    first, second = (
+        "mesh_type: structured, mesh_size: [2 mm, 5 mm]",
+        "mesh_type: right, mesh_size: 2 mm, sensitivity: false",
+    )
+    other = STUDY[STUDY.index("  one:") :].replace("one:", "two:").replace(first, second)
+    (tmp_path / "some.yaml").write_text(STUDY + other)
+    study = load_study(tmp_path / "some.yaml")
+    plan.plan(study, tmp_path / "results/some", 1)
+    groups = by_mesh(study.curves)
+    assert len(groups) == 2 < len(study.meshes) and all(groups.values())
+
+
+def test_outputs_without_files_have_no_job(planned, tmp_path):
+    (tmp_path / "none.yaml").write_text(STUDY.replace("[lattice, patch]}", "lattice, sensitivity: false}"))
+    study = load_study(tmp_path / "none.yaml")
+    assert "sensitivity" in study.outputs
+    found = due.jobs(study, plan.plan(study, tmp_path / "results/none", 1))
+    assert all(job.products for name, job in found.items() if name.startswith(due.PRESENT))
+    assert not any("sensitivity" in name for name in found if name.startswith(due.PRESENT))
 
 
 class TestWorkload:
@@ -331,3 +377,14 @@ class TestDisplay:
             assert display.jobs[1].made() == 1
         finally:
             display.stop()
+
+
+def test_a_job_without_a_word_on_a_full_disk(planned, monkeypatch):
+    study, made, names = planned
+    log = made.folder / f"logs/{names[0]}.log"
+    log.parent.mkdir(parents=True)
+    log.touch()
+    for room, said in ((5, "it said nothing"), (0, "it could say nothing: the disk is full; make room")):
+        state = SimpleNamespace(f_blocks=100, f_bavail=room)
+        monkeypatch.setattr(os, "statvfs", lambda folder, state=state: state)
+        assert said in summary.broken(study, made, 0.0)

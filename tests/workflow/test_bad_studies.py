@@ -133,3 +133,7 @@ def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
     assert code == 3, text
     assert text.endswith("--strict: 1 scenes are not solved\n")
     assert run()[0] == 0
+    dataset = tmp_path / "results/hole/dataset.nc"
+    dataset.write_bytes(dataset.read_bytes()[:1000])
+    code, text = run("--strict", "-n")
+    assert code == 0 and "dataset.nc is damaged" in text and "Traceback" not in text, text

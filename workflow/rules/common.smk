@@ -132,6 +132,7 @@ def begin():
             one.write()
         OURS.remember(RESULTS.parent / CODE_FILE)
     except OSError as error:
+        locks.end()
         remedy = "make room or give leave to write there, then call the same command again"
         raise WorkflowError(f"{error.filename or RESULTS} cannot be written: {error.strerror}; {remedy}") from None
     tell_start()
@@ -157,6 +158,10 @@ def release():
     looking |= any(word.partition("=")[0] in LOOKING for word in sys.argv[1:])
     if looking or not workflow.is_main_process:
         return
+    disk = os.statvfs(".")
+    if disk.f_blocks and not disk.f_bavail:
+        print(f"{Path.cwd()}: the disk is full; make room, then call the same command again", file=sys.stderr)
+        sys.exit(1)
     try:
         removed = locks.release(RESULTS)
     except locks.LockedError as error:

@@ -64,7 +64,7 @@ class Job:
 
 
 def output_jobs(study: "Study") -> "dict[str, list[Output]]":
-    """Outputs that a study asks for, by the job that makes them.
+    """Outputs that a study asks for and that have files in it, by the job that makes them.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
     """
     found: dict[str, list[Output]] = {}
     for one in outputs().values():
-        if one.name in study.outputs:
+        if one.name in study.outputs and output_files(one, study):
             found.setdefault(f"{PRESENT}_{one.made_by}", []).append(one)
     return found
 
@@ -230,8 +230,9 @@ def _checksum(path: str) -> str:
 
 def _is_up_to_date(job: Job, before: Job) -> bool:
     """Whether a job read what the one before it has made; that of a job that is to run is not asked for."""
-    read, made = sealed.read(job.record), sealed.read(before.record)
-    return made is None or read["read"] == made["products"][before.products[0]][2]
+    read, made = sealed.read(job.record), sealed.read(before.record, products=dict)
+    product = made and made["products"].get(before.products[0])
+    return not product or read["read"] == product[2]
 
 
 def is_damage(why: str) -> bool:

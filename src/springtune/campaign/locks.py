@@ -46,7 +46,15 @@ def begin(folders: Iterable[Path]) -> None:
         "command": " ".join(sys.argv),
         "folders": sorted(named),
     }
+    _forget(Path())
     sealed.write(_note(), note)
+
+
+def _forget(place: Path) -> None:
+    """Remove notes of this machine's processes that are gone."""
+    for path, note in _notes(place):
+        if note["host"] == this_host() and not _is_alive(note):
+            path.unlink(missing_ok=True)
 
 
 def end() -> None:
@@ -134,9 +142,7 @@ def release(folder: Path) -> str:
     for path in _files(place / LOCKS, "*.lock"):
         if _is_on(path, folder):
             path.unlink(missing_ok=True)
-    for path, note in _notes(place):
-        if note["host"] == this_host() and not _is_alive(note):
-            path.unlink(missing_ok=True)
+    _forget(place)
     return f"{folder}: the run before was killed and left its lock; the lock is removed"
 
 
@@ -162,7 +168,7 @@ def _is_on(lock: Path, folder: Path) -> bool:
 
 def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
     for path in _files(place / RUNS, "*.json"):
-        note = sealed.read(path)
+        note = sealed.read(path, host=str, pid=int, start=float, folders=list)
         if note is not None:
             yield path, note
 

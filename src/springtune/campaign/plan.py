@@ -150,7 +150,7 @@ def plan(study: "Study", folder: Path, cores: int) -> Plan:
     -------
     Plan
     """
-    known: dict[str, Any] = sealed.read(folder / BUNDLES_FILE) or {"cores": 0}
+    known: dict[str, Any] = sealed.read(folder / BUNDLES_FILE, cores=int) or {"cores": 0}
     # More cores want more bundles; what is solved stays solved, whichever bundle it is in.
     before: dict[str, Any] = known if known["cores"] >= cores else {"cores": cores}
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())

@@ -4,6 +4,7 @@
 the run (`ending`, `broken`), without xarray.
 """
 
+import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -239,7 +240,11 @@ def beside(study: "Study", plan: Plan, since: float) -> str:
 def _last(log: Path) -> str:
     """What a job said last: why it failed."""
     said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
-    return said[-1].strip() if said else "it said nothing"
+    if said:
+        return said[-1].strip()
+    room = os.statvfs(log.parent)
+    full = room.f_blocks and not room.f_bavail
+    return "it could say nothing: the disk is full; make room" if full else "it said nothing"
 
 
 def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:

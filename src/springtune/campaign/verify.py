@@ -99,7 +99,7 @@ def files(study: "Study", folder: Path) -> Files:
     compared, stale = 0, []
     faults: dict[str, str] = {}
     for name, job in found.items():
-        record = sealed.read(job.record)
+        record = sealed.read(job.record, digest=str, products=dict)
         made = record or {"digest": job.digest, "products": job.products}
         why = records.fault(job.record, made["digest"], made["products"], wholly=True)
         compared += len(made["products"]) + 1

@@ -48,7 +48,7 @@ class Costs:
 
     def __init__(self, path: Path, usual: Usual) -> None:
         self.usual = usual
-        known = sealed.read(path) or {}  # as good as new where it is damaged
+        known = sealed.read(path, kinds=dict) or {}  # as good as new where it is damaged
         self.ratios = {
             kind: seconds / expected for kind, (expected, seconds) in known.get("kinds", {}).items() if expected
         }
@@ -89,7 +89,7 @@ def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
     usual : dict of str to tuple
         As of `Costs`.
     """
-    known = sealed.read(path)
+    known = sealed.read(path, kinds=dict)
     since = path.stat().st_mtime if known else 0.0
     known = known or {"kinds": {}}
     notes = [note for note in (sealed.read(file) for file in done if file.stat().st_mtime > since) if note]

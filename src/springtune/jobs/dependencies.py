@@ -84,8 +84,8 @@ class Code:
         path : Path
             Note of `remember`; nothing is taken where there is none, or one of other code.
         """
-        note = sealed.read(path)
-        if note is not None and note["reader"] == READER:
+        note = sealed.read(path, sources=dict)
+        if note is not None and note.get("reader") == READER:
             self._known = note["sources"]
 
     def remember(self, path: Path) -> None:

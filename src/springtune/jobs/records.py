@@ -74,7 +74,7 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
     path = Path(path)
     if not path.exists():
         return "not done yet"
-    record = sealed.read(path)
+    record = sealed.read(path, digest=str, products=dict)
     if record is None:
         return f"{path}{DAMAGED}"
     if record["digest"] != digest:

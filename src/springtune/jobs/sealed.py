@@ -38,17 +38,19 @@ def write(path: str | Path, content: Any) -> None:
     atomic.write_bytes(path, b"".join([PREFIX, _seal(text), BETWEEN, text, SUFFIX]))
 
 
-def read(path: str | Path) -> Any:
+def read(path: str | Path, **parts: type) -> Any:
     """Content of a note.
 
     Parameters
     ----------
     path : str or Path
+    **parts
+        What it has at least, by name, and of which type: a note that is sound may be another one's.
 
     Returns
     -------
     object
-        None where there is no such file or its checksum is not that of its content.
+        None where there is no such file, its checksum is not that of its content, or it lacks a part.
 
     Examples
     --------
@@ -67,7 +69,9 @@ def read(path: str | Path) -> Any:
     seal, between, rest = text.removeprefix(PREFIX).partition(BETWEEN)
     content = rest.removesuffix(SUFFIX)
     sound = text.startswith(PREFIX) and between and rest.endswith(SUFFIX) and seal == _seal(content)
-    return json.loads(content) if sound else None
+    found = json.loads(content) if sound else None
+    lacks = parts and not (isinstance(found, dict) and all(isinstance(found.get(name), parts[name]) for name in parts))
+    return None if lacks else found
 
 
 def demand(path: str | Path) -> Any:

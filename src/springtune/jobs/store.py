@@ -77,14 +77,20 @@ def stored(path: str | Path, limits: str | None = None) -> set[str]:
     try:
         _checked(path)
     except DamagedError as error:
-        with open(path, "rb") as file:
-            old = file.read(len(OLD)) == OLD
-        if not old:
+        if not _is_old(path):
             set_aside(error)
         return set()
     with h5py.File(path) as file:
         scalars = _scalars(file)
     return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
+
+
+def _is_old(path: str | Path) -> bool:
+    """Whether a file was written when files had no checksum yet."""
+    if not Path(path).is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(len(OLD)) == OLD
 
 
 def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:

@@ -253,7 +253,7 @@ def _sensitivity(study, folder, members):
         {"name": stem(mesh), "curves": [_curve(study, curve) for curve in curves[mesh]]}
         for meshes in members
         for mesh in meshes
-        if curves[mesh]
+        if mesh in curves  # asking otherwise would add it for all who ask later
     ]
     return families and {
         "folder": str(folder / "curves"),
