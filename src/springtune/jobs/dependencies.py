@@ -29,6 +29,7 @@ from .syntax import Import, Source, read
 PACKAGE = Path(__file__).parents[1]
 
 CARRIED = {
+    ("browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
     ("jobs/atomic.py", "psutil"): "it says which processes live",
     ("jobs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
