@@ -264,6 +264,22 @@ class TestSlits:
         with pytest.raises(SystemExit, match="was changed while the study ran; call the same command again"):
             make({"length": 0.1, "height": 0.02, "file": str(path), "unit": 1.0, "content": "that of before"})
 
+    @pytest.mark.parametrize(
+        ("claimed", "expected"), [(10**15, MeshError), (MemoryError(), MemoryError), (OSError(5, "EIO"), OSError)]
+    )
+    def test_a_file_that_claims_more_than_any_memory_is_damaged_and_the_machines_faults_are_not_its(
+        self, tmp_path, monkeypatch, claimed, expected
+    ):
+        def read(path):
+            if isinstance(claimed, Exception):
+                raise claimed
+            return np.empty(claimed)
+
+        path = save(tmp_path / "own.vtu", self.MESH.points, {3: self.MESH.triangles})
+        monkeypatch.setattr(meshio, "read", read)
+        with pytest.raises(expected):
+            read_beam_mesh(path, 0.1, 0.02)
+
     @pytest.mark.parametrize("name", ["own.xdmf", "own.inp"])
     def test_parts_in_other_files_are_refused(self, tmp_path, name):
         path = tmp_path / name

@@ -18,6 +18,9 @@ CELLS = {"triangle": 3, "quad": 4}
 LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
+BEYOND_MEMORY = 1e12
+"""What no file of `LARGEST_FILE` holds [bytes]."""
+
 COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
 """Endings of files that have a part of a mesh."""
 
@@ -97,6 +100,17 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4)))
 
 
+def _is_the_machines(error: BaseException) -> bool:
+    """Whether a file cannot be read for reasons that are not its own: the system's errors, and a lack of memory.
+
+    A damaged file may claim to hold more than any memory.
+    """
+    if isinstance(error, MemoryError):
+        claimed = float(np.prod(getattr(error, "shape", 0), dtype=float)) * 8
+        return claimed < BEYOND_MEMORY
+    return isinstance(error, OSError) and error.errno is not None
+
+
 def _content(path: str | Path) -> Any:
     """What meshio reads from a file."""
     try:
@@ -124,9 +138,9 @@ def _content(path: str | Path) -> Any:
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             return meshio.read(path)
-    except (OSError, MemoryError):  # the machine's faults are not the file's
-        raise
     except (Exception, SystemExit) as error:
+        if _is_the_machines(error):
+            raise
         said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
         said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
         if not isinstance(error, SystemExit):
