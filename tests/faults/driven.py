@@ -17,14 +17,16 @@ import netCDF4
 import numpy as np
 import xarray
 
-from springtune.campaign import browse, collect, due, present
+from springtune.campaign import due
 from springtune.campaign.plan import plan
-from springtune.jobs import run_tasks, sealed, store
+from springtune.jobs import sealed, store
 from springtune.jobs.atomic import remove_unfinished
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
 from springtune.kinds.benchmark import stage as benchmark
 from springtune.kinds.laying import stage as laying
+
+from campaigns import Campaign
 
 STUDY = Path(__file__).with_name("small.yaml")
 FOLDER = Path("results/small")
@@ -56,30 +58,11 @@ def _remembered(function):
     return lambda task: known(json.dumps(task, sort_keys=True))
 
 
-class Run:
+class Run(Campaign):
     """The study of this folder, as it is to be run now."""
 
     def __init__(self):
-        self.study = load_study("small.yaml")
-        self.plan = plan(self.study, FOLDER, 1)
-        self.jobs = due.jobs(self.study, self.plan)
-
-    def due(self):
-        """Names of the jobs that are to run, in order."""
-        found = []
-        for name, job in self.jobs.items():
-            if due.fault(job, self.jobs) or self._waits(name) & set(found):
-                found.append(name)
-        return found
-
-    def _waits(self, name):
-        """Jobs that a job comes after."""
-        if name not in self.plan.jobs:
-            return {*self.plan.jobs} if name == due.COLLECT else {due.COLLECT}
-        stage, label = self.plan.jobs[name].stage, self.plan.jobs[name].label
-        others = self.plan.jobs.items()
-        same = {other for other, job in others if job.stage.name in stage.same and job.label == label}
-        return same | {other for other, job in others if job.stage.name in stage.every}
+        super().__init__("small.yaml")
 
     def begin(self):
         """What a run does before its first job."""
@@ -88,19 +71,11 @@ class Run:
         remove_unfinished(FOLDER.parent, below=False)
 
     def do(self, name):
-        """A job, by the function that its rule calls."""
+        """A job, or what comes before the first one."""
         if name == BEGIN:
-            return self.begin()
-        job = self.jobs[name]
-        if name in self.plan.jobs:
-            return run_tasks.main(str(self.plan.tasks(name)), str(job.record), job.digest)
-        dataset = str(FOLDER / due.DATASET)
-        if name == due.COLLECT:
-            return collect.main("small.yaml", str(FOLDER), dataset, str(job.record), job.digest)
-        if name == due.BROWSE:
-            return browse.main(dataset, job.products[0], str(job.record), job.digest, *due.linked(self.study))
-        names = [one.name for one in due.output_jobs(self.study)[name]]
-        return present.main(dataset, str(FOLDER), str(job.record), job.digest, *names)
+            self.begin()
+        else:
+            super().do(name)
 
     def finish(self, step):
         """A plain run after a failure of a step.

@@ -12,15 +12,17 @@ import meshio
 import netCDF4
 import numpy as np
 
-from springtune.campaign import browse, collect, due, present
-from springtune.campaign.plan import plan
+sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
+
+from springtune.campaign import due
 from springtune.jobs import records, run_tasks, sealed
 from springtune.jobs.dependencies import CODE_FILE, OURS
 from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
 from springtune.kinds.scenes import plan as scenes
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
+
+from campaigns import Campaign
 
 HERE = Path(__file__).parent
 CONFIG = Path("small.yaml")
@@ -36,32 +38,13 @@ TIMES = re.compile("seconds|created|history|git_|^config|^inputs")
 """Names of values that are others in every run or checkout, and of the texts that a study was read from."""
 
 
-class Run:
+class Run(Campaign):
     """The study of this folder, as it is to be run now."""
 
     def __init__(self, cores=1):
         for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
             cache.cache_clear()
-        self.study = load_study(CONFIG)
-        self.plan = plan(self.study, FOLDER, cores)
-        self.jobs = due.jobs(self.study, self.plan)
-
-    def due(self):
-        """Names of the jobs that are to run, in order."""
-        found = []
-        for name, job in self.jobs.items():
-            if due.fault(job, self.jobs) or self._before(name) & set(found):
-                found.append(name)
-        return found
-
-    def _before(self, name):
-        """Jobs that a job comes after."""
-        if name not in self.plan.jobs:
-            return {*self.plan.jobs} if name == due.COLLECT else {due.COLLECT}
-        stage, label = self.plan.jobs[name].stage, self.plan.jobs[name].label
-        others = self.plan.jobs.items()
-        same = {other for other, job in others if job.stage.name in stage.same and job.label == label}
-        return same | {other for other, job in others if job.stage.name in stage.every}
+        super().__init__(CONFIG, cores)
 
     def finish(self):
         """Run what is to run.
@@ -78,7 +61,7 @@ class Run:
             self.plan.write()
             OURS.remember(FOLDER.parent / CODE_FILE)
         for name in names:
-            self._do(name)
+            self.do(name)
             work = sealed.read(self.jobs[name].record).get("work", {})
             # What definitions cost is told beside the scene that they are part of.
             for kind in work.keys() - set(DEFINITIONS):
@@ -89,17 +72,9 @@ class Run:
         """Name of a job, without the number of its bundle."""
         return self.plan.jobs[name].stage.name if name in self.plan.jobs else name
 
-    def _do(self, name):
-        job, dataset = self.jobs[name], str(FOLDER / due.DATASET)
-        if name in self.plan.jobs:
-            run_tasks.mended(lambda: self._compute(name), FOLDER)
-        elif name == due.COLLECT:
-            collect.main(str(CONFIG), str(FOLDER), dataset, str(job.record), job.digest)
-        elif name == due.BROWSE:
-            browse.main(dataset, job.products[0], str(job.record), job.digest, *due.linked(self.study))
-        else:
-            names = [one.name for one in due.output_jobs(self.study)[name]]
-            present.main(dataset, str(FOLDER), str(job.record), job.digest, *names)
+    def do_stage(self, name):
+        """A job of a stage, in this process, which compiles once what it needs."""
+        run_tasks.mended(lambda: self._compute(name), FOLDER)
 
     def _compute(self, name):
         note, spent = sealed.read(self.plan.tasks(name)), Spent()

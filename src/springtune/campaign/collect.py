@@ -35,16 +35,19 @@ def run(config: str | Path, folder: str | Path, output: str | Path) -> list[Path
     list of Path
         Both.
     """
-    study, folder = load_study(config), Path(folder)
+    return _collected(load_study(config), config, Path(folder), Path(output))
+
+
+def _collected(study: "Study", config: str | Path, folder: Path, output: Path) -> list[Path]:
     groups = mended(lambda: _groups(study, folder), folder)
     try:
         dataset.write(output, groups, provenance.attributes(study, config))
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
-    told = Path(output).with_name(summary.FILE)
+    told = output.with_name(summary.FILE)
     atomic.write_text(told, summary.text(groups, study.title))
     bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
-    return [Path(output), told]
+    return [output, told]
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
@@ -62,7 +65,7 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     study = load_study(config)
     if due.jobs(study, plan(study, Path(folder), 1))[due.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    records.write(record, digest, run(config, folder, output))
+    records.write(record, digest, _collected(study, config, Path(folder), Path(output)))
 
 
 def _groups(study: "Study", folder: Path) -> dict[str, xr.Dataset]:

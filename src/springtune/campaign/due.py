@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..jobs import records, sealed
+from ..jobs.dependencies import PACKAGE
 from ..jobs.hashing import hash_of
 from ..jobs.keys import stage_key
 from ..jobs.run_tasks import RECORDS
@@ -31,8 +32,6 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark")
 """Studies that the paper reads."""
-
-PACKAGE = Path(__file__).parents[1]
 
 
 @dataclass(frozen=True)
@@ -133,23 +132,29 @@ def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
     """Digest of a study's dataset: of the study as it is expanded, not of its text."""
+    collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
     code = [stage_key("campaign.collect")]
     code += [stage_key(f"kinds.{name}.{part}") for name in KINDS for part in ("kind", "collect")]
-    code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
+    code += [stage_key(made.collect) for made in collected]
     about = [study.name, study.title, study.axes, study.stiffness_ratios, study.further_references, study.calibration]
     # What is stored of a scene knows neither its labels nor its beam's.
     of_scenes = [[scene.name, scene.force] for scene in study.scenes]
     bodies = {scene.mesh.beam for scene in study.scenes}, {scene.material for scene in study.scenes}
     named = [sorted((_plain(one) for one in group), key=lambda one: str(one["name"])) for group in bodies]
     parts = {name: _plain(part) for name, part in study.parts.items() if name != "scenes"}
-    collected = [made.name for made in outputs().values() if made.collect and made.name in study.outputs]
     printed = [_plain(cell) for cell in study.printed]
     stages = [job.digest for job in plan.jobs.values()]
-    return hash_of(about, of_scenes, named, parts, collected, _shows_fields(study), printed, stages, code)
-
-
-def _shows_fields(study: "Study") -> bool:
-    return "deformed" in study.outputs
+    return hash_of(
+        about,
+        of_scenes,
+        named,
+        parts,
+        [made.name for made in collected],
+        "deformed" in study.outputs,
+        printed,
+        stages,
+        code,
+    )
 
 
 def _plain(part: Any) -> Any:

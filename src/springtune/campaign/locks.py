@@ -8,17 +8,15 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from ..jobs import sealed
+from ..jobs.processes import lives
 
 LOCKS, RUNS = Path(".snakemake/locks"), Path(".snakemake/springtune")
 """Snakemake's locks, and notes of processes, from the folder on that a run is called in."""
-
-SAME_START = 2.0
-"""Seconds by which two readings of a process's start may differ, since the clock may be set."""
 
 
 class LockedError(Exception):
@@ -36,9 +34,6 @@ def begin(folders: Iterable[Path]) -> None:
     import psutil
 
     process, named = psutil.Process(), {str(folder) for folder in folders}
-    for path, other in _notes(Path()):  # of runs that are gone: this one has the lock
-        if named & {*other["folders"]}:
-            path.unlink(missing_ok=True)
     note = {
         "host": this_host(),
         "pid": process.pid,
@@ -46,14 +41,15 @@ def begin(folders: Iterable[Path]) -> None:
         "command": " ".join(sys.argv),
         "folders": sorted(named),
     }
-    _forget(Path())
+    _forget(Path(), named)
     sealed.write(_note(), note)
 
 
-def _forget(place: Path) -> None:
-    """Remove notes of this machine's processes that are gone."""
+def _forget(place: Path, locked: Collection[str] = ()) -> None:
+    """Remove notes of runs that are gone: of this machine, and those on folders that are locked by this process."""
     for path, note in _notes(place):
-        if note["host"] == this_host() and not _is_alive(note):
+        gone = note["host"] == this_host() and not _is_alive(note)
+        if gone or not {*note["folders"]}.isdisjoint(locked):
             path.unlink(missing_ok=True)
 
 
@@ -174,14 +170,7 @@ def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def _is_alive(note: dict[str, Any]) -> bool:
-    import psutil
-
-    try:
-        process = psutil.Process(note["pid"])
-        same = abs(process.create_time() - note["start"]) < SAME_START
-        return same and process.status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False
+    return lives(note["pid"], note["start"])
 
 
 def _running_in(place: Path) -> int | None:
@@ -192,7 +181,7 @@ def _running_in(place: Path) -> int | None:
     family = {own.pid, *(process.pid for process in own.parents())}
     for process in psutil.process_iter():
         try:
-            if process.pid in family or process.status() == psutil.STATUS_ZOMBIE:
+            if process.pid in family or not lives(process.pid):
                 continue
             if Path(process.cwd()) != place.resolve():
                 continue

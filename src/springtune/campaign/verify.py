@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..jobs import atomic, records, sealed
-from ..jobs.damage import ASIDE
+from ..jobs.damage import ASIDE, rename
 from ..jobs.guard import LIMITS_TOLD
 from ..jobs.keys import installed
 from ..jobs.spent import Spent
@@ -124,7 +124,7 @@ def set_aside(found: Files) -> list[Path]:
     """
     paths = [Path(why.removesuffix(records.DAMAGED)) for why in found.faults.values() if why.endswith(records.DAMAGED)]
     for path in paths:
-        path.replace(path.with_name(path.name + ASIDE))
+        rename(path)
     return paths
 
 
@@ -164,7 +164,7 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
         atomic.write_text(config, root.attrs["config"])
         study = load_study(config, beside)
         # What was lost to limits would take as much again.
-        held = [scene for scene in study.scenes if LIMITS_TOLD not in str(root.message.sel(_labels(scene)).item())]
+        held = [scene for scene in study.scenes if LIMITS_TOLD not in str(root.message.sel(scene.labels).item())]
         drawn = random.Random(seed).sample(held, min(number, len(held)))
         part = _part(study, drawn)
         made = _made(part, Path(temporary) / "results" / study.name)
@@ -214,16 +214,8 @@ def _made(study: "Study", folder: Path) -> "xr.Dataset":
     return found
 
 
-def _labels(scene: "SceneSpec") -> dict[str, str | float]:
-    return {
-        "beam": scene.mesh.beam.name, "mesh_type": scene.mesh.mesh_type, "mesh_size": scene.mesh.mesh_size,
-        "material": scene.material.name, "load": scene.load, "definition": scene.definition,
-        "kinematics": scene.kinematics,
-    }  # fmt: skip
-
-
 def _compared(scene: "SceneSpec", before: "xr.Dataset", after: "xr.Dataset", limit: float) -> Again:
-    labels = _labels(scene)
+    labels = scene.labels
     cells = [data.sel({name: label for name, label in labels.items() if name in data.dims}) for data in (before, after)]
     differences = [0.0]
     for name in COMPARED:

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from .processes import lives
+
 UNFINISHED = ".unfinished"
 """Ending of the name of a file that is being written, after its own and the number of the process that writes it."""
 
@@ -69,15 +71,8 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
 
 def _is_written(name: str) -> bool:
     """Whether the process that writes an unfinished file lives."""
-    import psutil  # here: hardly ever is there such a file
-
-    try:
-        # What nobody waits for stays in the list of processes: a container may have nobody.
-        return psutil.Process(int(name.removesuffix(UNFINISHED).rpartition(".")[2])).status() != psutil.STATUS_ZOMBIE
-    except (ValueError, OverflowError, psutil.NoSuchProcess):
-        return False
-    except psutil.AccessDenied:
-        return True
+    number = name.removesuffix(UNFINISHED).rpartition(".")[2]
+    return number.isdecimal() and lives(int(number))
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
@@ -119,27 +114,13 @@ def write_json(path: str | Path, content: Any) -> None:
     path : str or Path
     content : object
         Dicts, lists, numbers and texts.
-    """
-    write_text(path, json.dumps(content, indent=1) + "\n")
-
-
-def read_json(path: str | Path) -> Any:
-    """Content of a JSON file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    object
 
     Examples
     --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_json(Path(folder) / "note.json", {"seconds": 0.25})
-    ...     read_json(Path(folder) / "note.json")
+    ...     json.loads((Path(folder) / "note.json").read_text())
     {'seconds': 0.25}
     """
-    return json.loads(Path(path).read_text())
+    write_text(path, json.dumps(content, indent=1) + "\n")

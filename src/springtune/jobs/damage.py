@@ -26,6 +26,24 @@ class DamagedError(Exception):
         self.path, self.whole = Path(path), whole
 
 
+def rename(path: Path) -> Path:
+    """Give a damaged file the name under which it is kept.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Path
+        That name.
+    """
+    aside = path.with_name(path.name + ASIDE)
+    with suppress(FileNotFoundError):  # another job was quicker
+        path.replace(aside)
+    return aside
+
+
 def set_aside(error: DamagedError) -> None:
     """Give a damaged file another name and say so; what it held is computed again.
 
@@ -37,8 +55,5 @@ def set_aside(error: DamagedError) -> None:
     """
     told = "computed again"
     if error.path.exists() and not error.whole:
-        aside = error.path.with_name(error.path.name + ASIDE)
-        with suppress(FileNotFoundError):  # another job was quicker
-            error.path.replace(aside)
-        told = f"set aside as {aside.name}, and computed again"
+        told = f"set aside as {rename(error.path).name}, and computed again"
     print(f"{error}; {told}", file=sys.stderr)

@@ -30,7 +30,7 @@ PACKAGE = Path(__file__).parents[1]
 
 CARRIED = {
     ("browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
-    ("jobs/atomic.py", "psutil"): "it says which processes live",
+    ("jobs/processes.py", "psutil"): "it says which processes live",
     ("jobs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
     ("mesh/formats.py", "meshio"): "so do the meshes between two stages; where a study's own file is read it counts",
@@ -261,8 +261,8 @@ def modules(*names: str) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> [Path(file).name for file in modules("jobs.atomic")]
-    ['atomic.py']
+    >>> [Path(file).name for file in modules("jobs.hashing")]
+    ['hashing.py']
     """
     return tuple(sorted({str(file) for name in names for file in OURS.closure(_module(name)).files}))
 

@@ -55,7 +55,8 @@ def main(tasks: str, done: str, digest: str) -> None:
         raise SystemExit(
             f"{tasks}: not what this job is to do; call the same command again, it writes it anew (without --no-hooks)"
         )
-    if os.environ.get(STATE, source_state()) != source_state():
+    began_with = os.environ.get(STATE)
+    if began_with and began_with != source_state():
         raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
     _run(note, done, Path(tasks).parents[1])
 

@@ -83,8 +83,8 @@ class Spent:
                 return None
             return hole(why)
 
-    def add(self, kind: str, units: float, seconds: float) -> None:
-        """Count a task.
+    def add(self, kind: str, units: float, seconds: float, count: int = 1) -> None:
+        """Count tasks.
 
         Parameters
         ----------
@@ -92,9 +92,11 @@ class Spent:
         units : float
             Its particles, or what else its cost grows with.
         seconds : float
+        count : int, optional
+            Tasks of which these are the sums.
         """
         sums = self.sums[kind]
-        sums[0] += 1
+        sums[0] += count
         sums[1] += units
         sums[2] += seconds
 

@@ -83,6 +83,19 @@ class SceneSpec:
     kinematics: str
 
     @property
+    def labels(self) -> dict[str, str | float]:
+        """Its cell of the dataset: a label of each dimension."""
+        return {
+            "beam": self.mesh.beam.name,
+            "mesh_type": self.mesh.mesh_type,
+            "mesh_size": self.mesh.mesh_size,
+            "material": self.material.name,
+            "load": self.load,
+            "definition": self.definition,
+            "kinematics": self.kinematics,
+        }
+
+    @property
     def name(self) -> str:
         """Readable name, unique in a study."""
         return f"{self.mesh.name}_{self.material.name}_{self.load}_{self.definition}_{self.kinematics}"

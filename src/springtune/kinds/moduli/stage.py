@@ -35,8 +35,7 @@ def run(tasks, spent):
             continue
         if isinstance(mesh, dict):
             store.add(path, {one["key"]: mesh for one in missing})
-            for _ in missing:
-                spent.add(REFUSED, 0, 0.0)
+            spent.add(REFUSED, 0, 0.0, len(missing))
             continue
         moduli = MeshModuli(mesh)
         with store.Keeper(path) as keeper:

@@ -162,8 +162,7 @@ def _scenes(study, folder, root, block, fields, objections):
             why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]
             if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
                 values["message"] = "; ".join(filter(None, (values.get("message"), why)))
-            labels = {"material": scene.material.name, "load": scene.load, "definition": scene.definition}
-            labels |= {"kinematics": scene.kinematics, **_mesh_labels(mesh)}
+            labels = scene.labels
             root.put(values, **labels)
             if LOADS[scene.load].kind.pressed:
                 block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **labels)

@@ -44,8 +44,7 @@ def run(tasks, spent):
         refused = stored_mesh.refusal(tasks["meshes"], family["name"])
         if refused:
             store.add(path, {curve["key"]: _hole(curve, **refused) for curve in missing})
-            for _ in missing:
-                spent.add(stored_mesh.REFUSED, 0, 0.0)
+            spent.add(stored_mesh.REFUSED, 0, 0.0, len(missing))
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
         sheet = Sheet(mesh, 1.0)  # curves know stiffnesses alone

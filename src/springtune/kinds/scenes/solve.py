@@ -48,8 +48,7 @@ def run(tasks, spent):
         if refused:
             holes = {name: _hole(**refused) for name in missing if name not in present}
             store.add(path, holes | {kept[name]: {} for name in missing if name in kept})
-            for _ in missing:
-                spent.add(stored_mesh.REFUSED, 0, 0.0)
+            spent.add(stored_mesh.REFUSED, 0, 0.0, len(missing))
             continue
         mesh = stored_mesh.read(tasks["meshes"], family["name"])
         fields = References(tasks["references"], mesh)

@@ -81,7 +81,9 @@ def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
         known = read_notes(folder, name)
         if known["key"] != key or known.get("limits", limits) != limits:
             return False
-        return "message" in known or (path.exists() and _checked(path, notes) == path)
+        if "message" not in known and path.exists():
+            _checked(path, known["checksum"])
+        return "message" in known or path.exists()
     except DamagedError as error:
         set_aside(error)
         return False
@@ -146,13 +148,13 @@ def read(folder: str | Path, name: str) -> Mesh:
     DamagedError
         If it is not there, or not what was written.
     """
-    return read_mesh(_checked(*files(folder, name)))
+    path, _ = files(folder, name)
+    _checked(path, read_notes(folder, name)["checksum"])
+    return read_mesh(path)
 
 
-def _checked(path: Path, notes: Path) -> Path:
-    wanted = sealed.demand(notes)["checksum"]
+def _checked(path: Path, wanted: str) -> None:
     if not path.exists():
         raise DamagedError(path, "it is missing")
     if checksum(path) != wanted:
         raise DamagedError(path, "its checksum is not that of its content")
-    return path

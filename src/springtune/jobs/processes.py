@@ -1,0 +1,32 @@
+"""Which processes live."""
+
+SAME_START = 2.0
+"""Seconds by which two readings of a process's start may differ, since the clock may be set."""
+
+
+def lives(pid: int, start: float | None = None) -> bool:
+    """Whether a process lives.
+
+    Parameters
+    ----------
+    pid : int
+        Its number.
+    start : float, optional
+        When it began, seconds since the epoch; a number is given to others when its process is gone.
+
+    Returns
+    -------
+    bool
+        False for what nobody waits for and stays in the list of processes: a container may have nobody.
+    """
+    import psutil  # here: hardly ever is there something to ask
+
+    try:
+        process = psutil.Process(pid)
+        if start is not None and abs(process.create_time() - start) >= SAME_START:
+            return False
+        return process.status() != psutil.STATUS_ZOMBIE
+    except (OverflowError, ValueError, psutil.NoSuchProcess):
+        return False
+    except psutil.AccessDenied:
+        return True
