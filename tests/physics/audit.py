@@ -268,7 +268,7 @@ def solve(scene, mesh, force, stiffness):
         "reference": None,
         "stiffness": stiffness,
     }
-    return solve_scene(Sheet(mesh, scene.thickness), task, keep_fields=True)
+    return solve_scene(Sheet(mesh, scene.thickness), task | {"keep_fields": True})
 
 
 def audit(scene, path=True):

@@ -139,9 +139,9 @@ class TestExpansion:
     def test_names(self, load):
         study = load(changed(("[2 mm, 5 mm]", "[0.5 mm, 5 mm]")))
         assert study.meshes[0].name == "long_structured_0.5mm"
-        assert study.scenes[0].name == "long_structured_0.5mm_steel_traction_paper_nonlinear"
-        for items in (study.meshes, study.scenes):
-            assert len({item.name for item in items}) == len(items)
+        assert study.name_of(study.scenes[0]) == "long_structured_0.5mm_steel_traction_paper_nonlinear"
+        assert len({mesh.name for mesh in study.meshes}) == len(study.meshes)
+        assert len({study.name_of(scene) for scene in study.scenes}) == len(study.scenes)
 
     def test_stiffness_ratios(self, load):
         assert len(load(SMALL).stiffness_ratios) == 61
@@ -236,8 +236,8 @@ def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, ask
         axes = [grid["beam"], grid["mesh_type"], sizes]
         axes += [grid[name] for name in ("material", "load", "definition", "kinematics")]
         expected |= {"_".join(labels) for labels in itertools.product(*axes)}
-    names = [scene.name for scene in study.scenes]
-    calibrating = {scene.name for scene in study.grids[-1].scenes}
+    names = [study.name_of(scene) for scene in study.scenes]
+    calibrating = {study.name_of(scene) for scene in study.grids[-1].scenes}
     assert set(names) == expected | calibrating
     for items in (study.meshes, study.scenes, study.curves, study.references):
         assert len(set(items)) == len(items)
@@ -534,9 +534,9 @@ REFUSED = {
         (PULL_FORCE, "force: {}"),
         "study.yaml:21: grids.pull.force: no force at all; give one for each beam",
     ),
-    "list of forces": (
-        (PULL_FORCE, "force: [1 N]"),
-        "study.yaml:21: grids.pull.force: a list instead of a force such as",
+    "list of lengths for forces": (
+        (PULL_FORCE, "force: [1 N, 2 mm]"),
+        "study.yaml:21: grids.pull.force[1]: '2 mm' is a length; give a force such as",
     ),
     "two forces": (
         ("load: compression\n    force: 20 kN", "load: traction\n    force: 30 kN"),
@@ -560,7 +560,7 @@ REFUSED = {
     ),
     "mesh sizes in a mapping": (
         ("[2 mm, 5 mm]", "{a: 2 mm}"),
-        "grids.pull.mesh_size: a mapping instead of a value or a list",
+        "grids.pull.mesh_size: a mapping instead of a length such as '5 mm', a list, or a range",
     ),
     "unknown mesh type": (
         ("[structured, free]", "[structured, fre]"),

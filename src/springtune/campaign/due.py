@@ -136,11 +136,19 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
     code = [stage_key("campaign.collect")]
     code += [stage_key(f"kinds.{name}.{part}") for name in KINDS for part in ("kind", "collect")]
     code += [stage_key(made.collect) for made in collected]
-    about = [study.name, study.title, study.axes, study.stiffness_ratios, study.further_references, study.calibration]
+    about = [
+        study.name,
+        study.title,
+        study.axes,
+        study.swept,
+        study.stiffness_ratios,
+        study.further_references,
+        study.calibration,
+    ]
     # What is stored of a scene knows neither its labels nor its beam's.
-    of_scenes = [[scene.name, scene.force] for scene in study.scenes]
+    of_scenes = [[study.name_of(scene), scene.force] for scene in study.scenes]
     bodies = {scene.mesh.beam for scene in study.scenes}, {scene.material for scene in study.scenes}
-    named = [sorted((_plain(one) for one in group), key=lambda one: str(one["name"])) for group in bodies]
+    named = [sorted((_plain(one) for one in group), key=str) for group in bodies]
     parts = {name: _plain(part) for name, part in study.parts.items() if name != "scenes"}
     printed = [_plain(cell) for cell in study.printed]
     stages = [job.digest for job in plan.jobs.values()]

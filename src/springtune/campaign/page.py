@@ -15,7 +15,7 @@ from ..output.tables import csv_text, decimals, number
 ANSWERED = ("solved", "unstable", "linear_only")
 """Statuses of networks that have a displacement."""
 
-COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N"}
+COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa"}
 """Units at the ends of the names of columns, as they are written."""
 
 
@@ -57,7 +57,8 @@ def _beams(root: xr.Dataset) -> list[str]:
     for name in root.beam.values if "beam_length" in root else []:
         one = root.sel(beam=name)
         sides = [1e3 * float(one[f"beam_{side}"]) for side in ("length", "height")]
-        thick = 1e3 * float(one.beam_thickness) if "beam_thickness" in one else np.nan
+        told = "beam_thickness" in one and one.beam_thickness.ndim == 0  # else it is swept
+        thick = 1e3 * float(one.beam_thickness) if told else np.nan
         said = name == f"{sides[0]:g}x{sides[1]:g}"  # as "200x40"
         if np.isfinite(sides).all() and (not said or np.isfinite(thick)):
             text = f"{name} mm" if said else f"{name}, {sides[0]:.4g} x {sides[1]:.4g} mm"
@@ -80,16 +81,26 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
             errors.append(row.get(f"{name}_error_percent", np.nan))
     places = decimals(displacements), _of_errors(errors)
     marks: set[str] = set()
-    lines = [line for row in rows for line in _lines(row, definitions, there, places, marks)]
+    swept = {name: _short([row[name] for row in rows]) for name in table["swept"]}
+    lines = []
+    for place, row in enumerate(rows):
+        own = [texts[place] for texts in swept.values()]
+        lines += [line | {"swept": own} for line in _lines(row, definitions, there, places, marks)]
     return dict(table) | {
         "lines": lines,
         "kinematics": there,
         "printed": any(row["printed_displacement_mm"] == row["printed_displacement_mm"] for row in rows),
-        "stiffness": list(_stiffnesses(rows[0], definitions, there)),
+        "heads": [_head(name) for name in table["swept"]],
+        "stiffness": list(_stiffnesses(rows, definitions, there)),
         "objections": _objections(rows, there),
         "remarks": [f"{row['beam']}, {row['mesh_size_mm']:g} mm: {row['remark']}" for row in rows if row["remark"]],
         "marks": marks,
     }
+
+
+def _short(values: list[float]) -> list[str]:
+    """Texts of values as a study says them."""
+    return [f"{value:.6g}" for value in values]
 
 
 def _of_errors(values: list[float]) -> int:
@@ -143,11 +154,16 @@ def _lines(
         }  # fmt: skip
 
 
-def _stiffnesses(row: Mapping[str, Any], definitions: list[str], kinematics: list[str]) -> Iterable[str]:
+def _stiffnesses(rows: list[Mapping[str, Any]], definitions: list[str], kinematics: list[str]) -> Iterable[str]:
     """Uniform stiffnesses of the networks of a table."""
     for definition in definitions:
-        found = {name: row.get(f"{definition}_{name}_stiffness_N_per_m", np.nan) for name in kinematics}
-        texts = {name: f"{value:.4g}" for name, value in found.items() if np.isfinite(value)}
+        texts = {}
+        for name in kinematics:
+            found = [row.get(f"{definition}_{name}_stiffness_N_per_m", np.nan) for row in rows]
+            known = sorted(value for value in found if np.isfinite(value))
+            ends = list(dict.fromkeys(f"{value:.4g}" for value in known[:1] + known[-1:]))
+            if ends:
+                texts[name] = " to ".join(ends)
         if len(set(texts.values())) == 1:
             yield f"{definition}: k = {next(iter(texts.values()))} N/m"
         else:

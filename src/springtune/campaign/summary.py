@@ -14,6 +14,7 @@ import numpy as np
 
 from ..jobs.damage import ASIDE
 from ..output.text import aligned, without_numbers
+from ..problem.parameters import SWEPT, with_unit
 from ..problem.status import Status
 from .plan import Plan
 from .workload import clock, computed, keys_of
@@ -112,6 +113,8 @@ def _label(axis: "xr.DataArray", number: int) -> str:
     value = axis.values[number]
     if isinstance(value, str):
         return value
+    if axis.name in SWEPT:
+        return with_unit(str(axis.name), value)
     if axis.attrs.get("units") == "m":
         return f"{1e3 * value:g} mm"
     unit = axis.attrs.get("units", "1")

@@ -25,6 +25,7 @@ from .plan import plan
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..output.dataset import Label
     from ..study.model import CurveSpec, SceneSpec, Study
 
 COMPARED = ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement")
@@ -164,14 +165,16 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
         atomic.write_text(config, root.attrs["config"])
         study = load_study(config, beside)
         # What was lost to limits would take as much again.
-        held = [scene for scene in study.scenes if LIMITS_TOLD not in str(root.message.sel(scene.labels).item())]
+        held = [scene for scene in study.scenes if LIMITS_TOLD not in str(root.message.sel(study.labels(scene)).item())]
         drawn = random.Random(seed).sample(held, min(number, len(held)))
         part = _part(study, drawn)
         made = _made(part, Path(temporary) / "results" / study.name)
     software = json.loads(root.attrs["software"])
     same = all(installed(name) == version for name, version in software.items() if name != "python")
     for scene in part.scenes:
-        yield _compared(scene, root, made, SAME_SOFTWARE if same else OTHER_SOFTWARE)
+        yield _compared(
+            study.name_of(scene), study.labels(scene), root, made, SAME_SOFTWARE if same else OTHER_SOFTWARE
+        )
 
 
 def _part(study: "Study", scenes: "list[SceneSpec]") -> "Study":
@@ -214,8 +217,7 @@ def _made(study: "Study", folder: Path) -> "xr.Dataset":
     return found
 
 
-def _compared(scene: "SceneSpec", before: "xr.Dataset", after: "xr.Dataset", limit: float) -> Again:
-    labels = scene.labels
+def _compared(name: str, labels: "dict[str, Label]", before: "xr.Dataset", after: "xr.Dataset", limit: float) -> Again:
     cells = [data.sel({name: label for name, label in labels.items() if name in data.dims}) for data in (before, after)]
     differences = [0.0]
     for name in COMPARED:
@@ -227,4 +229,4 @@ def _compared(scene: "SceneSpec", before: "xr.Dataset", after: "xr.Dataset", lim
             size = 1.0 if name.endswith("error") else max(abs(old), abs(new))
             differences.append(abs(new - old) / size)
     old_status, new_status = (str(Status(int(cell.status))) for cell in cells)
-    return Again(scene.name, old_status, new_status, max(differences), limit)
+    return Again(name, old_status, new_status, max(differences), limit)

@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ..jobs.atomic import replacing
+from ..problem.parameters import SWEPT
 from ..problem.status import Status
 
 STATUS = tuple(map(str, Status))
@@ -27,6 +28,7 @@ DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "load": "load",
     "definition": "definition of the spring stiffness",
     "kinematics": "kinematics of the network",
+    **SWEPT,
 }
 """Dimensions that groups share: what they are, and their unit if they have one."""
 
@@ -92,6 +94,28 @@ class Group:
                 values = values.astype(object)
             coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
         return xr.Dataset(data, coordinates)
+
+    def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
+        """Group whose variables have further dimensions.
+
+        Parameters
+        ----------
+        further : dict of str to sequence of str
+            Dimensions that a variable gets, by its name: after those that groups share, before its own.
+        without : collection of str
+            Variables that are left out.
+
+        Returns
+        -------
+        Group
+        """
+        variables = {}
+        for name, (dimensions, units, long_name, nothing) in self.variables.items():
+            shared = [one for one in dimensions if one in DIMENSIONS]
+            own = [one for one in dimensions if one not in DIMENSIONS]
+            if name not in without:
+                variables[name] = (*shared, *further.get(name, ()), *own), units, long_name, nothing
+        return replace(self, variables=variables)
 
 
 class Filler:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from ..problem.geometry import beam_label
+from ..problem.parameters import SWEPT, shown_order
 
 if TYPE_CHECKING:
     from .dataset import Label
@@ -86,6 +87,65 @@ def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label 
             kept = np.arange(there.shape[axis]) == labels[name].index(chosen[name])
             there = there & np.expand_dims(kept, tuple(one for one in range(there.ndim) if one != axis))
     return chosen
+
+
+def last_swept(present: xr.DataArray) -> dict[str, xr.DataArray]:
+    """Of what a study sweeps, the last values that each beam, material and load has.
+
+    A figure that shows no sweep shows these: the largest force, under it the largest thickness, and so on.
+
+    Parameters
+    ----------
+    present : xarray.DataArray of bool
+        Cells that the study has.
+
+    Returns
+    -------
+    dict of str to xarray.DataArray
+        Value of each dimension that is swept, over ``beam, material, load`` as far as these are dimensions; nothing
+        where nothing is swept. `springtune.output.selection.at` takes it.
+    """
+    names = [str(name) for name in present.dims if name in SWEPT]
+    if not names:
+        return {}
+    kept = [name for name in ("beam", "material", "load") if name in present.dims]
+    there = present.any([name for name in present.dims if name not in (*kept, *names)]).transpose(*kept, *names)
+    # What is shown rather than others comes last.
+    there = there.isel({name: np.argsort(shown_order(name, there[name].values), kind="stable") for name in names})
+    shape = there.shape[len(kept) :]
+    flat = there.values.reshape(*there.shape[: len(kept)], -1)
+    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), shape)
+    coordinates = {name: there[name].values for name in kept}
+    return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
+
+
+def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
+    """Dataset at values of what is swept, each beam, material and load at its own.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    values : dict of str to xarray.DataArray
+        As `last_swept` gives them.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without these dimensions; a force that was one is a variable, as where nothing is swept.
+    """
+    chosen = {name: value for name, value in values.items() if name in data.dims}
+    if not chosen:
+        return data
+    found = data.sel(chosen)
+    own = {name: (("material",) if name.startswith("material") else ("beam",)) for name in BODIES if name in found}
+    for name, dimensions in own.items():  # what belongs to a body is the same under all loads, but for what is swept
+        others = [one for one in found[name].dims if one not in dimensions]
+        found[name] = found[name].isel(dict.fromkeys(others, -1), drop=True) if others else found[name]
+    return found.reset_coords([name for name in chosen if name in found.coords])
+
+
+BODIES = ("material_young_modulus", "material_poisson_ratio", "beam_thickness")
+"""Variables of bodies that may depend on what is swept."""
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:

@@ -15,6 +15,7 @@ from .config import StudyConfig, expected_value, json_schema, sections, study_mo
 from .expand import Declared, build, expand, files_of_meshes
 from .messages import Key, Problems, StudyError, show
 from .model import CurveSpec, MeshSpec, Reference, SceneSpec, Study, StudyKind
+from .rows import with_rows
 from .yaml_lines import read_study
 
 __all__ = [
@@ -61,16 +62,17 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
     problems = Problems(file, lines)
+    content = with_rows(content, beside, problems)
     config = _validate(study_model(kinds), content, problems)
     check_names(config, problems)
-    check_counts(config, problems)
+    check_counts(config, content, problems)
     for kind in kinds:
         kind.check(config, problems)
     problems.stop()
-    check_meshes(config, content, problems)
-    problems.stop()
     mesh_files = files_of_meshes(config, beside, problems)
     grids = expand(config, mesh_files, problems)
+    check_meshes(config, content, grids, problems)
+    problems.stop()
     check_definitions(config, content, grids, problems)
     problems.stop()
     printed_path = beside / config.printed if config.printed else None

@@ -1,8 +1,10 @@
 """Whether the values of a study go together."""
 
 import math
+import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ..mesh import MESH_TYPES
@@ -10,18 +12,22 @@ from ..problem.loads import LOADS
 from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
+from .combinations import check_groups, count
 from .config import PLAUSIBLE, StatedStiffness, StudyConfig
 from .messages import Key, Problems
-from .model import CurveSpec, Grid, MeshSpec, Reference, SceneSpec
+from .model import CurveSpec, Grid, MeshSpec, Reference, SceneSpec, swept_value
 
 MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""
 
 
-MOST_SCENES = 250_000
-"""Most scenes of a study, those that grids share counted in each: more take gigabytes before anything runs."""
+MOST_SCENES = 1_000_000
+"""Most scenes of a study, those that grids share counted in each, unless `MOST_NAMED` says more."""
 
-MOST_CELLS = 10 * MOST_SCENES
+MOST_NAMED = "SPRINGTUNE_MAX_SCENES"
+"""Variable of the environment with another number; `springtune run` sets it for its jobs."""
+
+MOST_CELLS = 2_500_000
 """Most cells of a dataset: combinations of labels of all its dimensions, whether or not a grid asks for them."""
 
 MOST_CURVE_POINTS = 10_000_000
@@ -80,23 +86,47 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
         problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
 
 
-def check_counts(config: StudyConfig, problems: Problems) -> None:
-    """How many scenes grids have, before they are expanded."""
+def most_scenes() -> int:
+    """Most scenes of a study.
+
+    Raises
+    ------
+    ValueError
+        If the environment gives something else than a whole number above zero.
+    """
+    text = os.environ.get(MOST_NAMED, str(MOST_SCENES))
+    try:
+        found = int(float(text))
+    except (ValueError, OverflowError):
+        found = 0
+    if found < 1:
+        raise ValueError(f"{MOST_NAMED}: '{text}' is not a number of scenes; give one such as 2000000, or none")
+    return found
+
+
+def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problems) -> None:
+    """How many scenes grids have, before they are expanded, and whether what goes together has as many values."""
+    for name, grid in config.grids.items():
+        check_groups(name, grid, content["grids"][name], problems)
+    problems.stop()
+    try:
+        most = most_scenes()
+    except ValueError as error:
+        problems.add((), str(error))
+        problems.stop()
     before = 0
     for name, grid in config.grids.items():
-        lists = {label: len(getattr(grid, label)) for label in SCENE_LISTS}
-        count = math.prod(lists.values())
-        if before + count > MOST_SCENES:
-            shown = " x ".join(f"{size} {label}" for label, size in lists.items() if size > 1)
+        number, lengths = count(grid)
+        if before + number > most:
+            shown = " x ".join(f"{size} {label}" for label, size in lengths.items() if size > 1)
             beside = f" beside {before} of the grids above" if before else ""
-            most = f"a study has at most {MOST_SCENES}"
-            problems.add(("grids", name), f"{_counted(count)} scenes ({shown}){beside}; {most}: {FEWER}")
+            more = f"or allow more by 'springtune run --max-scenes', or by {MOST_NAMED} in the environment"
+            problems.add(
+                ("grids", name),
+                f"{_counted(number)} scenes ({shown}){beside}; a study has at most {most}: {FEWER}, {more}",
+            )
             return
-        before += count
-
-
-SCENE_LISTS = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
-"""Lists of a grid whose product are its scenes."""
+        before += number
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
@@ -124,10 +154,12 @@ def check_cells(
     meshes: Iterable[MeshSpec],
     scenes: Iterable[SceneSpec],
     curves: Iterable[CurveSpec],
+    swept: Iterable[str],
     problems: Problems,
 ) -> None:
     """How large the dataset becomes: each combination of labels has a cell, whichever grid has which label."""
-    lists: dict[str, set[object]] = {label: set() for label in SCENE_LISTS}
+    labels = "beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics"
+    lists: dict[str, set[object]] = {label: set() for label in (*labels, *swept)}
     for mesh in meshes:
         lists["beam"].add(mesh.beam.name)
         lists["mesh_type"].add(mesh.mesh_type)
@@ -136,14 +168,17 @@ def check_cells(
         lists["material"].add(scene.material.name)
         for label in ("load", "definition", "kinematics"):
             lists[label].add(getattr(scene, label))
+        for label in swept:
+            lists[label].add(swept_value(scene, scene.mesh.beam, label))
     shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
     cells = math.prod(map(len, lists.values()))
     if cells > MOST_CELLS:
         most = f"a dataset has at most {MOST_CELLS}"
         problems.add(("grids",), f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}")
-    points = cells // len(lists["definition"]) * config.sensitivity.points
+    once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))
+    points = once * config.sensitivity.points
     if any(True for _ in curves) and points > MOST_CURVE_POINTS:
-        of = f"{config.sensitivity.points} on each of {cells // len(lists['definition'])} curves"
+        of = f"{config.sensitivity.points} on each of {once} curves"
         most = f"give at most {MOST_CURVE_POINTS}, or set sensitivity: false in grids that need no curves"
         problems.add(("sensitivity", "points"), f"{_counted(points)} points, {of}; {most}")
 
@@ -172,24 +207,31 @@ def mesh_type_names(config: StudyConfig) -> list[str]:
     return [*MESH_TYPES, *(config.mesh_files or ())]
 
 
-def check_meshes(config: StudyConfig, content: dict[str, Any], problems: Problems) -> None:
+def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[Grid], problems: Problems) -> None:
     """Mesh sizes against the beams they are for."""
-    for name, grid in config.grids.items():
-        if not any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type):
-            continue
+    for expanded in grids:
+        name, grid = expanded.name, config.grids[expanded.name]
+        made = {(scene.mesh.mesh_size, scene.mesh.beam.name) for scene in expanded.scenes if scene.mesh.file is None}
         written = content["grids"][name]["mesh_size"]
         for number, size in enumerate(grid.mesh_size):
-            shown = f"'{written[number]}'" if isinstance(written, list) else f"'{written}'"
-            path = ("grids", name, "mesh_size", number) if isinstance(written, list) else ("grids", name, "mesh_size")
-            for beam in grid.beam:
+            listed = isinstance(written, list)
+            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else _in_mm(size)
+            path = ("grids", name, "mesh_size", number) if listed else ("grids", name, "mesh_size")
+            for beam in dict.fromkeys(grid.beam):
+                if (size, beam) not in made:
+                    continue
                 length, height = config.beams[beam].length, config.beams[beam].height
                 if size > min(length, height):
-                    side = f"{1e3 * min(length, height):g} mm"
+                    side = _in_mm(min(length, height))
                     problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
                 elif length * height / (COEFFICIENT * size**2) > MOST_PARTICLES:
                     particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
                     least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.2g} mm"
                     problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
+
+
+def _in_mm(length: float) -> str:
+    return f"{1e3 * length:g} mm"
 
 
 def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
@@ -263,13 +305,14 @@ def check_files(
     """Different things must not share a name: names become files."""
     parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
     pairs = {(reference.beam.name, reference.material.name) for reference in references}
+    flat = {replace(mesh, beam=replace(mesh.beam, thickness=1.0)) for mesh in meshes}
     sizes = {mesh.mesh_size for mesh in meshes}
     boxes = {(mesh.beam.length, mesh.beam.height) for mesh in meshes}
     extents = [f"{1e3 * length:g} x {1e3 * height:g} mm" for length, height in boxes]
     for path, what, names, remedy in (
         (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
         (("beams",), "extents of beams", extents, "give these beams the same, names keep six digits"),
-        (("beams",), "meshes", [mesh.name for mesh in meshes], "rename a beam"),
+        (("beams",), "meshes", [mesh.name for mesh in flat], "rename a beam"),
         (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
         (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
     ):

@@ -15,10 +15,12 @@ from .fields import (
     Density,
     FileName,
     Flag,
-    Force,
+    Forces,
     FurtherReference,
+    Groups,
     Kinematics,
     Length,
+    Lengths,
     LimitSeconds,
     Load,
     MaterialName,
@@ -29,9 +31,13 @@ from .fields import (
     PerBeam,
     Points,
     PoissonRatio,
+    PoissonRatios,
     Ratio,
+    Ratios,
+    Sections,
     Stiffness,
     Stress,
+    Stresses,
     Text,
     one_of,
 )
@@ -45,11 +51,11 @@ PLAUSIBLE = 20.0
 def expected_value(field: FieldInfo) -> str:
     """Words for what a field of a section expects, e.g. ``a length such as '200 mm'``."""
     for note in field.metadata:
+        if hasattr(note, "words"):
+            return note.words
         if isinstance(note, OneOrMore):
             item = get_args(field.annotation)[0]
             return f"{get_args(item)[1].words}, or a list"
-        if hasattr(note, "words"):
-            return note.words
     listed = get_origin(field.annotation) is list
     text = next((note.words for part in get_args(field.annotation) for note in get_args(part)[1:]), None)
     return text or ("a list of sections; see below" if listed else "a section; see below")
@@ -170,34 +176,86 @@ class MeshFileConfig(Section):
     unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
 
 
+PARAMETERS = (
+    "beam",
+    "mesh_type",
+    "mesh_size",
+    "material",
+    "load",
+    "force",
+    "pressure",
+    "thickness",
+    "young_modulus",
+    "poisson_ratio",
+    "stiffness_scale",
+    "definition",
+    "kinematics",
+)
+"""Parameters of a grid: its keys whose values are combined."""
+
+
+class ExcludeConfig(Section):
+    """Combinations that a grid leaves out: those that have one of the values given, of every parameter given."""
+
+    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
+    mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
+    mesh_size: Lengths | None = Field(None, description="Lengths of an edge.")
+    material: Annotated[list[MaterialName], OneOrMore()] | None = Field(None, description="Materials.")
+    load: Annotated[list[Load], OneOrMore()] | None = Field(None, description="Loads.")
+    force: Forces | None = Field(None, description="Magnitudes of the force.")
+    pressure: Stresses | None = Field(None, description="Pressures.")
+    thickness: Lengths | None = Field(None, description="Thicknesses.")
+    young_modulus: Stresses | None = Field(None, description="Young's moduli.")
+    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios.")
+    stiffness_scale: Ratios | None = Field(None, description="Scales of the stiffness.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] | None = Field(None, description="Definitions.")
+    kinematics: Annotated[list[Kinematics], OneOrMore()] | None = Field(None, description="Kinematics.")
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if all(getattr(self, name) is None for name in PARAMETERS):
+            raise refuse("no parameter at all would leave nothing; give values of one such as {mesh_size: 1 mm}")
+        return self
+
+
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
-    A single value stands for a list of one. A scene that two grids ask for is solved once.
+    A single value stands for a list of one. A scene that two grids ask for is solved once. Numbers may be a range, both
+    ends included: `{from: 1 mm, to: 5 mm, points: 9}`, with `spacing: logarithmic` where they are to grow by a factor.
+
+    What a grid says of `thickness`, `young_modulus`, `poisson_ratio` or `stiffness_scale`, and a force that has several
+    values, is a dimension of the dataset, beside `beam`, `mesh_type`, `mesh_size`, `material`, `load`, `definition` and
+    `kinematics`.
     """
 
-    beam: Annotated[list[BeamName], OneOrMore()] = Field(description="Beams, by name.")
-    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(
+    beam: Annotated[list[BeamName], OneOrMore(repeats=True)] = Field(description="Beams, by name.")
+    mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
-        description="Lengths of an edge; at most the smaller side of each beam."
-    )
-    material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
-    load: Annotated[list[Load], OneOrMore()] = Field(
+    mesh_size: Lengths = Field(description="Lengths of an edge; at most the smaller side of each beam.")
+    material: Annotated[list[MaterialName], OneOrMore(repeats=True)] = Field(description="Materials, by name.")
+    load: Annotated[list[Load], OneOrMore(repeats=True)] = Field(
         description="`traction`, `compression`: along x on the right end, `bending`: along y there, the left end "
         "clamped; `shear`: along x on the upper side, which stays level, the lower side clamped; `pressure`, "
         "`follower-pressure`: down on the upper side, the lower side clamped. Spread evenly."
     )
-    force: Annotated[dict[str, Force], PerBeam()] | None = Field(
+    force: Annotated[dict[str, Forces], PerBeam()] | None = Field(
         None,
         description="Magnitude of the force: one for all beams, or one for each. The load's name carries the sign. "
-        "A beam, material and load have the same force in all grids.",
+        "Several make the force a dimension; where no grid has several, a beam, material and load have the same force "
+        "in all grids.",
     )
-    pressure: Stress | None = Field(
+    pressure: Stresses | None = Field(
         None,
         description="Pressure on the upper side, in place of `force`; for loads `pressure` and `follower-pressure`.",
+    )
+    thickness: Lengths | None = Field(None, description="Thicknesses, in place of the beams' own.")
+    young_modulus: Stresses | None = Field(None, description="Young's moduli, in place of the materials' own.")
+    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios, in place of the materials' own.")
+    stiffness_scale: Ratios | None = Field(
+        None, description="Factors on all stiffnesses that a definition gives, its energies' included."
     )
 
     @model_validator(mode="after")
@@ -211,13 +269,28 @@ class GridConfig(Section):
                 raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+    definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)] = Field(
         description="Rules that give every spring its stiffness; `springtune definitions` explains them."
     )
-    kinematics: Annotated[list[Kinematics], OneOrMore()] = Field(
+    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = Field(
         "nonlinear",
         validate_default=True,
         description="Whether springs keep their length law or their tangent at rest.",
+    )
+    zip: Annotated[list[list[str]], Groups(PARAMETERS)] = Field(
+        [],
+        description="Parameters that go together, such as `[mesh_size, force]`: the first value of one with the first "
+        "of the other, and so on, in place of all with all. A list of such lists for several groups.",
+    )
+    exclude: Annotated[list[ExcludeConfig], Sections()] = Field(
+        [],
+        description="Combinations that are left out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several.",
+    )
+    rows: FileName | None = Field(
+        None,
+        description="CSV file of combinations, its path relative to the study's folder: a column a parameter, named as "
+        "its key, a row a combination. A unit stands beside each number (`5 mm`), or in the head (`mesh_size [mm]`). "
+        "What the file has not is combined with each row.",
     )
     sensitivity: Flag = Field(
         "true",

@@ -2,22 +2,34 @@
 
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from ..mesh import MESH_TYPES
 from ..mesh.formats import LARGEST_FILE
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS, LOADS
 from ..problem.materials import Material
+from ..problem.parameters import SWEPT
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
 from .checks import check_cells, check_files, mesh_type_names, stated_rows
+from .combinations import Combination, combinations
 from .config import StudyConfig
-from .messages import Problems
-from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, StudyKind
+from .messages import LONGEST_SHOWN, Problems
+from .model import (
+    FURTHER_REFERENCES,
+    CurveSpec,
+    Grid,
+    MeshFiles,
+    MeshSpec,
+    Reference,
+    SceneSpec,
+    Study,
+    StudyKind,
+    swept_value,
+)
 from .printed import read_printed
 
 Ranks = dict[str, dict[str, int]]
@@ -114,53 +126,113 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
             found += [ranks["mesh_type"][mesh.mesh_type], mesh.mesh_size]
         if not isinstance(item, MeshSpec):
             found += [ranks["material"][item.material.name], ranks["load"][item.load]]
-            for label in ("definition", "kinematics"):
-                if hasattr(item, label):
-                    found.append(ranks[label][getattr(item, label)])
+            if isinstance(item, SceneSpec):
+                found.append(ranks["definition"][item.definition])
+            if not isinstance(item, Reference):
+                found.append(ranks["kinematics"][item.kinematics])
+            found.append(abs(item.force))
+        found.append(beam.thickness)
+        if not isinstance(item, MeshSpec):
+            found += [item.material.young_modulus, item.material.poisson_ratio]
+        if isinstance(item, SceneSpec):
+            found.append(item.stiffness_scale)
         return found
 
     return key
 
 
+def swept(config: StudyConfig) -> tuple[str, ...]:
+    """Parameters that are dimensions: those that a grid gives values of its own, and a force that has several.
+
+    Parameters
+    ----------
+    config : StudyConfig
+
+    Returns
+    -------
+    tuple of str
+        Of `SWEPT`.
+    """
+    found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
+    several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
+    several += [grid.pressure for grid in config.grids.values() if grid.pressure]
+    if any(len(set(values)) > 1 for values in several):
+        found.add("force")
+    return tuple(name for name in SWEPT if name in found)
+
+
+class _Bodies:
+    """Beams, materials and meshes of a study's combinations, each made once."""
+
+    def __init__(self, config: StudyConfig, mesh_files: MeshFiles) -> None:
+        self._declared, self._files = declared(config), mesh_files
+        self._beams: dict[tuple[str, float | None], Beam] = {}
+        self._materials: dict[tuple[str, float | None, float | None], Material] = {}
+        self._meshes: dict[tuple[Beam, str, float], MeshSpec | None] = {}
+
+    def beam(self, one: Combination) -> Beam:
+        """Beam of a combination, its thickness the combination's where that has one."""
+        name, thickness = key = one["beam"], one.get("thickness")
+        if key not in self._beams:
+            beam = self._declared.beams[name]
+            self._beams[key] = beam if thickness is None else replace(beam, thickness=thickness)
+        return self._beams[key]
+
+    def material(self, one: Combination) -> Material:
+        """Material of a combination, with the moduli that it has of its own."""
+        key = one["material"], one.get("young_modulus"), one.get("poisson_ratio")
+        if key not in self._materials:
+            own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
+            self._materials[key] = replace(self._declared.materials[key[0]], **own)
+        return self._materials[key]
+
+    def mesh(self, beam: Beam, one: Combination) -> MeshSpec | None:
+        """Mesh of a combination; None where there is no file for it."""
+        mesh_type, size = one["mesh_type"], one["mesh_size"]
+        key = beam, mesh_type, size
+        if key not in self._meshes:
+            made = mesh_type in MESH_TYPES
+            found = MeshSpec(*key) if made else self._files.get((mesh_type, beam.name, size))
+            # A file is of a beam's extent; its thickness is the combination's.
+            self._meshes[key] = found if found is None or found.beam == beam else replace(found, beam=beam)
+        return self._meshes[key]
+
+
 def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
-    """Grids with their scenes and curves, in canonical order."""
-    order = _order(_ranks(config))
-    beams, materials = declared(config).beams, declared(config).materials
-    forces: dict[tuple[str, str, str], tuple[float, str]] = {}
+    """Grids with their scenes and curves."""
+    bodies, several = _Bodies(config, mesh_files), "force" in swept(config)
+    forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
     for name, grid in config.grids.items():
         scenes: list[SceneSpec] = []
-        curves: list[CurveSpec] = []
+        curves: dict[CurveSpec, None] = {}
         absent = set()
-        for beam, material, load in product(grid.beam, grid.material, grid.load):
-            if grid.pressure is not None:
-                magnitude = grid.pressure * beams[beam].length * beams[beam].thickness
-            else:
-                given = cast("dict[str | None, float]", grid.force)  # see `PerBeam`
-                magnitude = given[beam if beam in given else None]
-            other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
-            if other != magnitude:
-                problems.add(
-                    ("grids", name, "force"),
-                    f"{magnitude:g} N on beam '{beam}' of {material} in {load}, but grid '{other_grid}' has "
-                    f"{other:g} N; give both the same force, or the other one a study of its own",
-                )
-            force = LOADS[load].sign * magnitude
-            for mesh_type, size, kinematics in product(grid.mesh_type, grid.mesh_size, grid.kinematics):
-                mesh = MeshSpec(beams[beam], mesh_type, size)
-                if mesh_type not in MESH_TYPES:
-                    if (mesh_type, beam, size) not in mesh_files:
-                        absent.add((mesh_type, beam, f"{1e3 * size:g} mm"))
-                        continue
-                    mesh = mesh_files[mesh_type, beam, size]
-                common = (mesh, materials[material], load, force)
-                scenes += [SceneSpec(*common, definition, kinematics) for definition in grid.definition]
-                if grid.sensitivity and not LOADS[load].follower:  # k enters as F/k only where forces stay
-                    curves.append(CurveSpec(*common, kinematics))
-        for mesh_type, beam, length in sorted(absent):
-            row = f"{{file: <path>, beam: {beam}, mesh_size: {length}}}"
+        for one in combinations(name, grid, problems):
+            beam, material, load = bodies.beam(one), bodies.material(one), one["load"]
+            magnitude = one["pressure"] * beam.length * beam.thickness if "pressure" in one else one["force"]
+            if not several:
+                other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
+                if other != magnitude:
+                    problems.add(
+                        ("grids", name, "force"),
+                        f"{magnitude:g} N on beam '{beam.name}' of {material.name} in {load}, but grid '{other_grid}' "
+                        f"has {other:g} N; give both the same force, or both forces in a list: force is a dimension "
+                        "then",
+                    )
+            mesh = bodies.mesh(beam, one)
+            if mesh is None:
+                absent.add((one["mesh_type"], beam.name, f"{1e3 * one['mesh_size']:g} mm"))
+                continue
+            common = (mesh, material, load, LOADS[load].sign * magnitude)
+            scenes.append(SceneSpec(*common, one["definition"], one["kinematics"], one.get("stiffness_scale", 1.0)))
+            if grid.sensitivity and not LOADS[load].follower:  # k enters as F/k only where forces stay
+                curves[CurveSpec(*common, one["kinematics"])] = None
+        for mesh_type, beam_name, length in sorted(absent):
+            row = f"{{file: <path>, beam: {beam_name}, mesh_size: {length}}}"
             problems.add(("grids", name, "mesh_size"), f"no file for {length}; add {row} to mesh_files.{mesh_type}")
-        grids.append(Grid(name, tuple(sorted(scenes, key=order)), tuple(sorted(curves, key=order))))
+        if not scenes and not absent:
+            problems.add(("grids", name, "exclude"), "leaves nothing of the grid; exclude less, or remove the grid")
+        grids.append(Grid(name, tuple(scenes), tuple(curves)))
     problems.stop()
     return tuple(grids)
 
@@ -183,6 +255,19 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
     groups: dict[tuple[str, Material], list[tuple[MeshSpec, Material, str, float]]] = {}
     for cell in cells:
         groups.setdefault((cell[0].mesh_type, cell[1]), []).append(cell)
+    for (mesh_type, material), members in groups.items():
+        for what, unit, values in (
+            ("forces", "N", {abs(force) for _, _, _, force in members}),
+            ("thicknesses", "m", {mesh.beam.thickness for mesh, _, _, _ in members}),
+        ):
+            if len(values) > 1 and any((mesh_type, material) == one[:2] for one in needed):
+                listed = ", ".join(f"{value:g} {unit}" for value in sorted(values))
+                problems.add(
+                    ("definitions", "calibrated"),
+                    f"beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name} has "
+                    f"{len(values)} {what} ({_clipped(listed)}), and one stiffness is calibrated; give it one value, "
+                    "or calibrate on a beam or load that is not swept",
+                )
     curves: list[CurveSpec] = []
     for mesh_type, material, kinematics in needed:
         found = [CurveSpec(*cell, kinematics) for cell in groups.get((mesh_type, material), ())]
@@ -194,6 +279,10 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
             )
         curves += found
     return curves
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
 
 
 def build(
@@ -212,10 +301,18 @@ def build(
     references = in_order(Reference(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes)
     check_files(meshes, scenes, references, problems)
     problems.stop()
-    check_cells(config, meshes, scenes, curves, problems)
+    names = swept(config)
+    check_cells(config, meshes, scenes, curves, names, problems)
     problems.stop()
     parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}
-    names = [output.name for kind in kinds for output in kind.outputs]
+    if config.printed and names:
+        problems.add(
+            ("printed",),
+            f"printed cells know no {' or '.join(names)}, which grids sweep; give the sweep a study of its own, or "
+            "remove the key",
+        )
+        problems.stop()
+    made = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     steps = [first + (last - first) * step / (points - 1) for step in range(points)]
     calibrated = config.definitions.calibrated
@@ -225,7 +322,7 @@ def build(
         scenes=scenes,
         curves=in_order(curves),
         references=references,
-        outputs=tuple(name for name in names if name in config.outputs),
+        outputs=tuple(name for name in made if name in config.outputs),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         parts=parts,
         limits={"seconds": config.limits.seconds, "memory": config.limits.memory},
@@ -234,7 +331,8 @@ def build(
         stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
         printed=read_printed(about["printed_path"], mesh_type_names(config), problems) if about["printed_path"] else (),
-        axes=_axes(ranks, meshes, scenes, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
+        axes=_axes(ranks, meshes, scenes, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
+        swept=names,
         **about,
     )
     for output in (output for kind in kinds for output in kind.outputs if output.name in study.outputs):
@@ -249,6 +347,7 @@ def _axes(
     ranks: Ranks,
     meshes: Iterable[MeshSpec],
     scenes: Sequence[SceneSpec],
+    names: Iterable[str],
     further: Iterable[Mapping[str, Collection[str | float]]],
 ) -> dict[str, tuple[str | float, ...]]:
     """Labels of each dimension; groups of a dataset share those that its root has."""
@@ -257,6 +356,7 @@ def _axes(
     used["mesh_type"] = {mesh.mesh_type for mesh in meshes}
     used["material"] = {scene.material.name for scene in scenes}
     used["mesh_size"] = {mesh.mesh_size for mesh in meshes}
+    used |= {name: {swept_value(scene, scene.mesh.beam, name) for scene in scenes} for name in names}
     own = {}
     for labels in further:
         for name, values in labels.items():
@@ -265,4 +365,4 @@ def _axes(
             else:
                 own[name] = values
     axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}
-    return axes | {"mesh_size": tuple(sorted(used["mesh_size"]))} | own
+    return axes | {name: tuple(sorted(used[name])) for name in ("mesh_size", *names)} | own

@@ -144,6 +144,7 @@ Memory = Annotated[
         _read_memory, {"type": "string", "pattern": _MEMORY.pattern, "examples": ["8 GB"]}, "a memory such as '8 GB'"
     ),
 ]
+_COUNT = number(f"a whole number from 2 to {MOST_LISTED}, such as 9", 2, MOST_LISTED, whole=True)
 Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
 FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
@@ -152,17 +153,25 @@ MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a mat
 
 
 class OneOrMore:
-    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
+    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one.
+
+    Parameters
+    ----------
+    repeats : bool, optional
+        Whether a value may be listed twice, as one of parameters that are zipped may; who allows it checks the others.
+    """
+
+    def __init__(self, repeats: bool = False) -> None:
+        self.repeats = repeats
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        array = handler(schema["schema"]) | {"minItems": 1, "uniqueItems": True}
+        array = handler(schema["schema"]) | {"minItems": 1} | ({} if self.repeats else {"uniqueItems": True})
         return {"anyOf": [array["items"], array]}
 
-    @staticmethod
-    def _read(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         listed = [value] if isinstance(value, str) else value
         if not isinstance(listed, list):
             raise refuse(f"{show(value)} instead of a value or a list; write it as [first, second]")
@@ -173,27 +182,129 @@ class OneOrMore:
         items = handler(listed)
         seen = set()
         for number, item in enumerate(items):
-            if item in seen:
+            if item in seen and not self.repeats:
                 raise refuse(f"{show(listed[number])} is listed twice; remove one", number)
             seen.add(item)
         return items
 
 
-class PerBeam:
-    """Annotation of a mapping from beams to quantities; a single quantity, kept under None, stands for all beams."""
+SPACINGS = ("linear", "logarithmic")
+"""How the values of a range may be spaced."""
 
-    words = "a force such as '400 kN', or one for each beam"
+RANGE_KEYS = ("from", "to", "points", "spacing")
+"""Keys of a range."""
+
+DIGITS = 12
+"""Significant digits of the values inside of a range: 1.5 mm is to be found as 1.5e-3 m."""
+
+
+def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
+    """Values of a range, both ends as they are.
+
+    Parameters
+    ----------
+    first, last : float
+    points : int
+        At least two.
+    spacing : str
+        Of `SPACINGS`.
+
+    Returns
+    -------
+    list of float
+
+    Examples
+    --------
+    >>> spaced(1e-3, 4e-3, 3, "linear"), spaced(1e-3, 4e-3, 3, "logarithmic")
+    ([0.001, 0.0025, 0.004], [0.001, 0.002, 0.004])
+    """
+    shares = [number / (points - 1) for number in range(1, points - 1)]
+    if spacing == "linear":
+        inside = [first + (last - first) * share for share in shares]
+    else:
+        inside = [math.exp((1 - share) * math.log(first) + share * math.log(last)) for share in shares]
+    return [first, *(float(f"{value:.{DIGITS}g}") for value in inside), last]
+
+
+class Values(OneOrMore):
+    """Annotation of numbers: a single one, a list, or a range, such as ``{from: 1 mm, to: 5 mm, points: 9}``.
+
+    Parameters
+    ----------
+    words : str
+        What one of them is, for messages and the manual.
+    """
+
+    def __init__(self, words: str) -> None:
+        super().__init__(repeats=True)
+        self.item, self.words = words, f"{words}, a list, or a range"
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        found = super().__get_pydantic_json_schema__(schema, handler)
+        (item, array), whole = found["anyOf"], {"type": "integer", "minimum": 2, "maximum": MOST_LISTED}
+        keys = {"from": item, "to": item, "points": whole, "spacing": {"enum": list(SPACINGS)}}
+        between = {
+            "type": "object",
+            "properties": keys,
+            "required": list(RANGE_KEYS[:3]),
+            "additionalProperties": False,
+        }
+        return {"anyOf": [item, array, between]}
+
+    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        return self._read_range(value, handler) if isinstance(value, dict) else super()._read(value, handler)
+
+    def _read_range(self, value: dict[str, Any], handler: core_schema.ValidatorFunctionWrapHandler) -> list[float]:
+        given = {key: text for key, text in value.items() if text is not None}
+        if not set(given) & set(RANGE_KEYS):
+            raise refuse(f"a mapping instead of {self.words}; a range is {{from: .., to: .., points: 9}}")
+        for key in given:
+            if key not in RANGE_KEYS:
+                raise refuse(f"unknown key {show(key)} of a range; {nearest(key, RANGE_KEYS)}", key)
+        for key in RANGE_KEYS[:3]:
+            if key not in given:
+                raise refuse(f"a range without '{key}'; give from, to and points: {{from: .., to: .., points: 9}}")
+        spacing = given.get("spacing", SPACINGS[0])
+        if spacing not in SPACINGS:
+            raise refuse(f"{show(spacing)} is no spacing; give {' or '.join(SPACINGS)}", "spacing")
+        points = _COUNT.read(given["points"]) if isinstance(given["points"], str) else 0
+        if not points:
+            raise refuse(f"{show(given['points'])} instead of {_COUNT.words}", "points")
+        first, last = handler([given["from"], given["to"]])
+        if not first < last:
+            raise refuse(f"{show(given['from'])} is not below 'to', {show(given['to'])}; exchange them", "from")
+        if spacing != SPACINGS[0] and not first > 0:
+            raise refuse(f"{show(given['from'])} has no logarithm; give a number above zero, or linear spacing", "from")
+        return spaced(first, last, points, spacing)
+
+
+Lengths = Annotated[list[Length], Values("a length such as '5 mm'")]
+Forces = Annotated[list[Force], Values("a force such as '400 kN'")]
+Stresses = Annotated[list[Stress], Values("a stress such as '210 GPa'")]
+PoissonRatios = Annotated[list[PoissonRatio], Values("a number from 0 to 0.5")]
+Ratios = Annotated[list[Ratio], Values("a number above 0")]
+
+
+class PerBeam:
+    """Annotation of a mapping from beams to forces; forces alone, kept under None, stand for all beams."""
+
+    words = "a force such as '400 kN', a list, or a range; or these for each beam"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        single = handler.generate_schema(Force)
+        single = handler.generate_schema(Forces)
         each = core_schema.no_info_wrap_validator_function(self._read_each, handler(source))
-        everywhere = core_schema.no_info_after_validator_function(lambda force: {None: force}, single)
+        everywhere = core_schema.no_info_after_validator_function(lambda forces: {None: forces}, single)
         choices: dict[Any, CoreSchema] = {"single": everywhere, "each": each}
-        return core_schema.tagged_union_schema(choices, lambda value: "each" if isinstance(value, dict) else "single")
+        return core_schema.tagged_union_schema(choices, self._kind)
+
+    @staticmethod
+    def _kind(value: object) -> str:
+        between = isinstance(value, dict) and value and set(value) <= set(RANGE_KEYS)
+        return "each" if isinstance(value, dict) and not between else "single"
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         each = handler(schema["choices"]["each"]["schema"])
-        return {"anyOf": [each["additionalProperties"], each | {"minProperties": 1}]}
+        return {"anyOf": [*each["additionalProperties"]["anyOf"], each | {"minProperties": 1}]}
 
     @staticmethod
     def _read_each(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
@@ -239,3 +350,61 @@ class Named:
                 message = f"'{name}' and '{other}' differ in case only, which file systems may ignore; rename one"
                 raise refuse(message, name)
         return handler(value)
+
+
+class Groups:
+    """Annotation of groups of names, each at least two of them and each name once; a single group may stand alone.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names that there are.
+    """
+
+    words = "a list of parameters such as [mesh_size, force], or several such lists"
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self.names = names
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        group = {"type": "array", "items": {"enum": list(self.names)}, "minItems": 2, "uniqueItems": True}
+        return {"anyOf": [group, {"type": "array", "items": group}]}
+
+    def _read(self, value: object) -> list[list[str]]:
+        groups = [value] if isinstance(value, list) and value and isinstance(value[0], str) else value
+        if not isinstance(groups, list) or not groups:
+            raise refuse(f"{show(value)} instead of parameters that go together; give {self.words}")
+        seen: set[str] = set()
+        for group in groups:
+            if not isinstance(group, list) or len(group) < 2:
+                raise refuse(f"{show(group)} instead of two parameters or more; give {self.words}")
+            for name in group:
+                if not isinstance(name, str) or name not in self.names:
+                    raise refuse(f"unknown parameter {show(name)}; {nearest(str(name), self.names)}")
+                if name in seen:
+                    raise refuse(f"'{name}' is zipped twice; name it once")
+                seen.add(name)
+        return groups
+
+
+class Sections:
+    """Annotation of a list of sections; a single one stands for a list of one."""
+
+    words = "a section, or a list of sections; see below"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        array = handler(schema["schema"])
+        return {"anyOf": [array["items"], array]}
+
+    @staticmethod
+    def _read(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        listed = [value] if isinstance(value, dict) else value
+        if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+            raise refuse(f"{show(value)} instead of keys and values, or a list of such")
+        return handler(listed)

@@ -50,6 +50,7 @@ class Problems:
 
     def __init__(self, file: str, lines: Mapping[tuple[Key, ...], int] | None = None) -> None:
         self._file, self._lines = file, lines or {}
+        self._places: dict[tuple[Key, ...], str] = {}
         self._found: list[tuple[int, str]] = []
 
     def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
@@ -68,9 +69,21 @@ class Problems:
         # What is missing has no line of its own; that of what should hold it helps.
         above = (path[:size] for size in range(len(path), 0, -1))
         line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
-        place = f"{self._file}:{line}" if line else self._file
+        place = self._places.get(path) or (f"{self._file}:{line}" if line else self._file)
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{_clipped(key)}" for key in path).removeprefix(".")
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
+
+    def located(self, path: tuple[Key, ...], place: str) -> None:
+        """Tell where a value stands that comes from another file.
+
+        Parameters
+        ----------
+        path : tuple of str or int
+            Keys that lead to it.
+        place : str
+            File and line.
+        """
+        self._places[path] = place
 
     def stop(self) -> None:
         """Raise if anything was found.

@@ -73,6 +73,8 @@ class SceneSpec:
         Key of `springtune.springs.DEFINITIONS`.
     kinematics : str
         One of `springtune.problem.loads.KINEMATICS`.
+    stiffness_scale : float
+        Factor on all stiffnesses of the definition [1].
     """
 
     mesh: MeshSpec
@@ -81,24 +83,7 @@ class SceneSpec:
     force: float
     definition: str
     kinematics: str
-
-    @property
-    def labels(self) -> dict[str, str | float]:
-        """Its cell of the dataset: a label of each dimension."""
-        return {
-            "beam": self.mesh.beam.name,
-            "mesh_type": self.mesh.mesh_type,
-            "mesh_size": self.mesh.mesh_size,
-            "material": self.material.name,
-            "load": self.load,
-            "definition": self.definition,
-            "kinematics": self.kinematics,
-        }
-
-    @property
-    def name(self) -> str:
-        """Readable name, unique in a study."""
-        return f"{self.mesh.name}_{self.material.name}_{self.load}_{self.definition}_{self.kinematics}"
+    stiffness_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -222,6 +207,8 @@ class Study:
         File of the printed values.
     axes : dict of str to tuple
         Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
+    swept : tuple of str
+        Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
     """
 
     name: str
@@ -244,6 +231,74 @@ class Study:
     printed: tuple[PrintedCell, ...]
     printed_path: Path | None
     axes: dict[str, tuple[str | float, ...]]
+    swept: tuple[str, ...] = ()
+
+    def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
+        """Cell of the dataset that is of a scene, a curve or a reference.
+
+        Parameters
+        ----------
+        one : SceneSpec, CurveSpec or Reference
+
+        Returns
+        -------
+        dict of str to str or float
+            Its label of each dimension.
+        """
+        found: dict[str, str | float] = {}
+        if isinstance(one, Reference):
+            beam = one.beam
+            found |= {"beam": beam.name, "material": one.material.name, "load": one.load}
+        else:
+            mesh, beam = one.mesh, one.mesh.beam
+            found |= {"beam": beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+            found |= {"material": one.material.name, "load": one.load}
+            if isinstance(one, SceneSpec):
+                found["definition"] = one.definition
+            found["kinematics"] = one.kinematics
+        for name in self.swept:
+            if name != "stiffness_scale" or isinstance(one, SceneSpec):
+                found[name] = swept_value(one, beam, name)
+        return found
+
+    def name_of(self, scene: SceneSpec) -> str:
+        """Readable name of a scene, unique in the study.
+
+        Parameters
+        ----------
+        scene : SceneSpec
+
+        Returns
+        -------
+        str
+            Such as ``"200x40_structured_5mm_steel_traction_lattice_nonlinear"``.
+        """
+        labels = self.labels(scene) | {"mesh_size": f"{1e3 * scene.mesh.mesh_size:g}mm"}
+        words = (f"{name}={label:.9g}" if isinstance(label, float) else label for name, label in labels.items())
+        return "_".join(words)
+
+
+def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -> float:
+    """Value of a parameter that is a dimension.
+
+    Parameters
+    ----------
+    one : SceneSpec, CurveSpec or Reference
+    beam : Beam
+        Its beam.
+    name : str
+        Key of `springtune.problem.parameters.SWEPT`.
+
+    Returns
+    -------
+    float
+        In SI units; of a force its magnitude.
+    """
+    if name == "force":
+        return abs(one.force)
+    if name == "thickness":
+        return beam.thickness
+    return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
 class StudyOutput(Protocol):

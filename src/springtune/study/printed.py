@@ -1,6 +1,5 @@
 """Printed values to compare with."""
 
-import csv
 import math
 from collections.abc import Sequence
 from decimal import Decimal
@@ -9,11 +8,9 @@ from typing import Any
 
 from ..problem.loads import LOADS
 from ..problem.quantities import nearest
+from .csv_files import read_lines
 from .messages import Problems, show
 from .model import PrintedCell
-
-LARGEST_TABLE = 5_000_000
-"""Bytes of the largest file of printed values that is read."""
 
 _PRINTED_COLUMNS = {
     # column: field and unit of PrintedCell; without unit, a text
@@ -52,40 +49,24 @@ def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> t
     StudyError
         If anything is wrong with the file.
     """
-    try:
-        with open(path, "rb") as file:
-            found = file.read(LARGEST_TABLE + 1)
-        if len(found) > LARGEST_TABLE:
-            raise ValueError(f"it is larger than {LARGEST_TABLE // 1_000_000} MB")
-        text = found.decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
-        problems.add(("printed",), f"'{path}' cannot be read: {why}; give the path of a CSV file, or remove the key")
-        problems.stop()
     file_problems = Problems(str(path))
-    # Empty lines in place of comments, so that the reader's line numbers are the file's.
-    rows = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
     cells: dict[tuple[Any, ...], tuple[int, PrintedCell]] = {}
     header: list[str] | None = None
-    try:
-        for row in rows:
-            if not row:
-                continue
-            if header is None:
-                header = row
-                if sorted(header) != sorted(_PRINTED_COLUMNS):
-                    wanted = ",".join(_PRINTED_COLUMNS)
-                    file_problems.add((), f"has columns {show(','.join(header))}; give {wanted}", rows.line_num)
-                    break
-            else:
-                cell = _printed_cell(header, row, mesh_types, rows.line_num, file_problems)
-                if cell:
-                    label = (cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load)
-                    first = cells.setdefault(label, (rows.line_num, cell))[0]
-                    if first != rows.line_num:
-                        file_problems.add((), f"is the cell of line {first} again; remove one", rows.line_num)
-    except csv.Error as error:
-        file_problems.add((), f"not CSV: {error}; correct or remove the line", rows.line_num)
+    remedy = "give the path of a CSV file, or remove the key"
+    for line, row in read_lines(path, ("printed",), problems, file_problems, remedy):
+        if header is None:
+            header = row
+            if sorted(header) != sorted(_PRINTED_COLUMNS):
+                wanted = ",".join(_PRINTED_COLUMNS)
+                file_problems.add((), f"has columns {show(','.join(header))}; give {wanted}", line)
+                break
+        else:
+            cell = _printed_cell(header, row, mesh_types, line, file_problems)
+            if cell:
+                label = (cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load)
+                first = cells.setdefault(label, (line, cell))[0]
+                if first != line:
+                    file_problems.add((), f"is the cell of line {first} again; remove one", line)
     if not cells:
         file_problems.add((), f"no printed values; give a line {','.join(_PRINTED_COLUMNS)} and a line for each cell")
     file_problems.stop()

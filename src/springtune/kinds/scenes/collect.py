@@ -12,10 +12,11 @@ from ...problem.status import Status
 from ...reference.field import outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
+from ...study.model import Reference
 from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
 from .stored_scene import PACKED, fields_key, unpacked
-from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
+from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, swept
 
 COPIED = (
     "displacement",
@@ -60,7 +61,7 @@ def groups(study, folder):
     dict of str to xarray.Dataset
     """
     axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
-    root = Filler(ROOT.empty(axes))
+    root = Filler(swept(ROOT, study).empty(axes))
     _meshes(study, folder, root)
     displacements, objections = _references(study, folder, root)
     block = _block(study, folder, axes) if pressed(study) else None
@@ -92,10 +93,16 @@ def _bodies(study, root):
             "material_poisson_ratio": material.poisson_ratio,
             "material_density": np.nan if material.density is None else material.density,
         }
-        root.put(values, material=material.name)
+        labels = {"young_modulus": material.young_modulus, "poisson_ratio": material.poisson_ratio}
+        root.put(values, material=material.name, **labels)
     for beam in {scene.mesh.beam for scene in study.scenes}:
         body = {"beam_length": beam.length, "beam_height": beam.height, "beam_thickness": beam.thickness}
-        root.put(body, beam=beam.name)
+        root.put(body, beam=beam.name, thickness=beam.thickness)
+
+
+def _reference_of(scene):
+    """Reference of a scene or a curve."""
+    return Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
 
 
 def _mesh_labels(mesh):
@@ -114,24 +121,24 @@ def _meshes(study, folder, root):
 
 
 def _references(study, folder, root):
-    """Displacement of each reference by (beam, material, load), and by these and kinematics objections to it."""
+    """Displacement of each reference, and by reference and kinematics objections to it."""
     displacements, objections = {}, {}
     for one in study.references:
         result = _reference(folder, one)
-        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
-        place = tuple(labels.values())
+        labels = study.labels(one)
         for kinematics in study.axes["kinematics"]:
-            objections[*place, kinematics] = found = objection(result, one.force, kinematics)
+            objections[one, kinematics] = found = objection(result, one.force, kinematics)
             root.put({"reference_applies": not found}, kinematics=kinematics, **labels)
         values = {
-            "force": one.force,
             "reference_seconds": result["seconds"],
             "reference_message": objection(result, one.force, "nonlinear"),
         }
+        if "force" in root.data.data_vars:
+            values["force"] = one.force
         if "displacement" in result:
-            displacements[place] = one.force * result["displacement"]
+            displacements[one] = one.force * result["displacement"]
             values |= {
-                "reference_displacement": displacements[place],
+                "reference_displacement": displacements[one],
                 "reference_error_estimate": result["error_estimate"],
                 "reference_rotation": abs(one.force) * result["rotation"],
                 "reference_strain": abs(one.force) * result["strain"],
@@ -149,24 +156,25 @@ def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
     calibration = _calibration(study, folder)
     arrays = ["face_profile"] * (block is not None)
-    shown = plan.shown_meshes(study) if fields else ()
+    shown = plan.shown_scenes(study) if fields else ()
     for mesh, scenes in plan.by_mesh(study.scenes).items():
         names = [plan.solved_key(study, scene, calibration) for scene in scenes]
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
-        of_fields = store.read(path, {fields_key(name) for name in names}, [PACKED]) if mesh in shown else {}
+        kept = {fields_key(name) for scene, name in zip(scenes, names) if scene in shown}
+        of_fields = store.read(path, kept, [PACKED]) if kept else {}
         for scene, name in zip(scenes, names):
             result = results[name] | unpacked(of_fields.get(fields_key(name), {}))
             values = {"status": result["status"], "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
-            why = objections[mesh.beam.name, scene.material.name, scene.load, scene.kinematics]
+            why = objections[_reference_of(scene), scene.kinematics]
             if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
                 values["message"] = "; ".join(filter(None, (values.get("message"), why)))
-            labels = scene.labels
+            labels = study.labels(scene)
             root.put(values, **labels)
             if LOADS[scene.load].kind.pressed:
                 block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **labels)
-            if "displacements" in result:
+            if "displacements" in result:  # of one value of what is swept
                 x, y = result["displacements"].T
                 of_springs = {"stiffness": result["spring_stiffnesses"], "force": result["spring_forces"]}
                 fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **labels)
@@ -192,14 +200,14 @@ def _printed(study, root):
 
 
 def _sensitivity(study, folder, displacements, axes):
-    curves = Filler(SENSITIVITY.empty(axes))
+    curves = Filler(swept(SENSITIVITY, study).empty(axes))
     for mesh, members in plan.by_mesh(study.curves).items():
         names = [plan.curve_key(study, curve) for curve in members]
         results = store.read(folder / "curves" / f"{plan.stem(mesh)}.h5", names, ["displacement", "stable"])
         for curve, name in zip(members, names):
             result, stiffness = results[name], np.array(plan.stiffnesses(study, curve))
             displacement = result["displacement"]
-            reference = displacements.get((mesh.beam.name, curve.material.name, curve.load), np.nan)
+            reference = displacements.get(_reference_of(curve), np.nan)
             status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
             status = np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status)
             curves.put(
@@ -215,10 +223,7 @@ def _sensitivity(study, folder, displacements, axes):
                     "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
                     "curve_seconds": result["seconds"],
                 },
-                material=curve.material.name,
-                load=curve.load,
-                kinematics=curve.kinematics,
-                **_mesh_labels(mesh),
+                **study.labels(curve),
             )
     return curves.data
 
@@ -226,11 +231,11 @@ def _sensitivity(study, folder, displacements, axes):
 def _block(study, folder, axes):
     """Group of pressed faces with the references of all kinds; scenes are still to come."""
     kinds = (SMALL_STRAIN, *study.further_references)
-    block = Filler(BLOCK.empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
+    block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
     for one in study.references:
         if not LOADS[one.load].kind.pressed:
             continue
-        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
+        labels = study.labels(one)
         for kind in kinds:
             block.put(_face_reference(folder, one, kind), reference=kind, **labels)
     return block
@@ -238,9 +243,9 @@ def _block(study, folder, axes):
 
 def _finite_strain(study, folder, axes, displacement):
     """Group of references at finite strain, and the networks' errors against them."""
-    finite = Filler(FINITE_STRAIN.empty(axes | {"reference": study.further_references}))
+    finite = Filler(swept(FINITE_STRAIN, study).empty(axes | {"reference": study.further_references}))
     for one in study.references:
-        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
+        labels = study.labels(one)
         for kind in study.further_references:
             result = _finite_reference(folder, one, kind)
             values = {"reference_message": result["message"]}
@@ -287,12 +292,13 @@ def _face_reference(folder, one, kind):
 
 def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
-    shown = plan.shown_meshes(study)
+    scenes = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
+    shown = {scene.mesh for scene in scenes}
     kept = [
         mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))
     ]
     meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
-    outlines = {one: _outline(folder, one) for one in study.references}
+    outlines = {one: _outline(folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {
         "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
@@ -300,7 +306,7 @@ def _fields(study, folder, axes):
         "spring_end": 2,
         "cell": max((len(corners) for corners in cells.values()), default=1),
         "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
-        "outline_point": max(len(points) for points, _ in outlines.values()),
+        "outline_point": max((len(points) for points, _ in outlines.values()), default=1),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
     fields = Filler(FIELDS.empty(axes | numbers))
@@ -309,8 +315,7 @@ def _fields(study, folder, axes):
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
-    for one in study.references:
-        points, displacements = outlines[one]
+    for one, (points, displacements) in outlines.items():
         moved = one.force * displacements
         beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
         fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)

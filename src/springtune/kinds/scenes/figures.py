@@ -6,8 +6,9 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.dataset import NO_NODE, STATUS
-from ...output.selection import cells, choose, group, labelled_beam, labels_of
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept
 from ...problem.loads import LOADS
+from ...problem.parameters import with_unit
 from ..base import distinct
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
@@ -81,12 +82,13 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     selection = choose(
         curves.status != 0, beam=beam, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics
     )
-    curves = curves.sel(selection)
-    root = group(data, "/")
-    return _sensitivity(curves, root.sel(selection) if "reference_displacement" in root else None, selection, ax)
+    curves, root = curves.sel(selection), group(data, "/")
+    values = last_swept(curves.status != 0)
+    known = at(root.sel(selection), values) if "reference_displacement" in root else None
+    return _sensitivity(at(curves, values), known, selection, _swept(values), ax)
 
 
-def _sensitivity(curves, root, selection, ax):
+def _sensitivity(curves, root, selection, swept, ax):
     figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
     panel, (unit, written) = axes[0, 0], labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
     place = {"left": 0.45, "right": 0.14, "bottom": 0.4, "top": 0.52}
@@ -105,10 +107,13 @@ def _sensitivity(curves, root, selection, ax):
     panel.set(ylim=(0, min(top, 1.1 * highest) if highest else MOST_SHOWN), ylabel="|Deformation error| [%]")
     panel.set_xlim(*((known.min(), known.max()) if len(known) else (0, 1)))
     panel.set_xlabel(f"Uniform spring stiffness [{written}N/m]")
-    panel.set_title(_sensitivity_title(panel, root, selection), pad=12)
+    panel.set_title(_sensitivity_title(panel, root, selection, swept), pad=12)
     if root is not None and "paper_stiffness" in root:
         _mark_printed(panel, root.paper_stiffness.values, unit)
-    labels.settle(figure, axes, place)
+    over = TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
+    if ax is None:
+        figure.set_size_inches(style.COLUMN, 2.6 + over)
+    labels.settle(figure, axes, place | {"top": place["top"] + over})
     if not ends:
         labels.say(panel, _why_no_curve(curves), bare=False)
         return panel
@@ -166,12 +171,13 @@ def _key(panel, seen):
                      frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)  # fmt: skip
 
 
-def _sensitivity_title(panel, root, selection):
+def _sensitivity_title(panel, root, selection, swept):
     named = dict(selection)
     if root is not None and "beam" in named:
         named["beam"] = labelled_beam(root, named["beam"])
     room = panel.get_window_extent().width / panel.figure.dpi
-    first = labels.wrapped(", ".join(_named(named, "beam", "mesh_type", "material", "load")), room, 8)
+    words = [*_named(named, "beam", "mesh_type", "material", "load"), *swept]
+    first = labels.wrapped(", ".join(words), room, 8)
     if root is None:
         return first
     reference = float(root.reference_displacement)
@@ -205,6 +211,12 @@ def _why_no_curve(curves):
 def _force(newtons):
     text = f"{newtons / 1e3:g} kN" if abs(newtons) >= 1e3 else f"{newtons:g} N"
     return text.replace("-", "−") if np.isfinite(newtons) else "no force"
+
+
+def _swept(values):
+    """Values of what the study sweeps that are shown, in words; nothing where nothing is swept."""
+    found = {name: float(value) for name, value in values.items()}
+    return [with_unit(name, value) for name, value in found.items() if (name, value) != ("stiffness_scale", 1.0)]
 
 
 def _named(selection, *names):
@@ -257,6 +269,8 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     """
     root = group(data, "/")
     root, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
+    values = last_swept(root.status != 0)
+    root = at(root, values)
     shown = []
     for name in beams:
         asked = labels_of(root.status.sel(beam=name) != 0, "definition")
@@ -274,13 +288,16 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         parts = [one for beam, one in shown if beam == name]
         part = f", {parts.index(definitions) + 1} of {len(parts)}" if len(parts) > 1 else ""
         room = panel.get_window_extent().width / panel.figure.dpi
-        panel.set(title=labels.wrapped(labelled_beam(root, name) + part, room, 8), xlabel="Mesh size [mm]")
+        words = ", ".join([labelled_beam(root, name) + part, *_swept(_of_beam(values, name))])
+        panel.set(title=labels.wrapped(words, room, 8), xlabel="Mesh size [mm]")
     under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
+    over = TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if values else 0.0
     if ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
     for panel in axes[:, 0]:
         panel.set_ylabel("Deformation error [%]")
-    labels.settle(figure, axes, {**place, "bottom": 0.4 + under, "down": 0.7 + under, "across": 0.06})
+    place |= {"top": 0.48 + over, "bottom": 0.4 + under, "down": 0.7 + under + over, "across": 0.06}
+    labels.settle(figure, axes, place)
     for panel, (ends, said) in zip(flat, drawn):
         labels.name_lines(panel, ends)
         if ends:
@@ -289,6 +306,9 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
             labels.say(panel, "no errors: " + said.replace("\n", "; "))
     return flat
 
+
+TITLE_LINE = 0.13
+"""Height of a line of a panel's title [inch]."""
 
 MOST_LINES = 6
 """Definitions in one panel; more of them take further rows of panels."""
@@ -339,6 +359,10 @@ def _lacking(definition, sizes, flags, known):
             reason = "no reference" if flag == 1 else STATUS[flag].replace("_", " ")
             reasons.setdefault(reason, []).append(f"{size:g}")
     return [f"{definition}, {', '.join(found)} mm: {reason}" for reason, found in reasons.items()]
+
+
+def _of_beam(values, beam):
+    return {name: value.sel(beam=beam) for name, value in values.items()}
 
 
 def _by_beam(root, beam, mesh_type, material, load, kinematics):
@@ -413,6 +437,9 @@ def plot_deformed(
     fields = fields.sel({"definition": definition, "mesh_type": selection["mesh_type"]})
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
+    cut = cut.sel(definition=definition)
+    values = last_swept(cut.status != 0)
+    cut = at(cut, values)
     extents = [_extent(fields.sel(beam=name)) for name in beams]
     room = style.COLUMN - 0.42 - 0.08
     heights = [float(np.clip(1.25 * room * high / wide, 0.45, 1.8)) for wide, high in extents]
@@ -427,12 +454,12 @@ def plot_deformed(
         _deformed(
             panel,
             fields.sel(beam=name),
-            cut.sel(beam=name, definition=definition),
+            cut.sel(beam=name),
             selection,
-            labelled_beam(root, name),
+            ", ".join([labelled_beam(root, name), *_swept(_of_beam(values, name))]),
         )
         panel.apply_aspect()  # its limits
-    over = 0.13 * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
+    over = TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
     if ax is None:
         figure.set_size_inches(style.COLUMN, style.size(figure)[1] + over * len(axes))
     labels.settle(figure, grid, place | {"top": 0.58 + over, "down": 0.6 + over})
@@ -576,8 +603,14 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     place = {"left": 0.45, "right": 0.06, "top": 0.62, "across": 0.55, "title": title}
     style.arrange(figure, axes, bottom=0.4, **place)
     (left, right), here = axes[0], root.sel(chosen)
+    values = last_swept(here.status != 0)
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
-    drawn = [_stiffness(left, curves, here), _profile(right, faces.sel(chosen), here, load)]
+    here, curves, faces = (
+        at(here, values),
+        curves if curves is None else at(curves, values),
+        at(faces.sel(chosen), values),
+    )
+    drawn = [_stiffness(left, curves, here), _profile(right, faces, here, load)]
     under = labels.LINE * max(labels.lines_of(said) for _, said, _ in drawn)
     if ax is None:
         figure.set_size_inches(style.PAGE, 3.0 + under)

@@ -2,14 +2,16 @@
 
 import hashlib
 from collections import defaultdict
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from ...jobs.hashing import hash_of
 from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...problem.loads import LOADS
+from ...problem.parameters import shown_order
 from ...reference.similarity import unit_problem, unit_scales
+from ...study.model import swept_value
 from ..base import Stage
 from . import stored_mesh
 from .stored_scene import calibrated_key
@@ -109,21 +111,38 @@ def scene_key(study, scene):
     reference = reference_of(scene.mesh.beam, scene.material, scene.load)
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
     parameters += [LOADS[scene.load].kind.name, _follows(scene), scene.force, scene.definition, scene.kinematics]
-    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene)]
+    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.stiffness_scale]
     return hash_of(parameters, stage_key("kinds.scenes.solve"), definition_key(scene.definition))
 
 
-@lru_cache(maxsize=1)
-def _shown_meshes(meshes):
+_shown: dict[int, tuple[Any, Any]] = {}
+
+
+def shown_scenes(study):
+    """Scenes whose whole fields are kept, whether or not they are drawn.
+
+    They are those on the coarsest mesh of each beam and mesh type; of what is swept those of one value, see
+    `springtune.problem.parameters.shown_order`.
+    """
+    items, found = _shown.get(0, (None, None))
+    if items is not study.scenes:
+        _shown[0] = study.scenes, _find_shown(study)
+    return _shown[0][1]
+
+
+def _find_shown(study):
     coarsest = {}
-    for mesh in sorted(meshes, key=lambda mesh: -mesh.mesh_size):
-        coarsest.setdefault((mesh.beam, mesh.mesh_type), mesh)
-    return frozenset(coarsest.values())
-
-
-def shown_meshes(study):
-    """Meshes whose whole fields are kept, the coarsest of each beam and mesh type, whether or not they are drawn."""
-    return _shown_meshes(study.meshes)
+    for mesh in study.meshes:
+        place = mesh.beam.name, mesh.mesh_type
+        coarsest[place] = max(coarsest.get(place, 0.0), mesh.mesh_size)
+    last = {}
+    for scene in study.scenes:
+        place = scene.mesh.beam.name, scene.mesh.mesh_type
+        if scene.mesh.mesh_size == coarsest[place]:
+            place += scene.material.name, scene.load, scene.definition, scene.kinematics
+            rank = [shown_order(name, [swept_value(scene, scene.mesh.beam, name)]) for name in study.swept]
+            last[place] = max(last.get(place, (rank, scene)), (rank, scene), key=lambda pair: pair[0])
+    return frozenset(scene for _, scene in last.values())
 
 
 def solved_key(study, scene, calibration):
@@ -264,13 +283,12 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
-    scenes, shown = by_mesh(study.scenes), shown_meshes(study)
+    scenes, shown = by_mesh(study.scenes), shown_scenes(study)
     families = [
         {
             "name": stem(mesh),
             "thickness": mesh.beam.thickness,
-            "keep_fields": mesh in shown,
-            "scenes": [_scene(study, scene) for scene in scenes[mesh]],
+            "scenes": [_scene(study, scene, shown) for scene in scenes[mesh]],
         }
         for meshes in members
         for mesh in meshes
@@ -284,7 +302,7 @@ def _solve(study, folder, members):
     }
 
 
-def _scene(study, scene):
+def _scene(study, scene, shown):
     task = {
         "key": scene_key(study, scene),
         "material": material_key(scene.material),
@@ -298,6 +316,10 @@ def _scene(study, scene):
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
+    if scene.stiffness_scale != 1:
+        task["stiffness_scale"] = scene.stiffness_scale
+    if scene in shown:
+        task["keep_fields"] = True
     if scene.definition == "calibrated":
         task["calibration"] = calibration_name(scene)
         task["thickness_ratio"] = _thickness_ratio(study, scene)

@@ -1,6 +1,7 @@
 """Stage `solve`: the mass-spring network of every scene, all scenes of a mesh together."""
 
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -28,10 +29,11 @@ def run(tasks, spent):
     ----------
     tasks : dict
         ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
-        or nothing) and ``families``, each with ``name, thickness, keep_fields`` and ``scenes``, and each of these with
+        or nothing) and ``families``, each with ``name, thickness`` and ``scenes``, and each of these with
         ``key, material, kind`` (the load's, by name), ``follower, force, definition, kinematics``, ``reference`` (see
-        `springtune.kinds.scenes.stored_reference.read`), ``stiffness`` where it is told, and ``thickness_ratio`` and
-        ``calibration``, the name of a group, where it is calibrated.
+        `springtune.kinds.scenes.stored_reference.read`), ``stiffness`` where it is told, ``stiffness_scale`` where it
+        is not 1, ``keep_fields`` where displacements of all particles and forces of all springs are kept, and
+        ``thickness_ratio`` and ``calibration``, the name of a group, where it is calibrated.
     spent : Spent
         What tasks cost is added to it.
     """
@@ -40,7 +42,7 @@ def run(tasks, spent):
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path, spent.limits)
         scenes = {stored_key(scene, calibration): scene for scene in family["scenes"]}
-        kept = {name: fields_key(name) for name in scenes} if family["keep_fields"] else {}
+        kept = {name: fields_key(name) for name, scene in scenes.items() if scene.get("keep_fields")}
         missing = {name: scene for name, scene in scenes.items() if not {name, kept.get(name, name)} <= present}
         if not missing:
             continue
@@ -57,7 +59,7 @@ def run(tasks, spent):
         with store.Keeper(path) as keeper:
             for name in order:
                 scene, derived = missing[name], sheet.deriving
-                solved = partial(solve, sheet, scene, fields.field, calibration, family["keep_fields"])
+                solved = partial(solve, sheet, scene, fields.field, calibration)
                 result = spent.attempt(name, solved, _hole)
                 if result is None:
                     continue
@@ -82,9 +84,10 @@ def lose(tasks, name, why, limits):
     """
     calibration = sealed.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
-        if any(stored_key(scene, calibration) == name for scene in family["scenes"]):
+        kept = {stored_key(scene, calibration): scene.get("keep_fields") for scene in family["scenes"]}
+        if name in kept:
             path = Path(tasks["folder"]) / f"{family['name']}.h5"
-            holes = {fields_key(name): {"limits": limits}} if family["keep_fields"] else {}
+            holes = {fields_key(name): {"limits": limits}} if kept[name] else {}
             if name not in store.stored(path, limits):  # else its fields alone are beyond them
                 holes[name] = _hole(why, limits=limits)
             store.add(path, holes)
@@ -131,7 +134,7 @@ class References:
         return None if field is None else reference["displacement"] * field
 
 
-def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
+def solve(sheet, scene, reference=None, calibration=None):
     """Result of a scene, ready to be stored.
 
     Parameters
@@ -143,8 +146,6 @@ def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
         Displacements of the scene's reference for 1 N at the particles [m]; None without.
     calibration : dict, optional
         Calibrated stiffnesses by group.
-    keep_fields : bool, optional
-        Whether displacements of all particles and forces of all springs are part of the result.
 
     Returns
     -------
@@ -156,13 +157,13 @@ def solve(sheet, scene, reference=None, calibration=None, keep_fields=False):
     """
     begin, derived = time.perf_counter(), sheet.deriving
     try:
-        result = _solved(sheet, scene, reference, calibration, keep_fields)
+        result = _solved(sheet, scene, reference, calibration)
     except DefinitionError as error:
         result = {"status": Status.FAILED, "message": f"{scene['definition']}: {error}"}
     return result | {"seconds": time.perf_counter() - begin - (sheet.deriving - derived)}
 
 
-def _solved(sheet, scene, reference, calibration, keep_fields):
+def _solved(sheet, scene, reference, calibration):
     stiffness = scene.get("stiffness")
     if "calibration" in scene:
         group = calibration[scene["calibration"]]
@@ -173,6 +174,8 @@ def _solved(sheet, scene, reference, calibration, keep_fields):
     kind, force, kinematics = LOAD_KINDS[scene["kind"]], scene["force"], scene["kinematics"]
     definition = definition_of(scene["definition"])
     springs, seconds = sheet.derive(definition, Material(**scene["material"]), stiffness, (kind, force, field))
+    if "stiffness_scale" in scene:
+        springs = replace(springs, reference=scene["stiffness_scale"] * springs.reference)
     solution = sheet.solve(kind, springs, force, kinematics, scene["follower"])
     found = solution.equilibrium
     result = {
@@ -196,7 +199,7 @@ def _solved(sheet, scene, reference, calibration, keep_fields):
         result |= _face(sheet, kind, found.displacements)
     if field is not None:
         result["field_error"] = field_error(sheet.mesh, found.displacements, force * field)
-    return result | (_fields(springs, solution, kinematics) if keep_fields else {})
+    return result | (_fields(springs, solution, kinematics) if scene.get("keep_fields") else {})
 
 
 def _fields(springs, solution, kinematics):

@@ -73,7 +73,7 @@ def _contributions(study: Study) -> list[list[object]]:
     seen: set[SceneSpec] = set()
     for grid in study.grids:
         meshes = {scene.mesh for scene in grid.scenes}
-        references = {(scene.mesh.beam, scene.material, scene.load) for scene in grid.scenes}
+        references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in grid.scenes}
         new = set(grid.scenes) - seen
         seen |= new
         rows.append([grid.name, len(grid.scenes), len(new), len(meshes), len(references), len(grid.curves)])

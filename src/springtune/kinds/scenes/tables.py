@@ -4,6 +4,7 @@ import numpy as np
 
 from ...output.dataset import STATUS
 from ...output.tables import cells_with_values
+from ...problem.parameters import SWEPT
 from .outputs import TABLE, stem
 
 ROW = ("beam", "mesh_size")
@@ -19,7 +20,8 @@ def tables(tree):
     Returns
     -------
     list of dict
-        Each with ``stem`` and ``rows``; those as the paper's with their labels, the others with ``title`` and ``note``.
+        Each with ``stem`` and ``rows``; those as the paper's with their labels, their ``definitions`` and the columns
+        of what is ``swept``; the others with ``title`` and ``note``.
     """
     root = tree.to_dataset()
     found = [_table(root.sel(selection), selection) for selection in _selections(root)]
@@ -38,18 +40,31 @@ def _table(cells, selection):
     numbers = np.unique(cells.paper_table.values[np.isfinite(cells.paper_table.values)])
     number = int(numbers[0]) if len(numbers) == 1 else None
     # Plain arrays: selecting each cell of a dataset takes a thousand times as long.
-    order = (*ROW, "kinematics", "definition")
+    swept = [name for name in SWEPT if name in cells.status.dims]
+    order = (*ROW, *swept, "kinematics", "definition")
     arrays = {name: array.transpose(..., *(one for one in order if one in array.dims)) for name, array in cells.items()}
     values = {name: (array.dims, array.values) for name, array in arrays.items()}
     labels = {name: cells[name].values.tolist() for name in order}
     requested = values["status"][1] != 0
-    places = np.argwhere(requested.any(axis=(2, 3)))
-    rows = [_row(values, labels, dict(zip(ROW, place))) for place in places.tolist()]
-    definitions = [name for name, there in zip(labels["definition"], requested.any(axis=(0, 1, 2))) if there]
-    return {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions, **selection}
+    places = np.argwhere(requested.any(axis=(-2, -1)))
+    rows = [_row(values, labels, dict(zip(order, place)), swept) for place in places.tolist()]
+    present = requested.any(axis=tuple(range(requested.ndim - 1)))
+    definitions = [name for name, there in zip(labels["definition"], present) if there]
+    found = {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions}
+    return found | {"swept": [SWEPT_COLUMNS[name][0] for name in swept if name != "force"], **selection}
 
 
-def _row(values, labels, place):
+SWEPT_COLUMNS = {
+    "force": ("force_N", 1.0),
+    "thickness": ("thickness_mm", 1e3),
+    "young_modulus": ("young_modulus_MPa", 1e-6),
+    "poisson_ratio": ("poisson_ratio", 1.0),
+    "stiffness_scale": ("stiffness_scale", 1.0),
+}
+"""Columns of what a study sweeps, and units in them over those of the dataset."""
+
+
+def _row(values, labels, place, swept):
     def value(name, **further):
         dimensions, array = values[name]
         return array[tuple((place | further)[dimension] for dimension in dimensions)]
@@ -57,7 +72,10 @@ def _row(values, labels, place):
     row = {
         "beam": labels["beam"][place["beam"]],
         "mesh_size_mm": 1e3 * labels["mesh_size"][place["mesh_size"]],
-        "force_N": float(value("force")),
+        "force_N": labels["force"][place["force"]] if "force" in swept else float(value("force")),
+    }
+    row |= _swept({name: labels[name][place[name]] for name in swept}, swept)
+    row |= {
         "printed_stiffness_N_per_m": float(value("paper_stiffness")),
         "printed_reference_mm": 1e3 * float(value("paper_reference_displacement")),
         "printed_displacement_mm": 1e3 * float(value("paper_displacement")),
@@ -82,16 +100,23 @@ def _row(values, labels, place):
     return row
 
 
+def _swept(labels, names):
+    """Columns of what a study sweeps."""
+    return {SWEPT_COLUMNS[name][0]: SWEPT_COLUMNS[name][1] * labels[name] for name in names}
+
+
 def _finite_strain(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
     rows = []
     dimensions = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
-    for place in cells_with_values(finite.deformation_error, dimensions):
+    swept = [name for name in SWEPT if name in finite.deformation_error.dims]
+    for place in cells_with_values(finite.deformation_error, (*dimensions, *swept)):
         if place["kinematics"] == "linear":
             continue
         cell, scene = finite.sel(place), {name: label for name, label in place.items() if name != "reference"}
         rows.append(
             {name: place[name] for name in ("material", "load", "beam", "mesh_type", "definition", "reference")}
+            | _swept(place, swept)
             | {
                 "mesh_size_mm": 1e3 * place["mesh_size"],
                 "network_mm": 1e3 * float(root.displacement.sel(scene)),
@@ -113,11 +138,13 @@ def _block(block, root):
     """Middle of the pressed face, every definition, mesh, material and kinematics."""
     rows = []
     dimensions = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
-    for place in cells_with_values(block.face_displacement, dimensions):
+    swept = [name for name in SWEPT if name in block.face_displacement.dims]
+    for place in cells_with_values(block.face_displacement, (*dimensions, *swept)):
         cell = block.sel(place)
         reference = cell.isel(reference=0)
         rows.append(
             {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
+            | _swept(place, swept)
             | {
                 "mesh_size_mm": 1e3 * place["mesh_size"],
                 "network_mm": 1e3 * float(cell.face_displacement),

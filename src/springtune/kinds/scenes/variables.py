@@ -1,8 +1,13 @@
 """Variables of scenes, curves and references: the root of a dataset and its groups."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...output.dataset import NO_NODE, Group
+
+if TYPE_CHECKING:
+    from ...study.model import Study
 
 SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
 MESH = ("beam", "mesh_type", "mesh_size")
@@ -106,6 +111,39 @@ SENSITIVITY = Group(
         "stiffness_ratio": "uniform stiffness over E t",
     },
 )
+
+PRINTED = "paper_"
+"""First letters of variables of printed cells, which know no parameters but those of `CELL`."""
+
+OWN = {
+    "material_young_modulus": "young_modulus",
+    "material_poisson_ratio": "poisson_ratio",
+    "beam_thickness": "thickness",
+}
+"""Parameters of bodies that a study may sweep."""
+
+
+def swept(group: Group, study: "Study") -> Group:
+    """Group whose variables are over what a study sweeps, each over what it depends on.
+
+    Parameters
+    ----------
+    group : Group
+    study : Study
+
+    Returns
+    -------
+    Group
+        The force is a coordinate where it is swept, and no variable.
+    """
+    further: dict[str, list[str]] = {}
+    for name, (dimensions, *_) in group.variables.items():
+        if name in OWN:
+            further[name] = [one for one in study.swept if one == OWN[name]]
+        elif "load" in dimensions and not name.startswith(PRINTED):
+            further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
+    return group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
+
 
 FURTHER = (*REFERENCE, "reference")
 

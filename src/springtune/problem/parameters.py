@@ -1,0 +1,61 @@
+"""Numbers of a scene that a study may sweep: dimensions of its dataset then."""
+
+from collections.abc import Sequence
+
+SWEPT = {
+    "force": ("size of the force on the loaded side; the load says its direction", "N"),
+    "thickness": ("thickness of the sheet", "m"),
+    "young_modulus": ("Young's modulus", "Pa"),
+    "poisson_ratio": ("Poisson's ratio", "1"),
+    "stiffness_scale": ("factor on the stiffness that the definition gives", "1"),
+}
+"""What each is, and its unit, by its name in a study and in the dataset."""
+
+
+def shown_order(name: str, values: Sequence[float]) -> list[float]:
+    """Order of values of a swept parameter of which the last one that is there is shown where only one can be.
+
+    Parameters
+    ----------
+    name : str
+        Key of `SWEPT`.
+    values : sequence of float
+
+    Returns
+    -------
+    list of float
+        Larger is later; of a factor on the stiffness, what changes it least.
+    """
+    return [-abs(value - 1) if name == "stiffness_scale" else value for value in values]
+
+
+def with_unit(name: str, value: float) -> str:
+    r"""A value of a swept parameter as it is read, of words that stay on a line.
+
+    Parameters
+    ----------
+    name : str
+        Key of `SWEPT`.
+    value : float
+        In SI units.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> with_unit("force", 4e5), with_unit("thickness", 2e-3), with_unit("poisson_ratio", 0.3)
+    ('400\xa0kN', 'thickness 2\xa0mm', 'nu\xa0=\xa00.3')
+    """
+    if name == "force":
+        text = f"{value / 1e3:.4g} kN" if abs(value) >= 1e3 else f"{value:.4g} N"
+    elif name == "thickness":
+        return f"thickness {1e3 * value:.4g}\u00a0mm"
+    elif name == "young_modulus":
+        text = f"E = {value / 1e9:.4g} GPa" if value >= 1e9 else f"E = {value / 1e6:.4g} MPa"
+    elif name == "poisson_ratio":
+        text = f"nu = {value:.4g}"
+    else:
+        return f"stiffness times\u00a0{value:.4g}"
+    return text.replace(" ", "\u00a0")

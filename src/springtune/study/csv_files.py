@@ -1,0 +1,57 @@
+"""CSV files that a study names."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from .messages import Key, Problems
+
+LARGEST_TABLE = 5_000_000
+"""Bytes of the largest CSV file that is read."""
+
+
+def read_lines(
+    path: Path, where: Sequence[Key], problems: Problems, own: Problems, remedy: str
+) -> Iterator[tuple[int, list[str]]]:
+    """Lines of a CSV file; empty ones and those that begin with # are left out.
+
+    Parameters
+    ----------
+    path : Path
+    where : sequence of str or int
+        Keys of the study that name the file.
+    problems : Problems
+        Of the study.
+    own : Problems
+        Of the file.
+    remedy : str
+        What to do where the file cannot be read.
+
+    Yields
+    ------
+    int, list of str
+        Number of the line, and its cells.
+
+    Raises
+    ------
+    StudyError
+        If the file cannot be read.
+    """
+    try:
+        with open(path, "rb") as file:
+            found = file.read(LARGEST_TABLE + 1)
+        if len(found) > LARGEST_TABLE:
+            raise ValueError(f"it is larger than {LARGEST_TABLE // 1_000_000} MB")
+        text = found.decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
+        problems.add(where, f"'{path}' cannot be read: {why}; {remedy}")
+        problems.stop()
+    # Empty lines in place of comments, so that the reader's line numbers are the file's.
+    reader = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                yield reader.line_num, row
+    except csv.Error as error:
+        own.add((), f"not CSV: {error}; correct or remove the line", reader.line_num)
