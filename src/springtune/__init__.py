@@ -25,6 +25,7 @@ _NAMES = {
     "kinds.laying.figures": ("plot_laying",),
     "kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
     "kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
+    "kinds.scenes.sweeps": ("plot_sweep",),
     "kinds.stability.figures": (
         "plot_stability_buckling",
         "plot_stability_energy",
@@ -99,6 +100,7 @@ __all__ = [
     "plot_stability_meshes",
     "plot_stability_rest",
     "plot_stability_strains",
+    "plot_sweep",
     "predict",
     "read_mesh",
     "sensitivity",

@@ -13,6 +13,7 @@ from .kinds.scenes.figures import plot_block as plot_block
 from .kinds.scenes.figures import plot_deformed as plot_deformed
 from .kinds.scenes.figures import plot_sensitivity as plot_sensitivity
 from .kinds.scenes.figures import plot_size as plot_size
+from .kinds.scenes.sweeps import plot_sweep as plot_sweep
 from .kinds.stability.figures import plot_stability_buckling as plot_stability_buckling
 from .kinds.stability.figures import plot_stability_energy as plot_stability_energy
 from .kinds.stability.figures import plot_stability_limits as plot_stability_limits

@@ -171,6 +171,10 @@ def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
     return groups
 
 
+TITLE_LINE = 0.13
+"""Height of a line of a panel's title [inch]."""
+
+
 def room_left(panel: Axes) -> float:
     """Width that a panel's axis on the left takes with the texts of its ticks and its label [inch].
 

@@ -85,7 +85,9 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     curves, root = curves.sel(selection), group(data, "/")
     values = last_swept(curves.status != 0)
     known = at(root.sel(selection), values) if "reference_displacement" in root else None
-    return _sensitivity(at(curves, values), known, selection, _swept(values), ax)
+    # The force has a place of its own.
+    words = _swept({name: value for name, value in values.items() if name != "force" or known is None})
+    return _sensitivity(at(curves, values), known, selection, words, ax)
 
 
 def _sensitivity(curves, root, selection, swept, ax):
@@ -110,7 +112,7 @@ def _sensitivity(curves, root, selection, swept, ax):
     panel.set_title(_sensitivity_title(panel, root, selection, swept), pad=12)
     if root is not None and "paper_stiffness" in root:
         _mark_printed(panel, root.paper_stiffness.values, unit)
-    over = TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
+    over = labels.TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
     if ax is None:
         figure.set_size_inches(style.COLUMN, 2.6 + over)
     labels.settle(figure, axes, place | {"top": place["top"] + over})
@@ -291,7 +293,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         words = ", ".join([labelled_beam(root, name) + part, *_swept(_of_beam(values, name))])
         panel.set(title=labels.wrapped(words, room, 8), xlabel="Mesh size [mm]")
     under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
-    over = TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if values else 0.0
+    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if values else 0.0
     if ax is None:
         figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
     for panel in axes[:, 0]:
@@ -306,9 +308,6 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
             labels.say(panel, "no errors: " + said.replace("\n", "; "))
     return flat
 
-
-TITLE_LINE = 0.13
-"""Height of a line of a panel's title [inch]."""
 
 MOST_LINES = 6
 """Definitions in one panel; more of them take further rows of panels."""
@@ -438,7 +437,7 @@ def plot_deformed(
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
     cut = cut.sel(definition=definition)
-    values = last_swept(cut.status != 0)
+    values = last_swept((root.status != 0).sel(material=selection["material"], load=selection["load"]))  # as stored
     cut = at(cut, values)
     extents = [_extent(fields.sel(beam=name)) for name in beams]
     room = style.COLUMN - 0.42 - 0.08
@@ -459,7 +458,7 @@ def plot_deformed(
             ", ".join([labelled_beam(root, name), *_swept(_of_beam(values, name))]),
         )
         panel.apply_aspect()  # its limits
-    over = TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
+    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
     if ax is None:
         figure.set_size_inches(style.COLUMN, style.size(figure)[1] + over * len(axes))
     labels.settle(figure, grid, place | {"top": 0.58 + over, "down": 0.6 + over})

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from ...problem.loads import LOADS
+from ...study.model import swept_value
 from ..base import Output, distinct
 
 if TYPE_CHECKING:
@@ -51,6 +52,19 @@ def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]
         yield labels | {"material": item.material.name, "load": item.load}
 
 
+def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
+    """Selections of the figures of sweeps: those under which a parameter has several values, by stem."""
+    found: dict[str, Mapping[str, str]] = {}
+    for name in study.swept:
+        values: dict[tuple[str, ...], set[float]] = {}
+        for scene in study.scenes:
+            place = scene.mesh.mesh_type, scene.material.name, scene.load, scene.kinematics, scene.mesh.beam.name
+            values.setdefault(place, set()).add(swept_value(scene, scene.mesh.beam, name))
+        several = [dict(zip(SCENE_LABELS, place)) for place, members in values.items() if len(members) > 1]
+        found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
+    return found
+
+
 OUTPUTS = (
     Output(
         "sensitivity",
@@ -72,6 +86,14 @@ OUTPUTS = (
         "figures of deformed networks (and the group `/fields` behind them)",
         figures=lambda study: distinct("deformed", SCENE_LABELS, _cells(study.scenes)),
         plot=f"{PLOTS}:deformed",
+        job="scenes",
+        usual=True,
+    ),
+    Output(
+        "sweep",
+        "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
+        figures=_sweeps,
+        plot="kinds.scenes.sweeps:sweep",
         job="scenes",
         usual=True,
     ),

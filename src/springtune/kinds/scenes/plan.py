@@ -121,8 +121,8 @@ _shown: dict[int, tuple[Any, Any]] = {}
 def shown_scenes(study):
     """Scenes whose whole fields are kept, whether or not they are drawn.
 
-    They are those on the coarsest mesh of each beam and mesh type; of what is swept those of one value, see
-    `springtune.problem.parameters.shown_order`.
+    They are those on the coarsest mesh of each beam and mesh type; of what is swept each beam, material and load shows
+    one value, see `springtune.problem.parameters.shown_order`.
     """
     items, found = _shown.get(0, (None, None))
     if items is not study.scenes:
@@ -135,14 +135,18 @@ def _find_shown(study):
     for mesh in study.meshes:
         place = mesh.beam.name, mesh.mesh_type
         coarsest[place] = max(coarsest.get(place, 0.0), mesh.mesh_size)
-    last = {}
+    first = {}
+    ranks = {}
     for scene in study.scenes:
-        place = scene.mesh.beam.name, scene.mesh.mesh_type
-        if scene.mesh.mesh_size == coarsest[place]:
-            place += scene.material.name, scene.load, scene.definition, scene.kinematics
-            rank = [shown_order(name, [swept_value(scene, scene.mesh.beam, name)]) for name in study.swept]
-            last[place] = max(last.get(place, (rank, scene)), (rank, scene), key=lambda pair: pair[0])
-    return frozenset(scene for _, scene in last.values())
+        body = scene.mesh.beam.name, scene.material.name, scene.load
+        rank = [shown_order(name, [swept_value(scene, scene.mesh.beam, name)]) for name in study.swept]
+        ranks[scene] = body, rank
+        first[body] = max(first.get(body, rank), rank)
+    return frozenset(
+        scene
+        for scene, (body, rank) in ranks.items()
+        if first[body] == rank and scene.mesh.mesh_size == coarsest[scene.mesh.beam.name, scene.mesh.mesh_type]
+    )
 
 
 def solved_key(study, scene, calibration):

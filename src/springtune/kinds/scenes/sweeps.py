@@ -1,0 +1,204 @@
+"""Figures of sweeps: errors against a parameter that a study gives several values."""
+
+import numpy as np
+
+from ...output import labels, style
+from ...output.dataset import STATUS
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept
+from ...problem.parameters import SWEPT, with_unit
+from ..base import distinct
+from .outputs import SCENE_LABELS
+
+UNITS = {
+    "force": ("Force [N]", 1.0),
+    "thickness": ("Thickness [mm]", 1e3),
+    "young_modulus": ("Young's modulus [MPa]", 1e-6),
+    "poisson_ratio": ("Poisson's ratio", 1.0),
+    "stiffness_scale": ("Factor on the stiffness", 1.0),
+}
+"""What is written along the axis of a parameter, and the unit there over that of the dataset."""
+
+WIDE = 20.0
+"""Largest value over the smallest from which on an axis is logarithmic."""
+
+MOST_LINES = 6
+"""Definitions in one panel; more of them take further panels."""
+
+
+def sweep(tree):
+    """Figures of sweeps: one for each parameter that is swept, mesh type, material and load.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    present = group(tree, "/").status != 0
+    names = [name for name in SWEPT if present.sizes.get(name, 1) > 1]
+    for name in names:
+        for stem, selection in distinct(f"sweep_{name}", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
+            here = present.sel(selection)
+            counts = {one: _most(here.sel(kinematics=one), name) for one in labels_of(here, "kinematics")}
+            chosen = max(counts, key=lambda one: (counts[one], one == "nonlinear"))
+            if counts[chosen] > 1:
+                yield stem, plot_sweep, selection | {"parameter": name, "kinematics": chosen}
+
+
+@style.styled
+def plot_sweep(
+    data,
+    ax=None,
+    *,
+    parameter,
+    beam=None,
+    mesh_type=None,
+    mesh_size=None,
+    material=None,
+    load=None,
+    kinematics="nonlinear",
+):
+    """Deformation error against a parameter that the study sweeps, a panel a beam that has several, a line a definition.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its root.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as beams; by default a new figure.
+    parameter : str
+        ``"force"``, ``"thickness"``, ``"young_modulus"``, ``"poisson_ratio"`` or ``"stiffness_scale"``. Of the others
+        that are swept each beam shows values under which this one has most; of several the largest force, under it
+        the largest thickness, and so on.
+    beam : str, optional
+        One beam in place of all.
+    mesh_size : float, optional
+        [m]; the finest one of each beam without.
+    mesh_type, material, load, kinematics : str, optional
+        Labels of the scenes. One that is not given must leave no choice.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_panels,)
+        One a beam, more where a beam has many definitions.
+
+    Raises
+    ------
+    ValueError
+        If the parameter is not swept, the selection leaves a choice, or nothing.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> st.plot_sweep(tree, parameter="force")
+    Traceback (most recent call last):
+    ValueError: parameter: 'force' is not swept; the study sweeps nothing
+    """
+    root = group(data, "/")
+    swept = [name for name in SWEPT if name in root.status.dims]
+    if parameter not in swept:
+        raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
+    if beam is not None:
+        choose(root.status != 0, beam=beam)
+        root = root.sel(beam=[beam])
+    root = root[["status", "deformation_error", "beam_length", "beam_height"]]
+    selection = choose(root.status != 0, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics)
+    root = root.sel(selection)
+    present = root.status != 0
+    several = [name for name in labels_of(present, "beam") if _most(present.sel(beam=[name]), parameter) > 1]
+    shown = [_of_beam(root, name, parameter, mesh_size) for name in several or labels_of(present, "beam")]
+    shown = [(one, part.tolist()) for one in shown for part in _parts(one)]
+    columns = min(3, len(shown)) if len(shown) != 4 else 2
+    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
+    names = [str(selection[name]) for name in ("mesh_type", "material", "load") if name in selection]
+    names += [selection["kinematics"]] * (selection.get("kinematics", "nonlinear") != "nonlinear")
+    place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": ", ".join(names)}
+    style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
+    looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
+    drawn = []
+    for panel, (one, definitions) in zip(flat, shown):
+        drawn.append(_panel(panel, one, {name: looks[name] for name in definitions}, parameter))
+        room = panel.get_window_extent().width / panel.figure.dpi
+        panel.set(title=labels.wrapped(one.attrs["words"], room, 8), xlabel=UNITS[parameter][0])
+    under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
+    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1)
+    if ax is None:
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
+    for panel in axes[:, 0]:
+        panel.set_ylabel("Deformation error [%]")
+    place |= {"top": 0.48 + over, "bottom": 0.4 + under, "down": 0.7 + under + over, "across": 0.06}
+    labels.settle(figure, axes, place)
+    for panel, (ends, said) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        if ends:
+            labels.note(panel, said)
+        else:
+            labels.say(panel, "no errors: " + said.replace("\n", "; "))
+    return flat
+
+
+def _most(present, parameter):
+    """Values that a beam has of a parameter, at most."""
+    return int(present.any([name for name in present.dims if name not in ("beam", parameter)]).sum(parameter).max())
+
+
+def _of_beam(root, name, parameter, mesh_size):
+    """Errors of a beam over a parameter and definitions, with what they are of in words."""
+    here = root.sel(beam=name)
+    sizes = labels_of(here.status != 0, "mesh_size")
+    size = min(sizes) if mesh_size is None else mesh_size
+    if size not in sizes:
+        raise ValueError(f"mesh_size: nothing of beam {name!r} has {size!r} m; it has {', '.join(map(str, sizes))}")
+    here = here.sel(mesh_size=size)
+    present = (here.status != 0).any("definition")
+    counts = present.sum(parameter)
+    values = last_swept(counts == counts.max())
+    words = [labelled_beam(root, name), f"mesh {1e3 * size:g}\u00a0mm"]
+    found = {one: float(value) for one, value in values.items()}
+    words += [with_unit(one, value) for one, value in found.items() if (one, value) != ("stiffness_scale", 1.0)]
+    return at(here, values).assign_attrs(words=", ".join(words))
+
+
+def _parts(here):
+    asked = labels_of(here.status != 0, "definition")
+    return np.array_split(asked, -(-len(asked) // MOST_LINES))
+
+
+def _panel(panel, here, looks, parameter):
+    """Draw errors over a parameter: ends of lines for names, and what a note says."""
+    here = here.transpose("definition", parameter, ...)
+    x, ends, said, statuses = UNITS[parameter][1] * here[parameter].values, [], [], set()
+    for definition, look in looks.items():
+        cell = here.sel(definition=definition)
+        error, flags = 100 * cell.deformation_error.values, cell.status.values
+        known = np.isfinite(error)
+        if known.any():
+            # What other beams or grids ask for makes no gaps.
+            asked = flags != 0
+            panel.plot(x[asked], error[asked], label=definition, **look)
+            last = np.flatnonzero(known)[-1]
+            ends.append((x[last], error[last], definition, look["color"]))
+        doubtful = known & (flags > 1)
+        if doubtful.any():
+            panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
+                       markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
+            statuses |= {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}
+        lost: dict[str, list[float]] = {}
+        for value, flag in zip(x[~known], flags[~known]):
+            if flag:
+                lost.setdefault("no reference" if flag == 1 else STATUS[flag].replace("_", " "), []).append(value)
+        for reason, found in lost.items():
+            span = f"{min(found):.4g}" if len(found) == 1 else f"{len(found)} from {min(found):.4g} to {max(found):.4g}"
+            said.append(f"{definition}, {span}: {reason}")
+    if statuses:
+        said.insert(0, f"hollow: {', '.join(sorted(statuses))}")
+    asked = x[(here.status != 0).any("definition").values]
+    if len(asked) > 1 and asked.min() > 0 and asked.max() / asked.min() > WIDE:
+        panel.set_xscale("log")
+    if ends:
+        panel.axhline(0, color="0.3", linewidth=0.7, zorder=1)
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said)
