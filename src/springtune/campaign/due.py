@@ -146,7 +146,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
         study.calibration,
     ]
     # What is stored of a scene knows neither its labels nor its beam's.
-    of_scenes = [[study.name_of(scene), scene.force] for scene in study.scenes]
+    of_scenes = [[*study.labels(scene).values(), scene.force] for scene in study.scenes]
     bodies = {scene.mesh.beam for scene in study.scenes}, {scene.material for scene in study.scenes}
     named = [sorted((_plain(one) for one in group), key=str) for group in bodies]
     parts = {name: _plain(part) for name, part in study.parts.items() if name != "scenes"}

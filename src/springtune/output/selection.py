@@ -111,9 +111,8 @@ def last_swept(present: xr.DataArray) -> dict[str, xr.DataArray]:
     kept = [name for name in ("beam", "material", "load") if name in present.dims]
     there = present.any([name for name in present.dims if name not in (*kept, *names)]).transpose(*kept, *names)
     # What is shown rather than others comes last.
-    there = there.isel(
-        {name: np.argsort(shown_order(name, there[name].values.tolist()), kind="stable") for name in names}
-    )
+    ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
+    there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
     shape = there.shape[len(kept) :]
     flat = there.values.reshape(*there.shape[: len(kept)], -1)
     places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), shape)

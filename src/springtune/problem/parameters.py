@@ -1,7 +1,5 @@
 """Numbers of a scene that a study may sweep: dimensions of its dataset then."""
 
-from collections.abc import Sequence
-
 SWEPT = {
     "force": ("size of the force on the loaded side; the load says its direction", "N"),
     "thickness": ("thickness of the sheet", "m"),
@@ -12,21 +10,21 @@ SWEPT = {
 """What each is, and its unit, by its name in a study and in the dataset."""
 
 
-def shown_order(name: str, values: Sequence[float]) -> list[float]:
-    """Order of values of a swept parameter of which the last one that is there is shown where only one can be.
+def shown_order(name: str, value: float) -> float:
+    """Rank of a value of a swept parameter: where only one can be shown, it is the last of those that are there.
 
     Parameters
     ----------
     name : str
         Key of `SWEPT`.
-    values : sequence of float
+    value : float
 
     Returns
     -------
-    list of float
+    float
         Larger is later; of a factor on the stiffness, what changes it least.
     """
-    return [-abs(value - 1) if name == "stiffness_scale" else value for value in values]
+    return -abs(value - 1) if name == "stiffness_scale" else value
 
 
 def with_unit(name: str, value: float) -> str:

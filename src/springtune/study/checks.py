@@ -15,7 +15,7 @@ from ..springs.lattice import COEFFICIENT
 from .combinations import check_groups, count
 from .config import PLAUSIBLE, StatedStiffness, StudyConfig
 from .messages import Key, Problems
-from .model import CurveSpec, Grid, MeshSpec, Reference, SceneSpec, swept_value
+from .model import Grid, MeshSpec, Reference, SceneSpec
 
 MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""
@@ -149,27 +149,8 @@ def check_particles(
         problems.add(path, f"{1e3 * size:g} mm gives {particles:.0e} particles; give {least} or more")
 
 
-def check_cells(
-    config: StudyConfig,
-    meshes: Iterable[MeshSpec],
-    scenes: Iterable[SceneSpec],
-    curves: Iterable[CurveSpec],
-    swept: Iterable[str],
-    problems: Problems,
-) -> None:
+def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
     """How large the dataset becomes: each combination of labels has a cell, whichever grid has which label."""
-    labels = "beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics"
-    lists: dict[str, set[object]] = {label: set() for label in (*labels, *swept)}
-    for mesh in meshes:
-        lists["beam"].add(mesh.beam.name)
-        lists["mesh_type"].add(mesh.mesh_type)
-        lists["mesh_size"].add(mesh.mesh_size)
-    for scene in scenes:
-        lists["material"].add(scene.material.name)
-        for label in ("load", "definition", "kinematics"):
-            lists[label].add(getattr(scene, label))
-        for label in swept:
-            lists[label].add(swept_value(scene, scene.mesh.beam, label))
     shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
     cells = math.prod(map(len, lists.values()))
     if cells > MOST_CELLS:
@@ -177,7 +158,7 @@ def check_cells(
         problems.add(("grids",), f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}")
     once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))
     points = once * config.sensitivity.points
-    if any(True for _ in curves) and points > MOST_CURVE_POINTS:
+    if curves and points > MOST_CURVE_POINTS:
         of = f"{config.sensitivity.points} on each of {once} curves"
         most = f"give at most {MOST_CURVE_POINTS}, or set sensitivity: false in grids that need no curves"
         problems.add(("sensitivity", "points"), f"{_counted(points)} points, {of}; {most}")

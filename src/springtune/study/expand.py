@@ -115,28 +115,34 @@ def _ranks(config: StudyConfig) -> Ranks:
     return {dimension: {name: rank for rank, name in enumerate(labels)} for dimension, labels in names.items()}
 
 
-def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Reference], list[float]]:
+def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Reference], tuple[float, ...]]:
     """Sort key of meshes, scenes, curves and references."""
+    beams, mesh_types, materials, loads = (ranks[name] for name in ("beam", "mesh_type", "material", "load"))
+    definitions, kinematics = ranks["definition"], ranks["kinematics"]
 
-    def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> list[float]:
-        mesh = item if isinstance(item, MeshSpec) else None if isinstance(item, Reference) else item.mesh
-        beam = item.beam if isinstance(item, MeshSpec | Reference) else item.mesh.beam
-        found: list[float] = [ranks["beam"][beam.name]]
-        if mesh:
-            found += [ranks["mesh_type"][mesh.mesh_type], mesh.mesh_size]
-        if not isinstance(item, MeshSpec):
-            found += [ranks["material"][item.material.name], ranks["load"][item.load]]
-            if isinstance(item, SceneSpec):
-                found.append(ranks["definition"][item.definition])
-            if not isinstance(item, Reference):
-                found.append(ranks["kinematics"][item.kinematics])
-            found.append(abs(item.force))
-        found.append(beam.thickness)
-        if not isinstance(item, MeshSpec):
-            found += [item.material.young_modulus, item.material.poisson_ratio]
+    def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> tuple[float, ...]:
+        if isinstance(item, MeshSpec):
+            return beams[item.beam.name], mesh_types[item.mesh_type], item.mesh_size, item.beam.thickness
+        material = item.material
+        own: tuple[int, ...] = (materials[material.name], loads[item.load])
+        if isinstance(item, Reference):
+            moduli = material.young_modulus, material.poisson_ratio
+            return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
+        mesh, last = item.mesh, 0.0
         if isinstance(item, SceneSpec):
-            found.append(item.stiffness_scale)
-        return found
+            own, last = (*own, definitions[item.definition]), item.stiffness_scale
+        return (
+            beams[mesh.beam.name],
+            mesh_types[mesh.mesh_type],
+            mesh.mesh_size,
+            *own,
+            kinematics[item.kinematics],
+            abs(item.force),
+            mesh.beam.thickness,
+            material.young_modulus,
+            material.poisson_ratio,
+            last,
+        )
 
     return key
 
@@ -302,7 +308,8 @@ def build(
     check_files(meshes, scenes, references, problems)
     problems.stop()
     names = swept(config)
-    check_cells(config, meshes, scenes, curves, names, problems)
+    used = _used(meshes, scenes, references, names)
+    check_cells(config, used, bool(curves), problems)
     problems.stop()
     parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}
     if config.printed and names:
@@ -331,7 +338,7 @@ def build(
         stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},
         calibration=(calibrated.beam, calibrated.load) if calibrated else None,
         printed=read_printed(about["printed_path"], mesh_type_names(config), problems) if about["printed_path"] else (),
-        axes=_axes(ranks, meshes, scenes, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
+        axes=_axes(ranks, used, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
         swept=names,
         **about,
     )
@@ -343,25 +350,39 @@ def build(
     return study
 
 
+def _used(
+    meshes: Iterable[MeshSpec], scenes: Sequence[SceneSpec], references: Sequence[Reference], names: Iterable[str]
+) -> dict[str, set[Any]]:
+    """Labels of each dimension that scenes have."""
+    used: dict[str, set[Any]] = {
+        "beam": {mesh.beam.name for mesh in meshes},
+        "mesh_type": {mesh.mesh_type for mesh in meshes},
+        "mesh_size": {mesh.mesh_size for mesh in meshes},
+        "material": {one.material.name for one in references},
+        "load": {one.load for one in references},
+        "definition": {scene.definition for scene in scenes},
+        "kinematics": {scene.kinematics for scene in scenes},
+    }
+    for name in names:
+        if name == "stiffness_scale":
+            used[name] = {scene.stiffness_scale for scene in scenes}
+        else:
+            used[name] = {swept_value(one, one.beam, name) for one in references}
+    return used
+
+
 def _axes(
     ranks: Ranks,
-    meshes: Iterable[MeshSpec],
-    scenes: Sequence[SceneSpec],
+    used: dict[str, set[Any]],
     names: Iterable[str],
     further: Iterable[Mapping[str, Collection[str | float]]],
 ) -> dict[str, tuple[str | float, ...]]:
     """Labels of each dimension; groups of a dataset share those that its root has."""
-    used = {name: {getattr(scene, name) for scene in scenes} for name in ("load", "definition", "kinematics")}
-    used["beam"] = {mesh.beam.name for mesh in meshes}
-    used["mesh_type"] = {mesh.mesh_type for mesh in meshes}
-    used["material"] = {scene.material.name for scene in scenes}
-    used["mesh_size"] = {mesh.mesh_size for mesh in meshes}
-    used |= {name: {swept_value(scene, scene.mesh.beam, name) for scene in scenes} for name in names}
-    own = {}
+    used, own = dict(used), {}
     for labels in further:
         for name, values in labels.items():
             if name in used:
-                used[name] |= set(values)
+                used[name] = used[name] | set(values)
             else:
                 own[name] = values
     axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}

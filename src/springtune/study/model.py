@@ -85,6 +85,15 @@ class SceneSpec:
     kinematics: str
     stiffness_scale: float = 1.0
 
+    @cached_property
+    def _hash(self) -> int:
+        own = self.material, self.load, self.force, self.definition, self.kinematics, self.stiffness_scale
+        return hash((self.mesh, own))
+
+    def __hash__(self) -> int:
+        # As a mesh's.
+        return self._hash
+
 
 @dataclass(frozen=True)
 class CurveSpec:

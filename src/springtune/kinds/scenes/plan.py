@@ -108,11 +108,16 @@ def curve_key(study, curve):
 
 def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    reference = reference_of(scene.mesh.beam, scene.material, scene.load)
-    parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
-    parameters += [LOADS[scene.load].kind.name, _follows(scene), scene.force, scene.definition, scene.kinematics]
-    parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene), scene.stiffness_scale]
-    return hash_of(parameters, stage_key("kinds.scenes.solve"), definition_key(scene.definition))
+    parameters = [scene.force, _given_stiffness(study, scene), _thickness_ratio(study, scene), scene.stiffness_scale]
+    return hash_of(_common_key(scene.mesh, scene.material, scene.load, scene.definition, scene.kinematics), parameters)
+
+
+@cache
+def _common_key(mesh, material, load, definition, kinematics):
+    """What keys of scenes share that differ in their force or by a factor on the stiffness."""
+    parameters = [mesh_key(mesh), mesh.beam.thickness]
+    parameters.append(_common_task(mesh.beam, material, load, definition, kinematics))
+    return hash_of(parameters, stage_key("kinds.scenes.solve"), definition_key(definition))
 
 
 _shown: dict[int, tuple[Any, Any]] = {}
@@ -135,18 +140,16 @@ def _find_shown(study):
     for mesh in study.meshes:
         place = mesh.beam.name, mesh.mesh_type
         coarsest[place] = max(coarsest.get(place, 0.0), mesh.mesh_size)
-    first = {}
-    ranks = {}
+    first, candidates = {}, []
     for scene in study.scenes:
-        body = scene.mesh.beam.name, scene.material.name, scene.load
-        rank = [shown_order(name, [swept_value(scene, scene.mesh.beam, name)]) for name in study.swept]
-        ranks[scene] = body, rank
-        first[body] = max(first.get(body, rank), rank)
-    return frozenset(
-        scene
-        for scene, (body, rank) in ranks.items()
-        if first[body] == rank and scene.mesh.mesh_size == coarsest[scene.mesh.beam.name, scene.mesh.mesh_type]
-    )
+        beam = scene.mesh.beam
+        body = beam.name, scene.material.name, scene.load
+        rank = [shown_order(name, swept_value(scene, beam, name)) for name in study.swept]
+        if rank > first.get(body, []):
+            first[body] = rank
+        if scene.mesh.mesh_size == coarsest[beam.name, scene.mesh.mesh_type]:
+            candidates.append((scene, body, rank))
+    return frozenset(scene for scene, body, rank in candidates if rank == first.get(body, []))
 
 
 def solved_key(study, scene, calibration):
@@ -174,11 +177,6 @@ def _thickness_ratio(study, scene):
 def calibration_name(scene):
     """Name of the group of curves that calibrates a scene."""
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
-
-
-def _follows(scene):
-    """Whether the force follows what it acts on: linear kinematics know no other place than that at rest."""
-    return LOADS[scene.load].follower and scene.kinematics == "nonlinear"
 
 
 def _given_stiffness(study, scene):
@@ -307,16 +305,8 @@ def _solve(study, folder, members):
 
 
 def _scene(study, scene, shown):
-    task = {
-        "key": scene_key(study, scene),
-        "material": material_key(scene.material),
-        "kind": LOADS[scene.load].kind.name,
-        "follower": _follows(scene),
-        "force": scene.force,
-        "definition": scene.definition,
-        "kinematics": scene.kinematics,
-        "reference": reference_of(scene.mesh.beam, scene.material, scene.load),
-    }
+    common = _common_task(scene.mesh.beam, scene.material, scene.load, scene.definition, scene.kinematics)
+    task = common | {"key": scene_key(study, scene), "force": scene.force}
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
@@ -328,6 +318,19 @@ def _scene(study, scene, shown):
         task["calibration"] = calibration_name(scene)
         task["thickness_ratio"] = _thickness_ratio(study, scene)
     return task
+
+
+@cache
+def _common_task(beam, material, load, definition, kinematics):
+    """What tasks of scenes share."""
+    return {
+        "material": material_key(material),
+        "kind": LOADS[load].kind.name,
+        "follower": LOADS[load].follower and kinematics == "nonlinear",  # linear kinematics know only the place at rest
+        "definition": definition,
+        "kinematics": kinematics,
+        "reference": reference_of(beam, material, load),
+    }
 
 
 def _family_products(content):

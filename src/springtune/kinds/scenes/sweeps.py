@@ -61,7 +61,7 @@ def plot_sweep(
     load=None,
     kinematics="nonlinear",
 ):
-    """Deformation error against a parameter that the study sweeps, a panel a beam that has several, a line a definition.
+    """Deformation error against a parameter that the study sweeps, a panel a beam, a line a definition.
 
     Parameters
     ----------
