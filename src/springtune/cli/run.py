@@ -10,6 +10,7 @@ import click
 
 from .completion import studies_here
 from .examples import examples
+from .many import allow, max_scenes
 
 USUAL_STUDY = "config/paper.yaml"
 """Study that is run where none is named."""
@@ -29,13 +30,14 @@ WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
         "springtune run --strict config/mine.yaml",
     ),
     context_settings={"ignore_unknown_options": True},
-    options_metavar="[--strict]",
+    options_metavar="[--strict] [--max-scenes N]",
 )
+@max_scenes
 @click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
 @click.argument(
     "arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]", shell_complete=studies_here
 )
-def run(strict: bool, arguments: tuple[str, ...]) -> None:
+def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake in the folder of the checkout, where results/ is. All options but those
@@ -45,6 +47,7 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     from ..kinds import load_study  # here, so that --help does not wait for it
     from ..study import StudyError
 
+    allow(most)
     named = bool(arguments) and not arguments[0].startswith("-")
     options = [*arguments[named:]]
     if "--configfile" in options or "--configfiles" in options:

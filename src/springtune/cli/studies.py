@@ -6,20 +6,24 @@ import click
 
 from .completion import studies_here
 from .examples import examples
+from .many import allow, max_scenes
 
 
 @click.command(
     epilog=examples(
         "springtune scenes config/paper.yaml",
+        "springtune scenes --max-scenes 2000000 config/large.yaml",
     )
 )
+@max_scenes
 @click.argument("config", type=click.Path(path_type=Path), shell_complete=studies_here)
-def scenes(config: Path) -> None:
+def scenes(config: Path, most: int | None) -> None:
     """Say what a study asks for, before anything runs.
 
     Counts scenes, meshes, references and curves, and what grids share. A study with mistakes is refused with the line
     of each.
     """
+    allow(most)
     from ..kinds import kinds, load_study  # here, so that --help does not wait for it
     from ..kinds.scenes.summary import summary
     from ..study import StudyError

@@ -9,6 +9,12 @@ SWEPT = {
 }
 """What each is, and its unit, by its name in a study and in the dataset."""
 
+MOST_SCENES = 1_000_000
+"""Most scenes of a study, those that grids share counted in each, unless `MOST_NAMED` says more."""
+
+MOST_NAMED = "SPRINGTUNE_MAX_SCENES"
+"""Variable of the environment with another number; `springtune run` sets it for its jobs."""
+
 
 def shown_order(name: str, value: float) -> float:
     """Rank of a value of a swept parameter: where only one can be shown, it is the last of those that are there.

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
+from ..problem.parameters import MOST_NAMED, MOST_SCENES
 from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
@@ -20,12 +21,6 @@ from .model import Grid, MeshSpec, Reference, SceneSpec
 MOST_PARTICLES = 5e6
 """A mesh with more particles is taken for an error of units."""
 
-
-MOST_SCENES = 1_000_000
-"""Most scenes of a study, those that grids share counted in each, unless `MOST_NAMED` says more."""
-
-MOST_NAMED = "SPRINGTUNE_MAX_SCENES"
-"""Variable of the environment with another number; `springtune run` sets it for its jobs."""
 
 MOST_CELLS = 2_500_000
 """Most cells of a dataset: combinations of labels of all its dimensions, whether or not a grid asks for them."""

@@ -1,0 +1,402 @@
+"""Grids: ranges, parameters that go together, what is left out, rows of a file, and what is swept."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+import springtune
+from springtune.kinds import load_study
+from springtune.output.selection import at, last_swept
+from springtune.problem.parameters import MOST_NAMED, SWEPT
+from springtune.study import StudyError
+from springtune.study.fields import spaced
+
+from campaigns import Campaign
+
+HEAD = """\
+title: A study
+beams:
+  long: {length: 200 mm, height: 30 mm}
+  short: {length: 100 mm, height: 20 mm, thickness: 2 mm}
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
+grids:
+  one:
+"""
+GRID = {
+    "beam": "long",
+    "mesh_type": "structured",
+    "mesh_size": "10 mm",
+    "material": "steel",
+    "load": "traction",
+    "force": "1 kN",
+    "definition": "lattice",
+    "kinematics": "linear",
+    "sensitivity": "false",
+}
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Load a study of one grid: `GRID` with some keys changed, None for those that are not there."""
+
+    def load(head=HEAD, **keys):
+        grid = {key: value for key, value in (GRID | keys).items() if value is not None}
+        path = tmp_path / "study.yaml"
+        path.write_text(head + "".join(f"    {line}\n" for line in yaml.safe_dump(grid, sort_keys=False).splitlines()))
+        return load_study(path)
+
+    return load
+
+
+@pytest.fixture
+def refusal(load, tmp_path):
+    """Message that a grid gets, without the folder."""
+
+    def refusal(**keys):
+        with pytest.raises(StudyError) as caught:
+            load(**keys)
+        return str(caught.value).replace(f"{tmp_path}/", "")
+
+    return refusal
+
+
+class TestRanges:
+    @given(
+        st.floats(1e-6, 1e6),
+        st.floats(1.001, 1e6),
+        st.integers(2, 40),
+        st.sampled_from(["linear", "logarithmic"]),
+    )
+    def test_ends_are_exact_and_steps_even(self, first, factor, points, spacing):
+        last = first * factor
+        values = spaced(first, last, points, spacing)
+        assert (values[0], values[-1], len(values)) == (first, last, points)
+        scaled = np.array(values) if spacing == "linear" else np.log(values)
+        # Values are rounded to twelve digits, and steps are differences of them.
+        assert np.diff(scaled) == pytest.approx((scaled[-1] - scaled[0]) / (points - 1), abs=1e-11 * abs(scaled).max())
+
+    def test_values_are_those_that_a_reader_writes(self, load):
+        study = load(mesh_size={"from": "1 mm", "to": "5 mm", "points": "9"})
+        assert study.axes["mesh_size"] == (1e-3, 1.5e-3, 2e-3, 2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3, 5e-3)
+
+    @pytest.mark.parametrize(
+        ("given", "said"),
+        [
+            ({"from": "5 mm", "to": "1 mm", "points": "3"}, "'5 mm' is not below 'to', '1 mm'; exchange them"),
+            ({"from": "1 mm", "to": "5 mm"}, "a range without 'points'; give from, to and points"),
+            ({"from": "1 mm", "to": "5 mm", "points": "1"}, "'1' is out of range; give a whole number from 2"),
+            ({"from": "1 mm", "to": "5 mm", "points": "3", "step": "1"}, "unknown key 'step' of a range"),
+            ({"from": "1 mm", "to": "5 mm", "points": "3", "spacing": "log"}, "'log' is no spacing; give linear or"),
+            ({"from": "1 mm", "to": "5 kg", "points": "3"}, "'5 kg' is of dimension [mass]; give a length"),
+            ({}, "a mapping instead of a length such as '5 mm', a list, or a range"),
+        ],
+    )
+    def test_bad_range(self, refusal, given, said):
+        message = refusal(mesh_size=given)
+        assert message.startswith("study.yaml:")
+        assert "grids.one.mesh_size" in message
+        assert said in message
+
+    def test_poisson_ratio_has_no_logarithm_at_zero(self, refusal):
+        message = refusal(poisson_ratio={"from": "0", "to": "0.4", "points": "3", "spacing": "logarithmic"})
+        assert "grids.one.poisson_ratio.from: '0' has no logarithm" in message
+
+
+NUMBERS = {
+    "mesh_size": ["2 mm", "5 mm", "10 mm"],
+    "force": ["1 N", "2 N", "3 N"],
+    "thickness": ["1 mm", "2 mm", "3 mm"],
+}
+
+
+class TestCombinations:
+    @given(st.permutations(list(NUMBERS)), st.integers(0, 3))
+    def test_what_is_zipped_goes_together_and_the_rest_is_a_product(self, tmp_path_factory, names, number):
+        zipped = names[:number] if number > 1 else []
+        path = tmp_path_factory.mktemp("grid") / "study.yaml"
+        grid = GRID | NUMBERS | ({"zip": zipped} if zipped else {})
+        path.write_text(HEAD + "".join(f"    {line}\n" for line in yaml.safe_dump(grid).splitlines()))
+        found = {(scene.mesh.mesh_size, scene.force, scene.mesh.beam.thickness) for scene in load_study(path).scenes}
+        places = itertools.product(range(3), repeat=3)
+        order = list(NUMBERS)
+        wanted = {
+            tuple([2e-3, 5e-3, 10e-3][p] if n == "mesh_size" else [1e0, 2e0, 3e0][p] * (1e-3 if n == "thickness" else 1)
+                  for n, p in zip(order, place))
+            for place in places
+            if len({place[order.index(name)] for name in zipped}) <= 1
+        }  # fmt: skip
+        assert found == wanted
+
+    def test_a_value_may_stand_twice_where_it_is_zipped_alone(self, load, refusal):
+        twice = {"mesh_size": ["5 mm", "5 mm"], "force": ["1 N", "2 N"]}
+        assert len(load(**twice, zip=["mesh_size", "force"]).scenes) == 2
+        assert "grids.one.mesh_size[1]: '5 mm' is listed twice; remove one" in refusal(**twice)
+
+    def test_forces_of_each_beam_go_with_it(self, load):
+        forces = {"long": {"from": "1 N", "to": "3 N", "points": "3"}, "short": "10 N"}
+        study = load(beam=["long", "short"], force=forces)
+        assert {(one.mesh.beam.name, one.force) for one in study.scenes} == {
+            ("long", 1.0), ("long", 2.0), ("long", 3.0), ("short", 10.0)
+        }  # fmt: skip
+        assert study.swept == ("force",)
+        assert study.axes["force"] == (1.0, 2.0, 3.0, 10.0)
+
+    def test_left_out(self, load):
+        grid = {"mesh_size": ["2 mm", "5 mm"], "definition": ["lattice", "area"], "force": ["1 N", "2 N"]}
+        study = load(
+            **grid, exclude=[{"mesh_size": "2 mm", "definition": "area"}, {"force": "2 N", "mesh_size": "5 mm"}]
+        )
+        assert {(one.mesh.mesh_size, one.definition, one.force) for one in study.scenes} == {
+            (2e-3, "lattice", 1.0), (2e-3, "lattice", 2.0), (5e-3, "lattice", 1.0), (5e-3, "area", 1.0)
+        }  # fmt: skip
+
+    def test_a_size_too_large_for_a_beam_may_be_left_out(self, load, refusal):
+        grid = {"beam": ["long", "short"], "mesh_size": ["5 mm", "25 mm"], "force": "1 N"}
+        assert "'25 mm' is larger than beam 'short'" in refusal(**grid)
+        assert len(load(**grid, exclude={"beam": "short", "mesh_size": "25 mm"}).scenes) == 3
+
+    @pytest.mark.parametrize(
+        ("keys", "said"),
+        [
+            (
+                {"mesh_size": ["2 mm", "5 mm"], "force": ["1 N", "2 N", "3 N"], "zip": ["mesh_size", "force"]},
+                "grids.one.zip: 2 of 'mesh_size', 3 of 'force' cannot go together; give each as many values",
+            ),
+            ({"zip": ["mesh_size", "thickness"]}, "'thickness' is zipped and has no values"),
+            ({"zip": ["mesh_size", "color"]}, "unknown parameter 'color'"),
+            ({"zip": ["mesh_size"]}, "instead of two parameters or more"),
+            ({"zip": [["mesh_size", "force"], ["force", "load"]]}, "'force' is zipped twice"),
+            ({"zip": "mesh_size"}, "'mesh_size' instead of parameters that go together"),
+            ({"force": {"long": "1 N"}, "zip": ["beam", "force"]}, "'force' is zipped and has values for each beam"),
+            ({"exclude": {"mesh_size": "3 mm"}}, "no combination of the grid has these values of mesh_size"),
+            ({"exclude": {"mesh_size": "10 mm"}}, "leaves nothing of the grid"),
+            ({"exclude": {}}, "no parameter at all"),
+            ({"exclude": {"mesh_size": "10 kg"}}, "'10 kg' is of dimension [mass]"),
+            ({"exclude": "10 mm"}, "'10 mm' instead of keys and values"),
+        ],
+    )
+    def test_refused(self, refusal, keys, said):
+        message = refusal(**keys)
+        assert message.startswith("study.yaml:")
+        assert said in message
+        assert "\n" not in message
+
+    def test_too_many_are_refused_before_they_are_made(self, refusal, monkeypatch):
+        many = {"mesh_size": {"from": "2 mm", "to": "5 mm", "points": "10000"}}
+        forces = {"from": "1 N", "to": "5 N", "points": "10000"}
+        assert "1e+08 scenes (10000 mesh_size x 10000 force); a study has at most 1000000" in refusal(
+            **many, force=forces
+        )
+        monkeypatch.setenv(MOST_NAMED, "9999")
+        assert "10000 scenes (10000 mesh_size); a study has at most 9999" in refusal(**many)
+        monkeypatch.setenv(MOST_NAMED, "many")
+        assert f"{MOST_NAMED}: 'many' is not a number of scenes" in refusal()
+
+
+class TestRows:
+    ROWS = "# measured\nbeam, mesh_size [mm], force\nlong, 5, 1 kN\n\nlong, 10, 2 kN\nshort, 5, 2 kN\n"
+
+    def test_a_row_is_a_combination(self, load, tmp_path):
+        (tmp_path / "rows.csv").write_text(self.ROWS)
+        study = load(beam=None, mesh_size=None, force=None, rows="rows.csv", definition=["lattice", "area"])
+        found = {(one.mesh.beam.name, one.mesh.mesh_size, one.force, one.definition) for one in study.scenes}
+        rows = [("long", 5e-3, 1e3), ("long", 10e-3, 2e3), ("short", 5e-3, 2e3)]
+        assert found == {(*row, definition) for row in rows for definition in ("lattice", "area")}
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            (
+                "beam,mesh_size,force\nlong,5 kg,1 N\n",
+                "rows.csv:2: grids.one.mesh_size[0]: '5 kg' is of dimension [mass]",
+            ),
+            ("beam,mesh_size,force\nlong,5 mm\n", "rows.csv:2: 2 values in 3 columns"),
+            ("beam,mesh_size,force\nlong,,1 N\n", "rows.csv:2: nothing in column 'mesh_size'"),
+            ("beam,mesh_size,farce\nlong,5 mm,1 N\n", "rows.csv:1: unknown column 'farce'; did you mean 'force'"),
+            ("beam,beam\nlong,long\n", "rows.csv:1: a second column 'beam'"),
+            ("beam,mesh_size,force\n", "rows.csv: no rows"),
+            ("", "rows.csv: no rows"),
+            ("beam,material\nlong,steel\n", "grids.one.material: 'rows.csv' has a column 'material', too; remove one"),
+        ],
+    )
+    def test_bad_files(self, refusal, tmp_path, text, said):
+        (tmp_path / "rows.csv").write_text(text)
+        assert said in refusal(beam=None, mesh_size=None, force=None, rows="rows.csv")
+
+    def test_no_file(self, refusal):
+        assert "grids.one.rows: " in refusal(rows="nothing.csv")
+        assert "cannot be read: No such file" in refusal(rows="nothing.csv")
+
+
+class TestSwept:
+    def test_what_has_one_value_is_no_dimension(self, load):
+        assert load(force="2 N").swept == ()
+        assert load(force=["2 N"]).swept == ()
+        assert load(force=["2 N", "3 N"]).swept == ("force",)
+        # In place of the beam's own, so that the label has to say which.
+        assert load(thickness="2 mm").swept == ("thickness",)
+
+    def test_two_forces_of_two_grids_are_no_sweep(self, load):
+        head = HEAD + "".join(f"    {line}\n" for line in yaml.safe_dump(GRID).splitlines()) + "  two:\n"
+        with pytest.raises(StudyError, match="2000 N on beam 'long' .* but grid 'one' has 1000 N; give both the same"):
+            load(head, force="2 kN")
+        assert load(head, force=["1 kN", "2 kN"]).axes["force"] == (1e3, 2e3)
+
+    def test_a_calibrated_group_has_one_force(self, load):
+        head = HEAD.replace("grids:", "definitions: {calibrated: {beam: long, load: traction}}\ngrids:")
+        forces = {"long": ["1 N", "2 N"], "short": "1 N"}
+        grid = {"beam": ["long", "short"], "definition": ["calibrated", "lattice"]}
+        with pytest.raises(StudyError, match=r"definitions.calibrated: beam 'long' .* has 2 forces \(1 N, 2 N\)"):
+            load(head, **grid, force=forces)
+        with pytest.raises(StudyError, match="has 2 thicknesses"):
+            load(head, **grid, thickness=["1 mm", "2 mm"])
+        assert load(head, **grid, force={"long": "1 N", "short": ["1 N", "2 N"]}).swept == ("force",)
+
+    def test_printed_cells_are_not_swept(self, load, tmp_path):
+        (tmp_path / "printed.csv").write_text("")
+        with pytest.raises(StudyError, match="printed: printed cells know no force, which grids sweep"):
+            load(HEAD.replace("grids:", "printed: printed.csv\ngrids:"), force=["1 N", "2 N"])
+
+    def test_labels_and_names_tell_scenes_apart(self, load):
+        study = load(
+            beam=["long", "short"],
+            force=["1 N", "2 N"],
+            thickness=["1 mm", "3 mm"],
+            young_modulus=["1 MPa", "2 MPa"],
+            poisson_ratio=["0", "0.5"],
+            stiffness_scale=["0.9", "1.1"],
+        )
+        assert study.swept == tuple(SWEPT)
+        assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == len(study.scenes) == 64
+        assert len({study.name_of(scene) for scene in study.scenes}) == 64
+
+
+def run(path):
+    """Dataset of a study, all its jobs done in this process."""
+    campaign = Campaign(path)
+    campaign.plan.write()
+    for name in campaign.jobs:
+        campaign.do(name)
+    return springtune.open(campaign.folder)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A study that sweeps everything, and the same cells one by one."""
+    folder = tmp_path_factory.mktemp("swept")
+    values = {
+        "force": ("100 N", "125 N"),
+        "thickness": ("1 mm", "3 mm"),
+        "young_modulus": ("1 GPa", "2 GPa"),
+        "poisson_ratio": ("0", "0.5"),
+        "stiffness_scale": ("1", "1.25"),
+    }
+    grid = GRID | {key: list(each) for key, each in values.items()}
+    grid |= {"definition": ["lattice", "delingette"], "kinematics": "nonlinear", "sensitivity": "true"}
+    text = HEAD.replace("grids:", "outputs: [size, sensitivity, deformed, sweep, tables]\ngrids:")
+    (folder / "all.yaml").write_text(text + "".join(f"    {line}\n" for line in yaml.safe_dump(grid).splitlines()))
+    alone = {
+        number: {key: each[place >> bit & 1] for bit, (key, each) in enumerate(values.items())}
+        for number, place in enumerate((0, 31, 13, 22))
+    }
+    for number, one in alone.items():
+        body = f"{{length: 200 mm, height: 30 mm, thickness: {one['thickness']}}}"
+        law = f"{{young_modulus: {one['young_modulus']}, poisson_ratio: {one['poisson_ratio']}}}"
+        head = HEAD.replace("{length: 200 mm, height: 30 mm}", body)
+        head = head.replace("{young_modulus: 210 GPa, poisson_ratio: 0.3}", law)
+        single = grid | {key: None for key in values} | {"force": one["force"]}
+        single = {key: value for key, value in single.items() if value is not None}
+        lines = "".join(f"    {line}\n" for line in yaml.safe_dump(single).splitlines())
+        (folder / f"one{number}.yaml").write_text(head.replace("grids:", "outputs: tables\ngrids:") + lines)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        trees = run("all.yaml"), {number: run(f"one{number}.yaml") for number in alone}
+    yield *trees, alone
+    for tree in (trees[0], *trees[1].values()):
+        tree.close()
+
+
+SI = {"N": 1.0, "mm": 1e-3, "GPa": 1e9, "": 1.0}
+
+
+def number_of(text):
+    value, _, unit = text.partition(" ")
+    return float(value) * SI[unit]
+
+
+def test_a_cell_of_a_sweep_is_that_of_a_study_of_its_own(swept):
+    """Bit for bit: a linear factor would not be the same for nonlinear kinematics."""
+    tree, singles, alone = swept
+    root, curves = tree.to_dataset(), tree["sensitivity"].to_dataset()
+    assert (root.status == 1).all()
+    for number, one in alone.items():
+        values = {key: number_of(text) for key, text in one.items()}
+        cell, single = root.sel(values), singles[number].to_dataset()
+        scale = values.pop("stiffness_scale")
+        assert float(cell.beam_thickness.sel(beam="long")) == values["thickness"]
+        assert float(cell.material_young_modulus.sel(material="steel")) == values["young_modulus"]
+        for name in ("reference_displacement", "reference_error_estimate"):
+            assert cell[name].values == pytest.approx(single[name].values, rel=1e-15)
+        if scale == 1:
+            assert cell.displacement.equals(single.displacement.reset_coords(drop=True).assign_coords(cell.coords))
+        else:
+            assert (cell.displacement < single.displacement.values).all()
+        assert (curves.sel(values).best_stiffness.values == singles[number]["sensitivity"].best_stiffness.values).all()
+
+
+def test_a_stiffer_network_gives_way_as_one_under_less_force(swept):
+    """Stiffness enters as F/k alone: 1.25 times it under 125 N is as 100 N, but for the rounding of a quotient."""
+    tree, _, _ = swept
+    root = tree.to_dataset()
+    stiff, soft = (root.displacement.sel(stiffness_scale=scale, force=100 * scale) for scale in (1.25, 1.0))
+    assert (np.abs(stiff / soft - 1) < 1e-9).all()
+    assert (root.stiffness.sel(definition="lattice").isnull()).all()
+
+
+def test_figures_show_the_last_values_and_say_which(swept):
+    tree, _, _ = swept
+    (panel,) = springtune.plot_size(tree)
+    title = panel.get_title(loc="left").replace("\n", " ").replace("\u00a0", " ")
+    assert title == "long (200 x 30 mm), 125 N, thickness 3 mm, E = 2 GPa, nu = 0.5"
+    (panel,) = springtune.plot_sweep(tree, parameter="force")
+    lines = {line.get_label(): line for line in panel.lines if line.get_label() in ("lattice", "delingette")}
+    assert [*lines["lattice"].get_xdata()] == [100.0, 125.0]
+    wanted = tree.deformation_error.sel(
+        definition="lattice", thickness=3e-3, young_modulus=2e9, poisson_ratio=0.5, stiffness_scale=1.0
+    )
+    assert lines["lattice"].get_ydata() == pytest.approx(100 * wanted.values.ravel())
+    with pytest.raises(ValueError, match="parameter: 'height' is not swept; the study sweeps force, thickness"):
+        springtune.plot_sweep(tree, parameter="height")
+
+
+def test_what_is_shown_is_of_each_beam_material_and_load(swept):
+    tree, _, _ = swept
+    root = tree.to_dataset()
+    present = (root.status != 0) & ~((root.force == 125.0) & (root.thickness > 2e-3))
+    values = last_swept(present)
+    assert {name: float(value.squeeze()) for name, value in values.items()} == {
+        "force": 125.0, "thickness": 1e-3, "young_modulus": 2e9, "poisson_ratio": 0.5, "stiffness_scale": 1.0
+    }  # fmt: skip
+    shown = at(root, values)
+    assert not set(SWEPT) & set(shown.dims)
+    assert float(shown.force.squeeze()) == 125.0
+    assert float(shown.beam_thickness.sel(beam="long")) == 1e-3
+    assert math.isfinite(float(shown.reference_displacement.squeeze()))
+    assert last_swept(present.isel(dict.fromkeys(SWEPT, 0))) == {}
+
+
+def test_tables_have_a_row_of_each_value(swept):
+    from springtune.kinds.scenes.tables import tables
+
+    tree, _, _ = swept
+    (table,) = tables(tree)
+    assert len(table["rows"]) == 32
+    assert table["swept"] == ["thickness_mm", "young_modulus_MPa", "poisson_ratio", "stiffness_scale"]
+    first = table["rows"][0]
+    assert (first["force_N"], first["thickness_mm"], first["young_modulus_MPa"]) == (100.0, 1.0, 1e3)
