@@ -50,15 +50,24 @@ PLAUSIBLE = 20.0
 
 def expected_value(field: FieldInfo) -> str:
     """Words for what a field of a section expects, e.g. ``a length such as '200 mm'``."""
-    for note in field.metadata:
-        if hasattr(note, "words"):
-            return note.words
-        if isinstance(note, OneOrMore):
-            item = get_args(field.annotation)[0]
-            return f"{get_args(item)[1].words}, or a list"
+    # A field that may be absent has its notes one level deeper.
+    for annotation, notes in ((field.annotation, field.metadata), *map(_parts, get_args(field.annotation))):
+        for note in notes:
+            if hasattr(note, "words"):
+                return str(note.words)
+            if isinstance(note, OneOrMore):
+                item = get_args(annotation)[0]
+                return f"{get_args(item)[1].words}, or a list"
     listed = get_origin(field.annotation) is list
-    text = next((note.words for part in get_args(field.annotation) for note in get_args(part)[1:]), None)
-    return text or ("a list of sections; see below" if listed else "a section; see below")
+    return "a list of sections; see below" if listed else "a section; see below"
+
+
+def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
+    """What an `Annotated` annotates, and its notes; none of what is no such."""
+    if get_origin(annotation) is not Annotated:
+        return annotation, ()
+    inside, *notes = get_args(annotation)
+    return inside, tuple(notes)
 
 
 class Section(BaseModel):
@@ -218,6 +227,11 @@ class ExcludeConfig(Section):
         return self
 
 
+def _rows_may_give(schema: dict[str, Any]) -> None:
+    """What a grid needs may come from its file of rows."""
+    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["rows"]}]
+
+
 class GridConfig(Section):
     """A product of parameters: every combination of the values listed is a scene.
 
@@ -228,6 +242,8 @@ class GridConfig(Section):
     values, is a dimension of the dataset, beside `beam`, `mesh_type`, `mesh_size`, `material`, `load`, `definition` and
     `kinematics`.
     """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_rows_may_give)
 
     beam: Annotated[list[BeamName], OneOrMore(repeats=True)] = Field(description="Beams, by name.")
     mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
