@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..jobs.damage import ASIDE
-from ..output.text import aligned, without_numbers
-from ..problem.parameters import SWEPT, with_unit
+from ..output.text import aligned, label_text, without_numbers
 from ..problem.status import Status
 from .plan import Plan
 from .workload import clock, computed, keys_of
@@ -110,15 +109,7 @@ def _labels(data: "xr.Dataset", dims: Sequence[object], place: Iterable[int]) ->
 
 
 def _label(axis: "xr.DataArray", number: int) -> str:
-    value = axis.values[number]
-    if isinstance(value, str):
-        return value
-    if axis.name in SWEPT:
-        return with_unit(str(axis.name), value)
-    if axis.attrs.get("units") == "m":
-        return f"{1e3 * value:g} mm"
-    unit = axis.attrs.get("units", "1")
-    return f"{str(axis.name).replace('_', ' ')} {value:g}{'' if unit == '1' else ' ' + unit}"
+    return label_text(str(axis.name), axis.values[number], str(axis.attrs.get("units", "1")))
 
 
 def _named(cells: Cells) -> Iterator[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from ..output.text import aligned, bytes_text, without_numbers
+from ..output.text import aligned, bytes_text, label_text, without_numbers
 from ..problem.status import Status
 from .examples import examples
 
@@ -128,8 +128,10 @@ def _errors(tree: "xr.DataTree") -> list[str]:
                 continue
             sizes = np.abs(values[np.isfinite(values)])
             worst = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
-            labels = [here[name].values[place] for name, place in zip(here.dims, worst)]
-            place = ", ".join(label if isinstance(label, str) else f"{1e3 * label:g} mm" for label in labels)
+            axes = [(here[name], number) for name, number in zip(here.dims, worst)]
+            place = ", ".join(
+                label_text(str(one.name), one.values[at], one.attrs.get("units", "1")) for one, at in axes
+            )
             kind = [str(error.kinematics.values[number])] if several else []
             numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * values[worst]:+.3g} %"]
             rows.append([f"  {definition}", *kind, *numbers, place])
