@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import springtune
 from springtune.kinds import load_study
 from springtune.output.selection import at, last_swept
-from springtune.problem.parameters import MOST_NAMED, SWEPT
+from springtune.problem.parameters import MOST_SCENES_VARIABLE, SWEPT
 from springtune.study import StudyError
 from springtune.study.fields import spaced
 
@@ -193,10 +193,10 @@ class TestCombinations:
         assert "1e+08 scenes (10000 mesh_size x 10000 force); a study has at most 1000000" in refusal(
             **many, force=forces
         )
-        monkeypatch.setenv(MOST_NAMED, "9999")
+        monkeypatch.setenv(MOST_SCENES_VARIABLE, "9999")
         assert "10000 scenes (10000 mesh_size); a study has at most 9999" in refusal(**many)
-        monkeypatch.setenv(MOST_NAMED, "many")
-        assert f"{MOST_NAMED}: 'many' is not a number of scenes" in refusal()
+        monkeypatch.setenv(MOST_SCENES_VARIABLE, "many")
+        assert f"{MOST_SCENES_VARIABLE}: 'many' is not a number of scenes" in refusal()
 
 
 class TestRows:

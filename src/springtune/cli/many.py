@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ..problem.parameters import MOST_NAMED, MOST_SCENES
+from ..problem.parameters import MOST_SCENES_VARIABLE, MOST_SCENES
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -25,4 +25,4 @@ def max_scenes(command: Command) -> Command:
 def allow(most: int | None) -> None:
     """Let this process and those that it starts read studies of so many scenes."""
     if most is not None:
-        os.environ[MOST_NAMED] = str(most)
+        os.environ[MOST_SCENES_VARIABLE] = str(most)

@@ -10,9 +10,9 @@ SWEPT = {
 """What each is, and its unit, by its name in a study and in the dataset."""
 
 MOST_SCENES = 1_000_000
-"""Most scenes of a study, those that grids share counted in each, unless `MOST_NAMED` says more."""
+"""Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
 
-MOST_NAMED = "SPRINGTUNE_MAX_SCENES"
+MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"
 """Variable of the environment with another number; `springtune run` sets it for its jobs."""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
-from ..problem.parameters import MOST_NAMED, MOST_SCENES
+from ..problem.parameters import MOST_SCENES_VARIABLE, MOST_SCENES
 from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
@@ -89,13 +89,15 @@ def most_scenes() -> int:
     ValueError
         If the environment gives something else than a whole number above zero.
     """
-    text = os.environ.get(MOST_NAMED, str(MOST_SCENES))
+    text = os.environ.get(MOST_SCENES_VARIABLE, str(MOST_SCENES))
     try:
         found = int(float(text))
     except (ValueError, OverflowError):
         found = 0
     if found < 1:
-        raise ValueError(f"{MOST_NAMED}: '{text}' is not a number of scenes; give one such as 2000000, or none")
+        raise ValueError(
+            f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; give one such as 2000000, or none"
+        )
     return found
 
 
@@ -115,7 +117,7 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
         if before + number > most:
             shown = " x ".join(f"{size} {label}" for label, size in lengths.items() if size > 1)
             beside = f" beside {before} of the grids above" if before else ""
-            more = f"or allow more by 'springtune run --max-scenes', or by {MOST_NAMED} in the environment"
+            more = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
             problems.add(
                 ("grids", name),
                 f"{_counted(number)} scenes ({shown}){beside}; a study has at most {most}: {FEWER}, {more}",

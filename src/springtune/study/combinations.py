@@ -14,7 +14,7 @@ Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
 Combination = dict[str, Any]
 """Value of each parameter of a grid by its name; parameters that it does not give are not there."""
 
-ALIKE = 1e-9
+SAME_VALUE = 1e-9
 """Difference of two numbers, relative, below which they are the same value."""
 
 
@@ -143,7 +143,7 @@ def _given(excluded: ExcludeConfig) -> dict[str, list[Any]]:
 
 
 def _among(value: Any, values: list[Any]) -> bool:
-    """Whether a value is one of some: numbers to `ALIKE`, since ranges are rounded."""
+    """Whether a value is one of some: numbers to `SAME_VALUE`, since ranges are rounded."""
     if isinstance(value, float):
-        return any(abs(value - one) <= ALIKE * abs(one) for one in values)
+        return any(abs(value - one) <= SAME_VALUE * abs(one) for one in values)
     return value in values

@@ -228,8 +228,10 @@ class ExcludeConfig(Section):
 
 
 def _rows_may_give(schema: dict[str, Any]) -> None:
-    """What a grid needs may come from its file of rows."""
+    """What a grid needs may come from its file of rows, and a value may stand twice where it is zipped."""
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["rows"]}]
+    once = {name: {"uniqueItems": True} for name in PARAMETERS}
+    schema |= {"if": {"not": {"required": ["zip"]}}, "then": {"properties": once}}
 
 
 class GridConfig(Section):

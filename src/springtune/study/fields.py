@@ -194,7 +194,7 @@ SPACINGS = ("linear", "logarithmic")
 RANGE_KEYS = ("from", "to", "points", "spacing")
 """Keys of a range."""
 
-DIGITS = 12
+RANGE_DIGITS = 12
 """Significant digits of the values inside of a range: 1.5 mm is to be found as 1.5e-3 m."""
 
 
@@ -223,7 +223,7 @@ def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
         inside = [first + (last - first) * share for share in shares]
     else:
         inside = [math.exp((1 - share) * math.log(first) + share * math.log(last)) for share in shares]
-    return [first, *(float(f"{value:.{DIGITS}g}") for value in inside), last]
+    return [first, *(float(f"{value:.{RANGE_DIGITS}g}") for value in inside), last]
 
 
 class Values(OneOrMore):

@@ -112,7 +112,7 @@ SENSITIVITY = Group(
     },
 )
 
-PRINTED = "paper_"
+OF_PRINT = "paper_"
 """First letters of variables of printed cells, which know no parameters but those of `CELL`."""
 
 OWN = {
@@ -140,7 +140,7 @@ def swept(group: Group, study: "Study") -> Group:
     for name, (dimensions, *_) in group.variables.items():
         if name in OWN:
             further[name] = [one for one in study.swept if one == OWN[name]]
-        elif "load" in dimensions and not name.startswith(PRINTED):
+        elif "load" in dimensions and not name.startswith(OF_PRINT):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
     return group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
 
