@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ..problem.parameters import MOST_SCENES_VARIABLE, MOST_SCENES
+from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

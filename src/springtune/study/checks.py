@@ -9,7 +9,7 @@ from typing import Any
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
-from ..problem.parameters import MOST_SCENES_VARIABLE, MOST_SCENES
+from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
