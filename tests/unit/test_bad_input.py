@@ -36,7 +36,7 @@ def sizes(count):
 
 def many_scenes():
     """A product of lists that are each within their limit."""
-    names = [f"m{number}" for number in range(40)]
+    names = [f"m{number}" for number in range(120)]
     materials = ", ".join(f"{name}: {{young_modulus: 1 GPa, poisson_ratio: 0.3}}" for name in names)
     text = SMALL.replace("material: steel", f"material: [{', '.join(names)}]").replace(
         "steel: {", f"{materials}, steel: {{"
@@ -58,7 +58,7 @@ def scattered_grids():
 STUDIES = {
     "many scenes": (
         many_scenes(),
-        "grids.g: 360000 scenes (9000 mesh_size x 40 material); a study has at most 250000: give shorter lists",
+        "grids.g: 1080000 scenes (9000 mesh_size x 120 material); a study has at most 1000000: give shorter lists",
     ),
     "a dense dataset": (
         scattered_grids(),
