@@ -4,6 +4,7 @@ import numpy as np
 
 from ...output.dataset import STATUS
 from ...output.tables import cells_with_values
+from ...problem.loads import LOADS
 from ...problem.parameters import SWEPT
 from .outputs import TABLE, stem
 
@@ -47,7 +48,9 @@ def _table(cells, selection):
     labels = {name: cells[name].values.tolist() for name in order}
     requested = values["status"][1] != 0
     places = np.argwhere(requested.any(axis=(-2, -1)))
-    rows = [_row(values, labels, dict(zip(order, place)), swept) for place in places.tolist()]
+    rows = [
+        _row(values, labels, dict(zip(order, place)), swept, LOADS[selection["load"]].sign) for place in places.tolist()
+    ]
     present = requested.any(axis=tuple(range(requested.ndim - 1)))
     definitions = [name for name, there in zip(labels["definition"], present) if there]
     found = {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions}
@@ -64,7 +67,7 @@ SWEPT_COLUMNS = {
 """Columns of what a study sweeps, and units in them over those of the dataset."""
 
 
-def _row(values, labels, place, swept):
+def _row(values, labels, place, swept, sign):
     def value(name, **further):
         dimensions, array = values[name]
         return array[tuple((place | further)[dimension] for dimension in dimensions)]
@@ -72,9 +75,9 @@ def _row(values, labels, place, swept):
     row = {
         "beam": labels["beam"][place["beam"]],
         "mesh_size_mm": 1e3 * labels["mesh_size"][place["mesh_size"]],
-        "force_N": labels["force"][place["force"]] if "force" in swept else float(value("force")),
+        "force_N": sign * labels["force"][place["force"]] if "force" in swept else float(value("force")),
     }
-    row |= _swept({name: labels[name][place[name]] for name in swept}, swept)
+    row |= _swept({name: labels[name][place[name]] for name in swept if name != "force"})
     row |= {
         "printed_stiffness_N_per_m": float(value("paper_stiffness")),
         "printed_reference_mm": 1e3 * float(value("paper_reference_displacement")),
@@ -100,9 +103,9 @@ def _row(values, labels, place, swept):
     return row
 
 
-def _swept(labels, names):
-    """Columns of what a study sweeps."""
-    return {SWEPT_COLUMNS[name][0]: SWEPT_COLUMNS[name][1] * labels[name] for name in names}
+def _swept(labels):
+    """Columns of what a study sweeps, of the labels of a cell."""
+    return {column: unit * labels[name] for name, (column, unit) in SWEPT_COLUMNS.items() if name in labels}
 
 
 def _finite_strain(finite, root):
@@ -116,7 +119,7 @@ def _finite_strain(finite, root):
         cell, scene = finite.sel(place), {name: label for name, label in place.items() if name != "reference"}
         rows.append(
             {name: place[name] for name in ("material", "load", "beam", "mesh_type", "definition", "reference")}
-            | _swept(place, swept)
+            | _swept(place)
             | {
                 "mesh_size_mm": 1e3 * place["mesh_size"],
                 "network_mm": 1e3 * float(root.displacement.sel(scene)),
@@ -144,7 +147,7 @@ def _block(block, root):
         reference = cell.isel(reference=0)
         rows.append(
             {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
-            | _swept(place, swept)
+            | _swept(place)
             | {
                 "mesh_size_mm": 1e3 * place["mesh_size"],
                 "network_mm": 1e3 * float(cell.face_displacement),
