@@ -15,7 +15,7 @@ from ..reference.small_strain import ReferenceNotConvergedError
 from ..scene.single import Result, Scene
 from ..springs import Springs
 from .formats import check_ending, write_vtu_with
-from .net import NOT_COMPUTED, SpringNet
+from .net import NOT_COMPUTED, SpringNet, content_of
 from .paraview import write_pvd
 
 FRAMES = 50
@@ -144,8 +144,8 @@ class _Frames:
     """Deformed networks of a scene as files, with what they have in common computed once."""
 
     def __init__(self, scene: Scene, compared: bool = True) -> None:
-        self.scene, self.net = scene, SpringNet.from_scene(scene, errors=False)
-        self.content = self.net.content
+        self.scene = scene
+        self.content = content_of(SpringNet.from_scene(scene, errors=False))
         self.reference: np.ndarray | None = None
         if not compared:
             return
