@@ -147,9 +147,9 @@ def _reference(folder, one, fields=()):
 
 def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    compared = set()  # places of fields that have their reference
     calibration = _calibration(study, folder)
     arrays = ["face_profile"] * (block is not None)
-    compared = set()
     shown = plan.shown_meshes(study) if fields else ()
     for mesh, scenes in plan.by_mesh(study.scenes).items():
         names = [plan.solved_key(study, scene, calibration) for scene in scenes]
