@@ -3,14 +3,16 @@
 import csv
 import io
 import json
+import warnings
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..jobs.atomic import replacing, write_text
+from ..mesh.formats import LONGEST_SAID
 from .paraview import comment_of, write_vtu
 from .terms import OF_CORNERS, VALUES, Terms
 
@@ -89,15 +91,23 @@ def read(path: str | Path) -> Content:
     ------
     ValueError
         If there is no such file, or it is not as springtune writes nets.
+    OSError
+        If the file cannot be read.
     """
     path = Path(path)
     form = _format_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
+    told = io.StringIO()
     try:
-        return _checked(form.read(path))
-    except (AttributeError, LookupError, TypeError, ValueError, OSError, RuntimeError, SystemExit) as error:
-        said = " ".join(str(error).split())[:200] or type(error).__name__
+        # meshio tells people of what it trips over, and exits.
+        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _checked(form.read(path))
+    except (Exception, SystemExit) as error:  # of a damaged file the libraries raise whatever they trip over
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 
