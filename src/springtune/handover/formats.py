@@ -135,6 +135,13 @@ def _checked(content: Content) -> Content:
                 raise ValueError(f"{name} have the shape {array.shape}")
         elif name != "masses":
             raise ValueError(f"it has no {name}")
+    numbers = [array for name, array in arrays.items() if ARRAYS[name][0] is float]
+    numbers += [values for terms in content.energies for values in terms.values.values()]
+    if not all(np.isfinite(array).all() for array in numbers):
+        raise ValueError("some of its numbers are not finite")
+    for terms in content.energies:
+        if any(len(values) != len(terms.cells) for values in terms.values.values()):
+            raise ValueError(f"{terms.kind} terms are not as many as cells")
     count = len(arrays["points"])
     for names, length in (
         (("masses", "held", "forces"), count),
