@@ -21,7 +21,7 @@ LAYERS = (
     ("mechanics",),
     ("springs", "reference"),
     ("scene",),
-    ("prediction", "study", "jobs", "output"),
+    ("prediction", "study", "jobs", "output", "handover"),
     ("kinds",),
     ("browse", "publication"),
     ("campaign",),

@@ -8,20 +8,13 @@ import click
 
 from .completion import mesh_types
 from .examples import examples
+from .options import MATERIALS, asked_beam, asked_material, asked_mesh, asked_size, is_made, known_materials
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
     from ..prediction import Choice, Number, References
     from ..problem.geometry import Beam
     from ..problem.materials import Material
-
-MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
-"""Young's modulus and Poisson's ratio of the paper's materials."""
-
-
-def known_materials(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Materials whose names begin so, for a shell to complete."""
-    return [name for name in MATERIALS if name.startswith(begun)]
 
 
 @click.command(
@@ -69,9 +62,9 @@ def predict(
     from ..springs import DefinitionError
 
     try:
-        sheet, solid = _asked_beam(beam, thickness), _asked_material(material, young, poisson)
-        made = _is_made(mesh_type)
-        edge = _asked_size(sheet, mesh_type, size) if made else None
+        sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson)
+        made = is_made(mesh_type)
+        edge = asked_size(sheet, mesh_type, size) if made else None
         sizes: list[float] = []
         count = 0.0 if edge is None else MESH_TYPES[mesh_type].particles(sheet.length, sheet.height, edge)
         if edge is not None and count > SOLVED:
@@ -90,83 +83,11 @@ def predict(
     click.echo(prediction_text(f"{sheet.label}, {name}: {about}", sheet, solid, found, known, mesh_type, sizes))
 
 
-def _quantity(option: str, text: str, kind: str) -> float:
-    from ..units import UnitError, parse
-
-    try:
-        number = parse(text, kind)
-    except UnitError as error:
-        raise ValueError(f"{option}: {error}") from None
-    if not number > 0:
-        raise ValueError(f"{option}: '{text}' is not above zero; give a size above zero")
-    return number
-
-
-def _asked_beam(text: str, thickness: str) -> "Beam":
-    from ..problem.geometry import Beam
-
-    sides = text.lower().split("x")
-    try:
-        length, height = (1e-3 * float(side) for side in sides)
-    except ValueError:
-        raise ValueError(f"--beam: '{text}' is not length x height; give millimetres such as 200x40") from None
-    if not (length > 0 and height > 0):
-        raise ValueError(f"--beam: '{text}' has a side that is not above zero; give millimetres such as 200x40")
-    return Beam(length, height, _quantity("--thickness", thickness, "length"), text)
-
-
-def _asked_material(name: str | None, young: str | None, poisson: str | None) -> "Material":
-    from ..problem.materials import Material
-
-    if name is not None and name not in MATERIALS:
-        raise ValueError(
-            f"--material: unknown material '{name}'; known: {', '.join(MATERIALS)}; or give --young and --poisson"
-        )
-    defaults = (None, None) if name is None else MATERIALS[name]
-    young, poisson = young or defaults[0], poisson or defaults[1]
-    if young is None or poisson is None:
-        raise ValueError(f"--material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson")
-    try:
-        ratio = float(poisson)
-    except ValueError:
-        ratio = float("nan")
-    if not 0 <= ratio <= 0.5:
-        raise ValueError(f"--poisson: '{poisson}' is out of range; give a number from 0 to 0.5")
-    return Material(_quantity("--young", young, "stress"), ratio, name=name or "material")
-
-
-def _is_made(mesh_type: str) -> bool:
-    """Whether a mesh is of a type, not from a file."""
-    from ..mesh import MESH_TYPES
-
-    if mesh_type not in MESH_TYPES and not Path(mesh_type).is_file():
-        known = ", ".join(MESH_TYPES)
-        raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {known}")
-    return mesh_type in MESH_TYPES
-
-
-def _asked_size(beam: "Beam", mesh_type: str, size: str | None) -> float:
-    """Length of an edge [m] of a mesh that is made; refused before anything is, where it would be too large."""
-    from ..mesh import MESH_TYPES
-
-    if size is None:
-        raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
-    edge = _quantity("--size", size, "length")
-    refusal = MESH_TYPES[mesh_type].refusal(beam.length, beam.height, edge, f"beam '{beam.name}'")
-    if refusal:
-        raise ValueError(f"--size: '{size}' {refusal}")
-    return edge
-
-
 def _asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "Mesh":
-    from ..mesh import MESH_TYPES, read_beam_mesh
     from ..prediction import SOLVED_FROM_FILE
 
-    if edge is not None:
-        return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
-    scale = _quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
-    mesh = read_beam_mesh(mesh_type, beam.length, beam.height, scale)
-    if len(mesh.points) > SOLVED_FROM_FILE:
+    mesh = asked_mesh(beam, mesh_type, edge, unit)
+    if edge is None and len(mesh.points) > SOLVED_FROM_FILE:
         raise ValueError(
             f"--mesh: '{mesh_type}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are solved "
             "here; give a coarser mesh, or make it a mesh file of a study"

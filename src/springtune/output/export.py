@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import shutil
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -285,7 +287,7 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
         shutil.rmtree(before, ignore_errors=True)
 
 
-EXPORTS = (".csv", ".parquet", ".zarr", ".nc")
+EXPORTS = (".csv", ".parquet", ".zarr", ".nc", ".vtu", ".pvd")
 """Endings of the names of files to export to."""
 
 
@@ -303,7 +305,8 @@ def export(
     ----------
     tree : xarray.DataTree
     path : str or Path
-        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh.
+        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh, ``.vtu`` one
+        scene of it for ParaView, and ``.pvd`` a collection of all that are chosen.
     group, variables, selection
         As of `table`; a Zarr store has the whole tree.
     force : bool, optional
@@ -327,6 +330,10 @@ def export(
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
     if ending == ".nc":
         return _mesh(tree, path, group, variables, selection or {})
+    if ending in (".vtu", ".pvd"):
+        if group.strip("/") not in ("", "fields") or variables:
+            raise ValueError(f"{path}: ParaView gets the group 'fields'; leave --group and --variables out")
+        return _paraview(tree, path, selection or {})
     if ending == ".zarr":
         if group.strip("/") or variables or selection:
             raise ValueError(
@@ -367,6 +374,104 @@ def _mesh(
         found.to_netcdf(unfinished, engine="netcdf4")
     sizes = found.sizes
     return f"{path}: {sizes['particle']} particles, {sizes['spring']} springs, {sizes['cell']} cells, as UGRID has them"
+
+
+def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
+    """Write scenes of the group of fields as files for ParaView."""
+    from ..handover.paraview import MOST_PIECES, series
+
+    if "fields" not in tree.children:
+        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
+    scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
+    if not scenes:
+        raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")
+    if path.suffix.lower() == ".vtu":
+        if len(scenes) > 1:
+            several = {name: len({labels[name] for labels in scenes}) for name in scenes[0]}
+            choose = ", ".join(name for name, count in several.items() if count > 1)
+            raise ValueError(
+                f"{path}: {len(scenes)} scenes, and a .vtu file has one; --select one {choose}, or give a name ending "
+                "in .pvd for all of them"
+            )
+        _SceneFiles(tree).write(path, scenes[0])
+        return f"{path}: {', '.join(map(_label_text, scenes[0].values()))}"
+    if len(scenes) > MOST_PIECES:
+        raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
+    files = _SceneFiles(tree)
+    with series(path) as add:
+        for number, labels in enumerate(scenes):
+            name = "_".join(map(_label_text, labels.values())).replace(" ", "")
+            add(float(number), partial(files.write, labels=labels), name)
+    return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
+
+
+MESH = ("beam", "mesh_type", "mesh_size")
+"""Dimensions whose labels make a mesh."""
+
+NUMBERS = {
+    "displacement": "displacement_of_the_load",
+    "reference_displacement": "reference_displacement_of_the_load",
+    "deformation_error": "deformation_error",
+}
+"""Numbers of a scene that go with its fields, and their names there."""
+
+
+def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
+    """Labels of the scenes that have fields, in the order of a dataset."""
+    order = (*MESH, "material", "load", "definition", "kinematics")
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
+    names = [*(name for name in order if name in solved.dims), *(name for name in solved.dims if name not in order)]
+    solved = solved.transpose(*names)
+    for place in np.argwhere(solved.values):
+        yield {str(name): solved[name].values[one].item() for name, one in zip(names, place)}
+
+
+def _label_text(label: str | float) -> str:
+    """A label in words: mesh sizes in mm."""
+    return label if isinstance(label, str) else f"{1e3 * label:.6g} mm"
+
+
+class _SceneFiles:
+    """Writes scenes of the group of fields: particles and their displacements, springs as lines, cells."""
+
+    def __init__(self, tree: xr.DataTree) -> None:
+        self.tree, root = tree, tree.to_dataset()
+        self.numbers = root[[name for name in NUMBERS if name in root]].load()
+        self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
+
+    def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
+        """Write the scene of some labels."""
+        from ..handover.paraview import write_vtu
+
+        mesh = {name: label for name, label in labels.items() if name in MESH}
+        if mesh != self.mesh:
+            self.mesh, self.network = mesh, reading.field(self.tree, **mesh)
+        found = self.network
+        found = found.sel({name: label for name, label in labels.items() if name not in MESH and name in found.dims})
+        corners = found[reading.CELL_NODES].transpose("cell", ...).values
+        cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
+        for count in (3, 4):
+            cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+
+        def vectors(names: str) -> np.ndarray:
+            return np.stack([found[names.format(axis)].values for axis in "xy"], axis=1)
+
+        of_particles = {"displacement": vectors("displacement_{}")}
+        if "particle_reference_x" in found:
+            expected = vectors("particle_reference_{}")
+            if np.isfinite(expected).all():
+                error = of_particles["displacement"] - expected
+                of_particles |= {"reference_displacement": expected, "error": error}
+        of_springs = {name: {2: found[name].values} for name in ("stiffness", "force") if name in found}
+        numbers = {}
+        for name, array in self.numbers.items():
+            here = array.sel({dim: label for dim, label in labels.items() if dim in array.dims})
+            if here.ndim == 0 and np.isfinite(here):
+                numbers[NUMBERS[str(name)]] = float(here)
+        said = {name: self.tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels)
+        units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
+        comment = json.dumps(said | {"units": units}, indent=1)
+        write_vtu(path, vectors("{}"), cells, of_particles, of_springs, numbers, comment)
 
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:

@@ -1,0 +1,107 @@
+"""What options say of a beam, its mesh and its material: shared by the commands that take no study."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..mesh import Mesh
+    from ..problem.geometry import Beam
+    from ..problem.materials import Material
+
+MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
+"""Young's modulus and Poisson's ratio of the paper's materials."""
+
+
+def known_materials(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Materials whose names begin so, for a shell to complete."""
+    return [name for name in MATERIALS if name.startswith(begun)]
+
+
+def asked_quantity(option: str, text: str, kind: str) -> float:
+    """Quantity above zero of an option, in SI units; ValueError names the option."""
+    from ..units import UnitError, parse
+
+    try:
+        number = parse(text, kind)
+    except UnitError as error:
+        raise ValueError(f"{option}: {error}") from None
+    if not number > 0:
+        raise ValueError(f"{option}: '{text}' is not above zero; give a size above zero")
+    return number
+
+
+def asked_beam(text: str, thickness: str) -> "Beam":
+    """Beam of a text such as ``200x40``; ValueError names the option."""
+    from ..problem.geometry import Beam
+
+    sides = text.lower().split("x")
+    try:
+        length, height = (1e-3 * float(side) for side in sides)
+    except ValueError:
+        raise ValueError(f"--beam: '{text}' is not length x height; give millimetres such as 200x40") from None
+    if not (length > 0 and height > 0):
+        raise ValueError(f"--beam: '{text}' has a side that is not above zero; give millimetres such as 200x40")
+    return Beam(length, height, asked_quantity("--thickness", thickness, "length"), text)
+
+
+def asked_material(name: str | None, young: str | None, poisson: str | None, density: str | None = None) -> "Material":
+    """Material of a name, or of its constants; ValueError names the option."""
+    from ..problem.materials import Material
+
+    if name is not None and name not in MATERIALS:
+        raise ValueError(
+            f"--material: unknown material '{name}'; known: {', '.join(MATERIALS)}; or give --young and --poisson"
+        )
+    defaults = (None, None) if name is None else MATERIALS[name]
+    young, poisson = young or defaults[0], poisson or defaults[1]
+    if young is None or poisson is None:
+        raise ValueError(f"--material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson")
+    try:
+        ratio = float(poisson)
+    except ValueError:
+        ratio = float("nan")
+    if not 0 <= ratio <= 0.5:
+        raise ValueError(f"--poisson: '{poisson}' is out of range; give a number from 0 to 0.5")
+    heavy = None if density is None else asked_quantity("--density", density, "density")
+    return Material(asked_quantity("--young", young, "stress"), ratio, heavy, name or "material")
+
+
+def is_made(mesh_type: str) -> bool:
+    """Whether a mesh is of a type, not from a file."""
+    from ..mesh import MESH_TYPES
+
+    if mesh_type not in MESH_TYPES and not Path(mesh_type).is_file():
+        known = ", ".join(MESH_TYPES)
+        raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {known}")
+    return mesh_type in MESH_TYPES
+
+
+def asked_size(beam: "Beam", mesh_type: str, size: str | None) -> float:
+    """Length of an edge [m] of a mesh that is made; refused before anything is, where it would be too large."""
+    from ..mesh import MESH_TYPES
+
+    if size is None:
+        raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
+    edge = asked_quantity("--size", size, "length")
+    refusal = MESH_TYPES[mesh_type].refusal(beam.length, beam.height, edge, f"beam '{beam.name}'")
+    if refusal:
+        raise ValueError(f"--size: '{size}' {refusal}")
+    return edge
+
+
+def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "Mesh":
+    """Mesh of a type with edges of a length [m], or of the file of that name where there is no length.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read, or does not mesh the beam once.
+    """
+    from ..mesh import MESH_TYPES, read_beam_mesh
+
+    if edge is not None:
+        return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
+    scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
+    return read_beam_mesh(mesh_type, beam.length, beam.height, scale)

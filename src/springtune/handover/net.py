@@ -1,0 +1,501 @@
+r"""A network as plain arrays in SI units: what another program needs to have the same springs.
+
+Inside, stiffnesses are multiples of a reference stiffness, forces are over it, and energies know their meshes. Here
+everything stands written out: springs in N/m, energies besides them as `Terms` with their formula, masses in kg, forces
+in N, and a header that says where all of it comes from and how far off it is.
+
+With particles at x, the springs, e, and the terms add up to the energy
+
+.. math:: W(x) = \sum_e \tfrac{1}{2} k_e (l_e - L_e)^2 + \sum_{terms} W_{cell}
+
+and an equilibrium has ``-dW/dx + forces = 0`` in all directions that are not held. With linear kinematics W is
+the quadratic form of its second derivative at rest.
+"""
+
+import inspect
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse.linalg import ArpackError
+
+from .. import __version__
+from ..linalg.factors import SingularError
+from ..mechanics.dynamics import Motion, masses
+from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
+from ..mechanics.integrators import IMPLICIT, INTEGRATORS
+from ..mechanics.network import Network
+from ..mesh import Mesh, corner_angles, signed_areas
+from ..mesh.cells import no_cells
+from ..problem.geometry import Beam
+from ..problem.loads import LOADS, LoadKind
+from ..problem.materials import Material
+from ..problem.quantities import positive
+from ..problem.status import Status
+from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
+from ..scene.motion import motion_of
+from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
+from ..scene.single import Scene
+from ..springs import Definition, DefinitionError, Springs
+from .formats import ARRAYS, Content, read, write
+from .terms import Terms
+
+UNITS = {
+    "points": "m",
+    "rest_lengths": "m",
+    "stiffness": "N/m",
+    "masses": "kg",
+    "thickness": "m",
+    "forces": "N",
+    "energy": "J",
+    "expected_error": "1",
+    "largest_stable_step": "s",
+}
+"""Units of what a net holds; those of terms stand with them."""
+
+MEANING = (
+    "displacement of the load over that of finite elements, less 1: above zero where the springs are too soft; linear "
+    "kinematics, small strain"
+)
+"""What an expected error is."""
+
+STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
+"""What a largest stable step is."""
+
+NOT_COMPUTED = "not computed"
+"""How a text begins that stands in the place of a number."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpringNet:
+    """A network of springs as plain arrays, in SI units.
+
+    Attributes
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        Particles at rest [m].
+    springs : ndarray of int, shape (n_springs, 2)
+        Particles at the two ends of each spring, counted from 0: all edges of the mesh, sorted.
+    rest_lengths : ndarray of float, shape (n_springs,)
+        [m]
+    stiffness : ndarray of float, shape (n_springs,)
+        [N/m]; 0 for edges that a definition gives no spring, as where the law of all springs is part of `energies`.
+    energies : tuple of Terms
+        What there is besides springs; empty for springs alone.
+    masses : ndarray of float, shape (n_points,), or None
+        Of particles [kg]; None where the material has no density.
+    thickness : float
+        Of the sheet [m].
+    held : ndarray of bool, shape (n_points, 2)
+        Where a particle cannot move in x or y; nowhere without a load.
+    forces : ndarray of float, shape (n_points, 2)
+        Of the load on each particle [N]; zero without a load.
+    header : dict
+        Plain texts, numbers and dicts: definition, its formula and source, beam, material, mesh, load, expected errors
+        [1], largest stable time steps [s], units, and the version of springtune.
+    triangles : ndarray of int, shape (n_triangles, 3)
+        Cells of the mesh.
+    quads : ndarray of int, shape (n_quads, 4)
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> net = st.SpringNet.from_mesh(mesh, steel, "area", beam=beam)
+    >>> print(f"{net.stiffness.max():.4g} N/m, {net.masses.sum():.4g} kg, {net.energies[0].formula}")
+    1.865e+08 N/m, 0.0628 kg, W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area
+    >>> print({load: f"{100 * error:+.1f} %" for load, error in net.header["expected_error"].items()})
+    {'traction': '+4.0 %', 'bending': '+1.7 %', 'shear': '-0.2 %'}
+    >>> print(f"{1e9 * net.header['largest_stable_step']['central-difference']:.0f} ns")
+    634 ns
+    >>> [path.name for path in net.write("net.json")]
+    ['net.json']
+    >>> (st.SpringNet.read("net.json").stiffness == net.stiffness).all().item()
+    True
+    """
+
+    points: np.ndarray
+    springs: np.ndarray
+    rest_lengths: np.ndarray
+    stiffness: np.ndarray
+    energies: tuple[Terms, ...]
+    masses: np.ndarray | None
+    thickness: float
+    held: np.ndarray
+    forces: np.ndarray
+    header: dict[str, Any]
+    triangles: np.ndarray = field(default_factory=lambda: no_cells(3))
+    quads: np.ndarray = field(default_factory=lambda: no_cells(4))
+
+    @classmethod
+    def from_scene(
+        cls, scene: Scene, mesh_name: str = "", *, springs: Springs | None = None, errors: bool = True
+    ) -> "SpringNet":
+        """Springs of a scene, held and loaded as it is.
+
+        Parameters
+        ----------
+        scene : Scene
+        mesh_name : str, optional
+            What the header calls the mesh, such as ``"structured 2 mm"``.
+        springs : Springs, optional
+            In the place of the scene's own.
+        errors : bool, optional
+            Whether the header shall say the expected errors, which takes a solve a load.
+
+        Returns
+        -------
+        SpringNet
+
+        Raises
+        ------
+        DefinitionError
+            If the definition cannot live on the mesh or with the material.
+        """
+        springs = scene.springs if springs is None else springs
+        parts = _parts(scene.sheet, springs, scene.material, scene.kind, scene.force)
+        load = {
+            "name": scene.load,
+            "force": scene.force,
+            "kinematics": scene.kinematics,
+            "follower": scene.follower,
+        }
+        header = _header(scene.definition, scene.sheet, scene.material, springs, scene.kind, mesh_name)
+        header |= {"beam": _beam(scene.beam), "load": load}
+        if errors:
+            header["expected_error"] = _expected_errors(
+                scene.sheet, scene.definition, springs, scene.beam, scene.material, scene.load
+            )
+        return cls(**parts, header=header)
+
+    @classmethod
+    def from_mesh(
+        cls,
+        mesh: Mesh,
+        material: Material,
+        definition: AnyDefinition = "patch",
+        *,
+        thickness: float | str = 1e-3,
+        beam: Beam | None = None,
+        stiffness: float | str | None = None,
+        springs: Springs | None = None,
+        mesh_name: str = "",
+        errors: bool = True,
+    ) -> "SpringNet":
+        """Springs of a definition on a mesh of any outline, without a load.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        material : Material
+        definition : str, Definition or callable, optional
+            As of `springtune.Scene`.
+        thickness : float or str, optional
+            Of the sheet [m]; the beam's where there is one.
+        beam : Beam, optional
+            That the mesh fills: with it the header says the expected errors.
+        stiffness : float or str, optional
+            Uniform stiffness [N/m], for definitions that are told one.
+        springs : Springs, optional
+            In the place of those that the definition gives.
+        mesh_name, errors : optional
+            As of `from_scene`.
+
+        Returns
+        -------
+        SpringNet
+
+        Raises
+        ------
+        ValueError
+            If an argument is unknown or out of its range, or the mesh does not fill the beam.
+        DefinitionError
+            If the definition cannot live on the mesh or with the material, or is not told what it needs.
+        """
+        is_a(mesh, Mesh, "mesh", A_MESH)
+        is_a(material, Material, "material", A_MATERIAL)
+        if beam is not None:
+            is_a(beam, Beam, "beam", A_BEAM)
+            check_filled(mesh, beam)
+        chosen = definition_of(definition)
+        sheet = Sheet(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
+        if springs is None:
+            check_stiffness(chosen, stiffness)
+            given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
+            with named(chosen):
+                springs = sheet.derive(chosen, material, given)[0]
+        header = _header(chosen, sheet, material, springs, None, mesh_name)
+        if beam is None:
+            header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
+        else:
+            header["beam"] = _beam(beam)
+            if errors:
+                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material)
+        return cls(**_parts(sheet, springs, material, None, 0.0), header=header)
+
+    def write(self, path: str | Path) -> list[Path]:
+        """Write the net in the format that the ending of a name says; files appear whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
+            beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
+            ``.vtu`` has springs as lines, for ParaView and meshio.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        ValueError
+            If the name has another ending.
+        """
+        return write(path, content_of(self))
+
+    @classmethod
+    def read(cls, path: str | Path) -> "SpringNet":
+        """Read a net; it has the very numbers that were written.
+
+        Parameters
+        ----------
+        path : str or Path
+            As of `write`.
+
+        Returns
+        -------
+        SpringNet
+
+        Raises
+        ------
+        ValueError
+            If there is no such file, or it is not as `write` writes it.
+        """
+        arrays, energies, header = read(path)
+        parts: dict[str, Any] = {"masses": None} | arrays
+        return cls(**parts, energies=energies, thickness=header["thickness"], header=header)
+
+
+def content_of(net: SpringNet) -> Content:
+    """What the files of a net hold.
+
+    Parameters
+    ----------
+    net : SpringNet
+
+    Returns
+    -------
+    Content
+    """
+    arrays = {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
+    return Content(arrays, net.energies, net.header | {"thickness": float(net.thickness)})
+
+
+def terms(energy: Energy, reference: float) -> Terms:
+    """Energy of a network as plain arrays.
+
+    Parameters
+    ----------
+    energy : Energy
+    reference : float
+        Reference stiffness that its moduli are over [N/m].
+
+    Returns
+    -------
+    Terms
+
+    Raises
+    ------
+    DefinitionError
+        If it is of none of the kinds of `springtune.mechanics.energies`.
+    """
+    points, corners = energy.points, energy.corners
+    values: dict[str, np.ndarray]
+    if isinstance(energy, AreaEnergy):
+        values = {"rest_area": signed_areas(points, corners), "modulus": reference * energy.modulus}
+        return Terms("area", corners, values)
+    if isinstance(energy, AngleEnergy):
+        values = {"rest_angle": corner_angles(points, corners), "modulus": reference * energy.modulus}
+        return Terms("angle", corners, values)
+    if isinstance(energy, BiquadraticEnergy):
+        sides = np.roll(points[corners], 1, axis=1) - np.roll(points[corners], -1, axis=1)
+        coupling = np.zeros(energy.tensile.shape) if energy.coupling is None else energy.coupling
+        values = {
+            "rest_length": np.linalg.norm(sides, axis=2),
+            "tensile": reference * energy.tensile,
+            "coupling": reference * coupling,
+        }
+        return Terms("biquadratic", corners, values)
+    raise DefinitionError(
+        f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
+    )
+
+
+def _parts(sheet: Sheet, springs: Springs, material: Material, kind: LoadKind | None, force: float) -> dict[str, Any]:
+    """Arrays of a net."""
+    mesh, none = sheet.mesh, np.zeros(sheet.mesh.points.shape)
+    density = material.density
+    return {
+        "points": mesh.points,
+        "springs": mesh.edges,
+        "rest_lengths": mesh.edge_lengths,
+        "stiffness": springs.reference * springs.relative,
+        "energies": _merged([terms(energy, springs.reference) for energy in springs.energies]),
+        "masses": None if density is None else masses(mesh, density, sheet.thickness),
+        "thickness": sheet.thickness,
+        "held": none.astype(bool) if kind is None else sheet.held(kind),
+        "forces": none if kind is None else force * sheet.pattern(kind, springs),
+        "triangles": mesh.triangles,
+        "quads": mesh.quads,
+    }
+
+
+def _merged(given: list[Terms]) -> tuple[Terms, ...]:
+    """Terms of one kind and the same cells as one: energies are proportional to their moduli."""
+    found: dict[tuple[str, int], Terms] = {}
+    for one in given:
+        key = one.kind, one.cells.shape[1]
+        if key in found:
+            moduli = {
+                name: found[key].values[name] + values
+                for name, values in one.values.items()
+                if not name.startswith("rest_")
+            }
+            one = Terms(one.kind, one.cells, one.values | moduli)
+        found[key] = one
+    return tuple(found.values())
+
+
+def _header(
+    definition: Definition | OwnDefinition,
+    sheet: Sheet,
+    material: Material,
+    springs: Springs,
+    kind: LoadKind | None,
+    mesh_name: str,
+) -> dict[str, Any]:
+    """What a net says of itself, but for what a scene adds."""
+    mesh, (formula, source) = sheet.mesh, described(definition)
+    counts = {
+        "particles": len(mesh.points),
+        "springs": len(mesh.edges),
+        "triangles": len(mesh.triangles),
+        "quads": len(mesh.quads),
+    }
+    return {
+        "made_by": f"springtune {__version__}",
+        "definition": definition.name,
+        "formula": formula,
+        "source": source,
+        "reference_stiffness": float(springs.reference),
+        # Forces on the long faces that belong to the springs; they are part of the forces of a load.
+        **({"lateral_stress": springs.lateral} if springs.lateral else {}),
+        "thickness": float(sheet.thickness),
+        "beam": None,
+        "material": {
+            "name": material.name,
+            "young_modulus": material.young_modulus,
+            "poisson_ratio": material.poisson_ratio,
+            "density": material.density,
+        },
+        "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
+        "load": None,
+        "expected_error": f"{NOT_COMPUTED}: not asked for",
+        "expected_error_means": MEANING,
+        "largest_stable_step": _stable_steps(sheet, springs, material, kind),
+        "largest_stable_step_means": STEP_MEANING,
+        "units": UNITS
+        | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
+    }
+
+
+def _beam(beam: Beam) -> dict[str, Any]:
+    return {"name": beam.name, "length": beam.length, "height": beam.height, "thickness": beam.thickness}
+
+
+def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
+    """Formula of a definition in words, and where it comes from.
+
+    Parameters
+    ----------
+    definition : Definition or OwnDefinition
+
+    Returns
+    -------
+    formula : str
+        First line of its function's docstring, which `springtune definitions` shows.
+    source : str
+        Docstring of its module, which has formula, source and assumptions; of a function of one's own its own.
+    """
+    function = inspect.unwrap(definition.function)
+    own = inspect.getdoc(function) or ""
+    module = sys.modules.get(function.__module__)
+    of_package = function.__module__.startswith(f"{DefinitionError.__module__.rpartition('.')[0]}.")
+    source = (inspect.getdoc(module) if of_package and module else own) or ""
+    return own.partition("\n")[0].rstrip("."), source
+
+
+def _expected_errors(
+    sheet: Sheet,
+    definition: Definition | OwnDefinition,
+    springs: Springs,
+    beam: Beam,
+    material: Material,
+    load: str | None = None,
+) -> dict[str, float | str]:
+    """Error of the displacement by load, linear kinematics against the reference of small strain; or why none."""
+    from ..prediction import CASES, SOLVED, references  # here, since finite elements take half a second to import
+    from ..reference.small_strain import ReferenceNotConvergedError, solve_small_strain
+
+    names = [*CASES]
+    if load is not None and LOADS[load].kind not in [LOADS[name].kind for name in names]:
+        names.append(load)
+    count = len(sheet.mesh.points)
+    if count > SOLVED:
+        why = f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header"
+        return dict.fromkeys(names, why)
+    known: dict[str, Any] = dict(references(beam, material))
+    errors: dict[str, float | str] = {}
+    for name in names:
+        kind = LOADS[name].kind
+        if definition.uniaxial and not kind.uniaxial:
+            errors[name] = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
+            continue
+        try:
+            if name not in known:
+                known[name] = solve_small_strain(beam, material, 1.0, kind=kind)
+            if isinstance(known[name], str):
+                errors[name] = f"{NOT_COMPUTED}: {known[name]}"
+                continue
+            found = sheet.solve(kind, springs, springs.reference, "linear")
+        except (SingularError, ReferenceNotConvergedError) as error:
+            errors[name] = f"{NOT_COMPUTED}: {error}"
+            continue
+        if found.status is Status.SOLVED:
+            errors[name] = float(found.displacement / (springs.reference * known[name].displacement) - 1)
+        else:
+            errors[name] = f"{NOT_COMPUTED}: {found.message}"
+    return errors
+
+
+def _stable_steps(
+    sheet: Sheet, springs: Springs, material: Material, kind: LoadKind | None
+) -> dict[str, float | str] | str:
+    """Largest stable step of each integrator, undamped [s], or that any is stable; or why there is none."""
+    if material.density is None:
+        return f"{NOT_COMPUTED}: material '{material.name}' has no density"
+    if kind is None:
+        free = np.zeros(sheet.mesh.points.shape, dtype=bool)
+        inertia = masses(sheet.mesh, material.density, sheet.thickness) / springs.reference
+        motion = Motion(Network(sheet.mesh, free, springs.relative, springs.energies), inertia)
+    else:
+        motion = motion_of(sheet, kind, springs, material.density)
+    try:
+        return {name: "unlimited" if name in IMPLICIT else motion.step_limit(name) for name in INTEGRATORS}
+    except ArpackError as error:
+        return f"{NOT_COMPUTED}: {error}"
