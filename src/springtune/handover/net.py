@@ -35,7 +35,7 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import motion_of
-from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, definition_of, named
+from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..springs import Definition, DefinitionError, Springs
 from .formats import ARRAYS, Content, read, write
@@ -198,6 +198,7 @@ class SpringNet:
         chosen = definition_of(definition)
         sheet = Sheet(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
         if springs is None:
+            check_stiffness(chosen, stiffness)
             given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
             with named(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
@@ -356,6 +357,8 @@ def _header(
         "formula": formula,
         "source": source,
         "reference_stiffness": float(springs.reference),
+        # Forces on the long faces that belong to the springs; they are part of the forces of a load.
+        **({"lateral_stress": springs.lateral} if springs.lateral else {}),
         "thickness": float(sheet.thickness),
         "beam": None,
         "material": {
@@ -366,7 +369,8 @@ def _header(
         },
         "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
         "load": None,
-        "units": UNITS | {"reference_stiffness": "N/m", "young_modulus": "Pa", "density": "kg/m3"},
+        "units": UNITS
+        | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
     }
 
 

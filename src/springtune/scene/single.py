@@ -21,7 +21,7 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..springs import Springs
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
-from .sheet import AnyDefinition, Sheet, chosen, definition_of, named
+from .sheet import AnyDefinition, Sheet, check_stiffness, chosen, definition_of, named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -127,16 +127,7 @@ class Scene:
             raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
         self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
-        if (self.definition.needs == "stiffness") != (stiffness is not None):
-            if stiffness is None:
-                raise ValueError(
-                    f"stiffness: definition {self.definition.name!r} needs a uniform one; give a stiffness such as "
-                    "'170e6 N/m'"
-                )
-            raise ValueError(
-                f"stiffness: {stiffness!r} is not used, since definition {self.definition.name!r} derives its own; "
-                "leave it out, or choose 'paper'"
-            )
+        check_stiffness(self.definition, stiffness)
         if sheet is not None:
             is_a(sheet, Sheet, "sheet", "that of another scene")
         self.sheet = Sheet(mesh, beam.thickness) if sheet is None else sheet
