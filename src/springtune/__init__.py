@@ -15,6 +15,7 @@ solved: 9.51 mm, error +0.1 %
 __version__ = "0.1.0"
 
 _NAMES = {
+    "handover.net": ("SpringNet",),
     "kinds": ("load_study",),
     "kinds.benchmark.figures": (
         "plot_benchmark",
@@ -68,6 +69,7 @@ __all__ = [
     "Moduli",
     "Result",
     "Scene",
+    "SpringNet",
     "Springs",
     "Status",
     "StudyError",

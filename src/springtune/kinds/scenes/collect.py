@@ -9,7 +9,7 @@ from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
 from ...problem.loads import LOADS
 from ...problem.status import Status
-from ...reference.field import outline
+from ...reference.field import interpolate, outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
 from . import plan, stored_mesh, stored_reference
@@ -292,7 +292,8 @@ def _fields(study, folder, axes):
         mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))
     ]
     meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
-    outlines = {one: _outline(folder, one) for one in study.references}
+    # Whole references of a large study are more than memory has: what is wanted of each is taken at once.
+    looked_at = {one: _looked_at(folder, one, meshes) for one in study.references}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {
         "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
@@ -300,7 +301,7 @@ def _fields(study, folder, axes):
         "spring_end": 2,
         "cell": max((len(corners) for corners in cells.values()), default=1),
         "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
-        "outline_point": max(len(points) for points, _ in outlines.values()),
+        "outline_point": max(len(points) for points, _, _ in looked_at.values()),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
     fields = Filler(FIELDS.empty(axes | numbers))
@@ -310,13 +311,16 @@ def _fields(study, folder, axes):
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
     for one in study.references:
-        points, displacements = outlines[one]
+        points, displacements, of_meshes = looked_at[one]
         moved = one.force * displacements
         beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
         fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
         fields.put_rows(
             {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
         )
+        for spec, field in of_meshes.items():
+            x, y = one.force * field.T
+            fields.put_rows({"particle_reference_x": x, "particle_reference_y": y}, **_mesh_labels(spec), **load)
     return fields
 
 
@@ -330,9 +334,14 @@ def _cells(mesh):
     return cells
 
 
-def _outline(folder, one):
-    """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
+def _looked_at(folder, one, meshes):
+    """What is kept of a reference: points of its outline and their displacements; those of the particles of meshes.
+
+    Displacements are for 1 N [m]; nothing is there of a reference that has none.
+    """
     result = _reference(folder, one, ["x", "y", "displacements"])
     if "x" not in result:
-        return np.zeros((0, 2)), np.zeros((0, 2))
-    return outline(result["x"], result["y"], result["displacements"])
+        return np.zeros((0, 2)), np.zeros((0, 2)), {}
+    grid = result["x"], result["y"], result["displacements"]
+    fields = {spec: interpolate(*grid, mesh.points) for spec, mesh in meshes.items() if spec.beam == one.beam}
+    return *outline(*grid), fields
