@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..problem.geometry import Beam
     from ..problem.materials import Material
 
-OPTIONS = re.compile(r"^(?=(load|force|definition|stiffness)\b)")
+OPTIONS = re.compile(r"^(?=(load|force|definition|stiffness|density)\b)")
 """Beginnings of messages that name an argument, which is an option here."""
 
 

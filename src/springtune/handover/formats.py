@@ -10,8 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..jobs.atomic import replacing, write_text
+from .mujoco import mjcf
 from .paraview import comment_of, write_vtu
+from .simulation import Net
+from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Terms
+from .xpbd import xpbd
 
 ARRAYS = {
     "points": (float, 2, "m"),
@@ -530,6 +534,22 @@ def _read_h5(path: Path) -> Content:
         return Content(arrays, energies, _header_in(file["header"]))
 
 
+# -- simulators ----------------------------------------------------------------------------------------------------
+
+
+def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
+    """Format of a simulator, which is not read."""
+
+    def write_it(path: Path, content: Content) -> list[Path]:
+        write_text(path, text(Net(**content.arrays, energies=content.energies, header=content.header)))
+        return [path]
+
+    def refuse(path: Path) -> Content:
+        raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
+
+    return _Format(write_it, refuse)
+
+
 class _Format(NamedTuple):
     """How a net is written in a format, and read."""
 
@@ -542,6 +562,11 @@ _FORMATS = {
     ".json": _Format(_write_json, _read_json),
     ".vtu": _Format(_write_vtu, _read_vtu),
     ".h5": _Format(_write_h5, _read_h5),
+    ".xml": _for_simulator("MuJoCo", mjcf),
+    ".mjcf": _for_simulator("MuJoCo", mjcf),
+    ".scn": _for_simulator("SOFA", sofa_xml),
+    ".py": _for_simulator("SOFA", sofa_python),
+    ".xpbd.json": _for_simulator("XPBD", xpbd),
 }
 
 ENDINGS = tuple(_FORMATS)
@@ -549,7 +574,9 @@ ENDINGS = tuple(_FORMATS)
 
 
 def _format_of(path: Path) -> _Format:
-    form = _FORMATS.get(path.suffix.lower())
+    # The longest ending that fits: .xpbd.json is not .json.
+    ending = max((one for one in ENDINGS if path.name.lower().endswith(one)), key=len, default="")
+    form = _FORMATS.get(ending)
     if form is None:
         raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(ENDINGS)}")
     return form

@@ -2,27 +2,29 @@
 
 Each particle that can move is a body on a slide joint for each direction that is not held, each spring a spatial tendon
 with its stiffness and its rest length: MuJoCo's law is ``stiffness (springlength - length)`` along the tendon, which is
-that of springtune. One fixed tendon and one actuator hold the whole load: force over the actuator's control, so that
-whoever opens the file sees it move, and can change the load by one slider. The damping is that of the joints, which
-MuJoCo's integrator Euler takes implicitly; all else is as in `symplectic-euler`, whose largest stable step is known.
+that of springtune, in tension and in compression. A fixed tendon spreads the load, and one actuator is the load, its
+control added to it: whoever opens the file sees it move, and changes the load by a slider. Damping is that of the
+joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
 
-Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles, and
-so is MuJoCo's flex of two dimensions, with Lame constants per area of its own: the model's
+Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
+and so is MuJoCo's flex of two dimensions (3.5 and later), but for what it calls young and poisson. Its shear modulus
+and Lame's first constant, times the thickness, are
 
     mu t = thickness young / (8 (1 + poisson)),
     lambda t = thickness young poisson / (2 (1 + poisson) (1 - 2 poisson)),
 
-found by the stiffness matrices of single triangles in MuJoCo 3.5.0 and 3.17.0 and equal to 1e-10. Its young and poisson
-are therefore not those of the material, but those which give the lambda t and mu t of plane stress.
+as the stiffness matrices of single triangles in MuJoCo 3.5.0 and 3.17.0 have it, to rounding. The file has the young
+and poisson with which they are those of plane stress. Bodies of a flex may have no damping in their joints, so a
+fixed tendon for each joint has it.
 """
+
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from ..mesh import corner_angles, signed_areas
 from .simulation import Net, Simulation, about, commented, numbers, simulate
 from .terms import Terms
-
-PROGRAM = "MuJoCo"
 
 LEAST_MASS = 1e-15
 """Mass below which MuJoCo takes no body that moves [kg]."""
@@ -48,27 +50,21 @@ def mjcf(net: Net) -> str:
     ValueError
         If MuJoCo has no law of the net's energies, or the net has no masses, linear kinematics or a load that turns.
 
-    Notes
-    -----
-    Compression and traction alike are laws of springs of length: tendons push, too. A flex needs MuJoCo 3.5.
-
     Examples
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("40 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), steel, "traction", "1 kN", definition="lattice")
-    >>> print("\\n".join(mjcf(st.SpringNet.from_scene(scene)).splitlines()[-4:]))
-      <keyframe>
-        <key name="predicted" qpos="..."/>
-      </keyframe>
-    </mujoco>
+    >>> [path] = scene.springs.write("net.xml")
+    >>> next(line for line in path.read_text().splitlines() if "<spatial" in line).strip()
+    '<spatial stiffness="90932667.39736606" springlength="0.02"><site site="p0"/><site site="p1"/></spatial>'
     """
-    simulation = simulate(net, PROGRAM, ("biquadratic",))
+    simulation = simulate(net, "MuJoCo", ("biquadratic",))
     moving = ~net.held.all(axis=1)
     least = float(simulation.masses[moving].min())
     if least < LEAST_MASS:
         raise ValueError(
-            f"masses: the least one is {least:.3g} kg, and {PROGRAM} takes {LEAST_MASS:g} kg and more; take larger "
+            f"masses: the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more; take larger "
             "cells or a thicker sheet"
         )
     size = float(net.rest_lengths.mean())
@@ -79,7 +75,7 @@ def mjcf(net: Net) -> str:
     said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
     flex = [_flex(net, terms, size) for terms in net.energies]
     lines = [
-        f'<mujoco model="{_model(net)}">',
+        f"<mujoco model={quoteattr(_model(net))}>",
         *commented(about(net, simulation, said), "  "),
         f'  <option timestep="{simulation.step!r}" integrator="Euler" gravity="0 0 0">',
         f'    <flag contact="disable"{keep}/>',
@@ -174,8 +170,8 @@ def _flex(net: Net, terms: Terms, size: float) -> str:
             "  <deformable>",
             *commented(
                 [
-                    "Delingette's springs. young and poisson are those that give MuJoCo's flex, for a thickness of 1,",
-                    f"the material's Lame constants of plane stress times its thickness: {first:.6g}, {second:.6g} N/m.",
+                    "Delingette's springs: young and poisson are those with which a flex has the Lame constants of",
+                    f"plane stress, times the thickness: lambda t = {first:.6g} N/m, mu t = {second:.6g} N/m.",
                 ],
                 "    ",
             ),
@@ -189,7 +185,7 @@ def _flex(net: Net, terms: Terms, size: float) -> str:
 
 
 def _lame(net: Net, terms: Terms) -> tuple[float, float]:
-    """lambda t and mu t of plane stress [N/m] that give all triangles their springs."""
+    """Lame constants of plane stress, times the thickness [N/m], that give all triangles their springs."""
     areas = 16 * signed_areas(net.points, terms.cells)[:, None]
     cotangents = 1 / np.tan(corner_angles(net.points, terms.cells))
     products = np.roll(cotangents, -1, axis=1) * np.roll(cotangents, -2, axis=1)
@@ -203,7 +199,7 @@ def _lame(net: Net, terms: Terms) -> tuple[float, float]:
     if away > 1e-9 or not (twice > 0 and first > -1e-9 * twice):
         raise ValueError(
             f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
-            f"{PROGRAM}'s flex has the law of a material alone; take 'delingette', or a definition of springs alone, "
+            f"MuJoCo's flex has the law of a material alone; take 'delingette', or a definition of springs alone, "
             "such as 'patch'"
         )
     return max(first, 0.0), float(twice) / 2

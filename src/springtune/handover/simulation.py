@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..mesh import Mesh
 from ..problem.status import Status
 from .terms import Terms
 
-SHARE = 0.8
+STEP_SHARE = 0.8
 """Step that is written, over the largest stable one at rest: springs that are stretched by a quarter vibrate faster by
 a tenth, and a load that is switched on stretches them twice as far as it does in the end."""
 
@@ -23,31 +23,21 @@ WORDS = {"area": "areas", "angle": "angles", "biquadratic": "squared lengths"}
 """What energies besides springs are of, by their kind."""
 
 
-class Net(Protocol):
-    """A network as plain arrays, such as `springtune.SpringNet`, which says what each of them is."""
+@dataclass(frozen=True, eq=False)
+class Net:
+    """A network as plain arrays; the attributes are those of `springtune.SpringNet`, the header with the thickness."""
 
-    @property
-    def points(self) -> np.ndarray: ...
-    @property
-    def springs(self) -> np.ndarray: ...
-    @property
-    def rest_lengths(self) -> np.ndarray: ...
-    @property
-    def stiffness(self) -> np.ndarray: ...
-    @property
-    def energies(self) -> tuple[Terms, ...]: ...
-    @property
-    def masses(self) -> np.ndarray | None: ...
-    @property
-    def held(self) -> np.ndarray: ...
-    @property
-    def forces(self) -> np.ndarray: ...
-    @property
-    def header(self) -> Mapping[str, Any]: ...
-    @property
-    def triangles(self) -> np.ndarray: ...
-    @property
-    def quads(self) -> np.ndarray: ...
+    points: np.ndarray
+    springs: np.ndarray
+    rest_lengths: np.ndarray
+    stiffness: np.ndarray
+    held: np.ndarray
+    forces: np.ndarray
+    triangles: np.ndarray
+    quads: np.ndarray
+    energies: tuple[Terms, ...]
+    header: Mapping[str, Any]
+    masses: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +53,7 @@ class Simulation:
     largest_step : float
         Largest stable step of explicit schemes about rest, undamped [s].
     step : float
-        Step that stays stable while the net moves [s]: `SHARE` of it.
+        Step that stays stable while the net moves [s]: `STEP_SHARE` of it.
     frequency : float
         Lowest frequency that the load excites [rad/s]; 0 without a load.
     mass_damping : float
@@ -128,9 +118,7 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
             displacements = found.displacements if status is Status.SOLVED else None
         except SingularError as error:
             why = str(error)
-    return Simulation(
-        net.masses, force, largest, SHARE * largest, frequency, 2 * frequency, displacements, "" if not why else why
-    )
+    return Simulation(net.masses, force, largest, STEP_SHARE * largest, frequency, 2 * frequency, displacements, why)
 
 
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
@@ -144,8 +132,8 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
         )
     if net.masses is None:
         raise ValueError(
-            f"material '{net.header['material']['name']}': has no density, and {program} moves masses; give one, such "
-            "as '7850 kg/m^3'"
+            f"density: material '{net.header['material']['name']}' has none, and {program} moves masses; give a "
+            "density such as '7850 kg/m^3'"
         )
     load = net.header.get("load")
     if load and load["follower"]:
@@ -195,7 +183,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
         f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",
         f"{len(net.points)} particles, {len(net.springs) - left_out} springs; m, kg, s, N.",
         f"Material '{material['name']}': Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio "
-        f"{material['poisson_ratio']:g}, density {material['density']:g} kg/m3; thickness {_thickness(net):g} m.",
+        f"{material['poisson_ratio']:g}, density {material['density']:g} kg/m3; thickness {header['thickness']:g} m.",
     ]
     if left_out:
         lines.append(f"{left_out} springs of no stiffness are left out.")
@@ -216,10 +204,6 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     if simulation.force and simulation.why:
         lines.append(f"No equilibrium was found: {simulation.why}.")
     return lines
-
-
-def _thickness(net: Net) -> float:
-    return float(net.header.get("thickness", getattr(net, "thickness", np.nan)))
 
 
 def numbers(values: np.ndarray) -> str:

@@ -1,10 +1,10 @@
 """Scenes for SOFA, as XML (.scn) and in Python (.py, for SofaPython3).
 
 Written after the sources of SOFA v24.06 to v26.06, not run there: SOFA has no wheel. `SpringForceField` reads
-``spring="first second stiffness damping rest_length ..."``, so each spring has its own stiffness [N/m] and rest length,
-and its law is ``stiffness (length - rest_length)``, that of springtune. `MeshSpringForceField` will not do: it makes one
-stiffness of all edges, divides it by their lengths, and since v24.12 passes over springs that it is given (sofa issue
-5135). The particles are of three dimensions, all held across the plane: each component has these templates.
+``spring="first second stiffness damping rest_length ..."``, so each spring has its own stiffness [N/m] and rest
+length, and its law is ``stiffness (length - rest_length)``, that of springtune. `MeshSpringForceField` will not do: it
+has one stiffness for all edges, divides it by their lengths, and since v24.12 passes over springs that it is given
+(sofa issue 5135). Particles have three dimensions, that across the plane held: for those every component is there.
 """
 
 from collections.abc import Mapping
@@ -14,12 +14,10 @@ import numpy as np
 
 from .simulation import Net, Simulation, about, commented, numbers, simulate
 
-PROGRAM = "SOFA"
-
 PERIOD = 50
 """Steps of the slowest period that the load excites: backward Euler damps it by 6 % of the critical damping."""
 
-INTEGRATORS = (
+BACKWARD_EULER = (
     ("Sofa.Component.ODESolver.Backward", "EulerImplicitSolver"),
     ("Sofa.Component.IntegrationScheme.Backward", "EulerImplicitIntegrationScheme"),
 )
@@ -92,12 +90,12 @@ def sofa_xml(net: Net) -> str:
     >>> import springtune as st
     >>> beam, steel = st.Beam("40 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), steel, "traction", "1 kN", definition="lattice")
-    >>> text = sofa_xml(st.SpringNet.from_scene(scene))
-    >>> next(line for line in text.splitlines() if "Fixed" in line).strip()
-    '<FixedProjectiveConstraint template="Vec3" indices="0 3"/>'
+    >>> [path] = scene.springs.write("net.scn")
+    >>> next(line for line in path.read_text().splitlines() if "<Fixed" in line).strip()
+    '<FixedProjectiveConstraint template="Vec3" indices="0 1"/>'
     """
     scene = _scene(net)
-    plugin, integrator = INTEGRATORS[0]
+    plugin, integrator = BACKWARD_EULER[0]
     plugins = [Component("RequiredPlugin", {"pluginName": name}) for name in (*PLUGINS, plugin)]
     lines = [
         '<?xml version="1.0"?>',
@@ -114,9 +112,11 @@ def sofa_xml(net: Net) -> str:
 
 
 def _tags(components: list[Component], indent: str) -> list[str]:
-    return [
-        f"{indent}<{one.name}{''.join(f' {key}="{value}"' for key, value in one.data.items())}/>" for one in components
-    ]
+    lines = []
+    for one in components:
+        data = "".join(f' {key}="{value}"' for key, value in one.data.items())
+        lines.append(f"{indent}<{one.name}{data}/>")
+    return lines
 
 
 PYTHON = '''
@@ -140,7 +140,7 @@ def createScene(root):
 
 def add_integrator(root, sheet):
     """Backward Euler, whose plugin and component have other names since v26.06."""
-    for plugin, name in INTEGRATORS:
+    for plugin, name in BACKWARD_EULER:
         try:
             root.addObject("RequiredPlugin", pluginName=plugin)
             return sheet.addObject(name, **INTEGRATOR)
@@ -164,7 +164,7 @@ def sofa_python(net: Net) -> str:
     said = "\n".join(f"# {line}" for line in scene.about)
     entries = {
         "PLUGINS": repr(PLUGINS),
-        "INTEGRATORS": repr(INTEGRATORS),
+        "BACKWARD_EULER": repr(BACKWARD_EULER),
         "INTEGRATOR": repr(dict(scene.sheet[0].data)),
         "ROOT": _rows(scene.root),
         "SHEET": _rows(scene.sheet[1:]),
@@ -181,7 +181,7 @@ def _rows(components: list[Component]) -> str:
 
 
 def _scene(net: Net) -> SofaScene:
-    simulation = simulate(net, PROGRAM)
+    simulation = simulate(net, "SOFA")
     step = float(2 * np.pi / simulation.frequency / PERIOD) if simulation.frequency else simulation.step
     there = net.stiffness != 0
     springs = " ".join(

@@ -11,8 +11,6 @@ import numpy as np
 
 from .simulation import Net, simulate
 
-PROGRAM = "XPBD"
-
 CONTENT = {
     "points": "particles at rest [m]",
     "inverse_masses": "of the particles [1/kg]; 0 where a particle is held",
@@ -50,20 +48,21 @@ def xpbd(net: Net) -> str:
     >>> import springtune as st
     >>> beam, steel = st.Beam("40 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), steel, "traction", "1 kN", definition="lattice")
-    >>> found = json.loads(xpbd(st.SpringNet.from_scene(scene)))
+    >>> [path] = scene.springs.write("net.xpbd.json")
+    >>> found = json.loads(path.read_text())
     >>> found["inverse_masses"][0], f"{found['constraints']['compliance'][0]:.3g} m/N"
     (0.0, '1.1e-08 m/N')
     """
-    simulation = simulate(net, PROGRAM)
+    simulation = simulate(net, "XPBD")
     negative = int((net.stiffness < 0).sum())
     if negative:
         raise ValueError(
             f"definition '{net.header['definition']}': {negative} of {len(net.springs)} springs have a negative "
-            f"stiffness, and no compliance of {PROGRAM} is negative; take a mesh with less slender or obtuse cells, or "
+            f"stiffness, and no compliance of XPBD is negative; take a mesh with less slender or obtuse cells, or "
             "'patch' or 'lattice', whose springs all pull"
         )
     there = net.stiffness > 0
-    whole = net.held.all(axis=1)
+    whole = np.asarray(net.held.all(axis=1))
     step = 2 * np.pi / simulation.frequency / 50 if simulation.frequency else simulation.step
     displacements = simulation.displacements
     content: dict[str, Any] = {
@@ -71,7 +70,7 @@ def xpbd(net: Net) -> str:
         "content": CONTENT,
         "points": net.points.tolist(),
         "inverse_masses": np.where(whole, 0.0, 1 / simulation.masses).tolist(),
-        "held_directions": np.argwhere(net.held & ~whole[:, None]).tolist(),
+        "held_directions": np.argwhere(net.held & ~np.repeat(whole[:, None], 2, axis=1)).tolist(),
         "forces": net.forces.tolist(),
         "constraints": {
             "particles": net.springs[there].tolist(),
