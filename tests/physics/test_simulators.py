@@ -23,6 +23,12 @@ LOADED = tuple(FORCES)
 PROGRAMS = {".xml": "MuJoCo", ".mjcf": "MuJoCo", ".scn": "SOFA", ".py": "SOFA", ".xpbd.json": "XPBD"}
 
 
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path_factory, monkeypatch):
+    """A folder for MuJoCo's log: it writes its warnings into the current one."""
+    monkeypatch.chdir(tmp_path_factory.mktemp("log"))
+
+
 def scene(mesh_type="structured", load="traction", definition="lattice", force=None, size="5 mm", **options):
     """A scene of the beam of these tests."""
     material = options.pop("material", STEEL)

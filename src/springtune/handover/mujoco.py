@@ -68,7 +68,9 @@ def mjcf(net: Net) -> str:
             "cells or a thicker sheet"
         )
     size = float(net.rest_lengths.mean())
-    low, high = net.points.min(axis=0), net.points.max(axis=0)
+    moved = 0.0 if simulation.displacements is None else simulation.displacements
+    seen = np.concatenate([net.points, net.points + moved])
+    low, high = seen.min(axis=0), seen.max(axis=0)
     centre = " ".join(f"{value:.6g}" for value in (low + high) / 2)
     accelerations = np.abs(np.where(net.held, 0, net.forces)).max(axis=1) / simulation.masses
     keep = ' autoreset="disable"' if accelerations.max() > LARGEST_ACCELERATION else ""
@@ -80,14 +82,17 @@ def mjcf(net: Net) -> str:
         f'  <option timestep="{simulation.step!r}" integrator="Euler" gravity="0 0 0">',
         f'    <flag contact="disable"{keep}/>',
         "  </option>",
-        f'  <statistic center="{centre} 0" extent="{float(np.hypot(*(high - low))):.6g}" meansize="{size:.6g}"/>',
+        f'  <statistic center="{centre} 0" extent="{0.6 * float(np.hypot(*(high - low))):.6g}" meansize="{size:.6g}"/>',
         "  <visual>",
         '    <global azimuth="90" elevation="-90"/>',
         '    <headlight ambient="0.6 0.6 0.6" diffuse="0.4 0.4 0.4"/>',
         "  </visual>",
+        "  <asset>",
+        '    <texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/>',
+        "  </asset>",
         "  <default>",
         f'    <site size="{size / 8:.6g}" rgba="0.2 0.2 0.25 1"/>',
-        f'    <tendon width="{size / 20:.6g}" rgba="0.2 0.45 0.7 1"/>',
+        f'    <tendon width="{size / 16:.6g}" rgba="0.2 0.45 0.7 1"/>',
         '    <default class="x"><joint type="slide" axis="1 0 0"/></default>',
         '    <default class="y"><joint type="slide" axis="0 1 0"/></default>',
         "  </default>",
