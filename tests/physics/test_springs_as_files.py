@@ -2,7 +2,7 @@
 
 import os
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import meshio
 import numpy as np
@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.handover.formats import ENDINGS
+from springtune.kinds.scenes.solve import solve
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
@@ -299,6 +300,19 @@ class TestResult:
         assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("kinematics", ["nonlinear", "linear"])
+@pytest.mark.parametrize(("definition", "mesh_type"), [("area", "free"), ("delingette", "free"), ("flechon", "braced")])
+def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinematics):
+    """Stiffness and force of each spring, which a study keeps with seven digits."""
+    scene = scene_of(definition, mesh_type, kinematics=kinematics)
+    task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
+    stored = solve(scene.sheet, task | {"force": scene.force, "kinematics": kinematics}, keep_fields=True)
+    result = scene.solve()
+    assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
+    assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
+    assert result.stiffness.any() == (definition != "delingette")  # whose law is all an energy
+
+
 def series(path):
     """Times of a collection and the grids of its pieces."""
     rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
@@ -430,6 +444,7 @@ class TestCommand:
         "mesh": (("--mesh", "none.msh"), "--mesh: 'none.msh' is neither a mesh type nor a file"),
         "not a folder": (("--out", "file/net.csv"), "--out: file/net.csv: "),
         "a folder": (("--out", "folder.json"), "--out: folder.json: Is a directory"),
+        "a folder for tables": (("--out", "folder.csv"), "--out: folder.csv: Is a directory"),
         "uniaxial": (
             ("--mesh", "braced", "--definition", "baudet-corrected", "--load", "shear", "--force", "1 N"),
             "--definition: 'baudet-corrected' is not for 'shear'",
@@ -440,8 +455,10 @@ class TestCommand:
     def test_refuses_in_a_line_and_writes_nothing(self, options, said, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         (tmp_path / "file").write_text("no folder")
-        (tmp_path / "folder.json").mkdir()
+        for name in ("folder.json", "folder.csv"):
+            (tmp_path / name).mkdir()
         result = self.run(*self.STEEL, "--out", "net.csv", *options)
         assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1, result.output
         assert result.stderr.startswith(said) or said in result.stderr
-        assert sorted(os.listdir()) == ["file", "folder.json"] and not os.listdir("folder.json")
+        assert sorted(os.listdir()) == ["file", "folder.csv", "folder.json"]
+        assert not os.listdir("folder.json") and not os.listdir("folder.csv")

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -219,9 +220,11 @@ def _write_csv(path: Path, content: Content) -> list[Path]:
         if others[name] in tables
     ]
     said += [f"# {line}" for line in _header_lines(content.header)]
-    for other, table in tables.items():
-        write_text(other, _csv_text(table))
-    write_text(path, "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS)))
+    texts = {other: _csv_text(table) for other, table in tables.items()}
+    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
+    with ExitStack() as unfinished:  # the last one is the first to get its name: where it cannot, none does
+        for one, text in texts.items():
+            unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
     for other in set(others.values()) - set(tables):
         other.unlink(missing_ok=True)  # of another net, written before
     return [path, *tables]

@@ -439,14 +439,14 @@ def _write_scene(tree: xr.DataTree, labels: Mapping[str, str | float], path: Pat
         if np.isfinite(expected).all():
             error = of_particles["displacement"] - expected
             of_particles |= {"reference_displacement": expected, "error": error}
-    of_springs = {name: {2: found[name].values} for name in ("stiffness", "force")}
+    of_springs = {name: {2: found[name].values} for name in ("stiffness", "force") if name in found}
     root = tree.to_dataset()
     numbers = {}
-    for name in ("displacement", "reference_displacement", "deformation_error", "force"):
+    for name in ("displacement", "reference_displacement", "deformation_error"):
         if name in root:
             here = root[name].sel({dim: label for dim, label in labels.items() if dim in root[name].dims})
             if here.ndim == 0 and np.isfinite(here):
-                numbers[name] = float(here)
+                numbers[name if name == "deformation_error" else f"{name}_of_the_load"] = float(here)
     said = {"title": tree.attrs.get("title", ""), "study": tree.attrs.get("study", ""), **labels}
     units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
     write_vtu(path, points, cells, of_particles, of_springs, numbers, json.dumps(said | {"units": units}, indent=1))
