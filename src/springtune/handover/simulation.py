@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..linalg.factors import SingularError
 from ..mechanics.dynamics import Motion
@@ -55,9 +57,12 @@ class Simulation:
     step : float
         Step that stays stable while the net moves [s]: `STEP_SHARE` of it.
     frequency : float
+        Lowest frequency [rad/s]; 0 without a load.
+    loaded_frequency : float
         Lowest frequency that the load excites [rad/s]; 0 without a load.
     mass_damping : float
-        Damping over mass that is critical for it [1/s].
+        Damping over mass that is critical for the lowest frequency [1/s]: all others oscillate, and none is later at
+        rest.
     displacements : ndarray of float, shape (n_points, 2), or None
         Equilibrium under the load [m]; None where there is none that is stable.
     why : str
@@ -69,6 +74,7 @@ class Simulation:
     largest_step: float
     step: float
     frequency: float
+    loaded_frequency: float
     mass_damping: float
     displacements: np.ndarray | None
     why: str
@@ -108,17 +114,31 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     network = _network(net, reference)
     motion = Motion(network, net.masses / reference, net.forces / reference)
     largest = motion.step_limit("symplectic-euler")
-    displacements, frequency, why = None, 0.0, "there is no load"
+    displacements, lowest, loaded, why = None, 0.0, 0.0, "there is no load"
     if force:
         try:
-            frequency = motion.loaded_frequency
+            lowest, loaded = _lowest_frequency(motion), motion.loaded_frequency
             problem = StaticProblem(network, net.forces / force)
             found = problem.nonlinear(force / reference)
             status, why, _ = problem.judge(force / reference, found)
             displacements = found.displacements if status is Status.SOLVED else None
         except SingularError as error:
             why = str(error)
-    return Simulation(net.masses, force, largest, STEP_SHARE * largest, frequency, 2 * frequency, displacements, why)
+    return Simulation(net.masses, force, largest, STEP_SHARE * largest, lowest, loaded, 2 * lowest, displacements, why)
+
+
+def _lowest_frequency(motion: Motion) -> float:
+    """Lowest frequency at rest [rad/s], by Lanczos' method on the factorized tangent."""
+    size, mass = len(motion.mass), motion.mass
+    if size < 10:
+        root = 1 / np.sqrt(mass)
+        return float(np.sqrt(np.linalg.eigvalsh(root[:, None] * motion.stiffness_matrix.toarray() * root)[0]))
+    inverse = LinearOperator((size, size), matvec=motion.network.rest_factor.solve, dtype=float)
+    start = np.random.default_rng(0).standard_normal(size)
+    (square,) = eigsh(
+        motion.stiffness_matrix, 1, diags_array(mass), sigma=0.0, OPinv=inverse, v0=start, return_eigenvectors=False
+    )
+    return float(np.sqrt(square))
 
 
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
@@ -198,8 +218,8 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     )
     if simulation.frequency:
         lines.append(
-            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, critical for the lowest frequency that the load "
-            f"excites, {simulation.frequency:.4g} rad/s."
+            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, critical for the lowest frequency; the one that "
+            f"the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} times as high."
         )
     if simulation.force and simulation.why:
         lines.append(f"No equilibrium was found: {simulation.why}.")

@@ -182,7 +182,7 @@ def _rows(components: list[Component]) -> str:
 
 def _scene(net: Net) -> SofaScene:
     simulation = simulate(net, "SOFA")
-    step = float(2 * np.pi / simulation.frequency / PERIOD) if simulation.frequency else simulation.step
+    step = float(2 * np.pi / simulation.loaded_frequency / PERIOD) if simulation.loaded_frequency else simulation.step
     there = net.stiffness != 0
     springs = " ".join(
         f"{first} {second} {stiffness!r} 0 {length!r}"
@@ -214,7 +214,7 @@ def _scene(net: Net) -> SofaScene:
     ]
     said = (
         f"the one here is that of backward Euler, a {PERIOD}th of the slowest period that the load excites"
-        if simulation.frequency
+        if simulation.loaded_frequency
         else "the one here is below it"
     )
     predicted = []

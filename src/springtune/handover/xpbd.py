@@ -19,7 +19,8 @@ CONTENT = {
     "constraints": "C = distance of the particles - rest_lengths [m], with compliance [m/N]; one list each",
     "time_step": "a fiftieth of the slowest period that the load excites [s]; XPBD is stable in any, and converges the "
     "sooner the shorter it is",
-    "mass_damping": "damping over mass that is critical for that period [1/s]; velocities over 1 + mass_damping * step",
+    "mass_damping": "damping over mass that is critical for the lowest frequency [1/s]; velocities go down to their "
+    "share 1 / (1 + mass_damping * time_step) in each step",
     "displacements": "where the load brings the particles in the end [m]; null where there is no stable equilibrium",
 }
 """What each entry of a file is."""
@@ -63,7 +64,7 @@ def xpbd(net: Net) -> str:
         )
     there = net.stiffness > 0
     whole = np.asarray(net.held.all(axis=1))
-    step = 2 * np.pi / simulation.frequency / 50 if simulation.frequency else simulation.step
+    step = 2 * np.pi / simulation.loaded_frequency / 50 if simulation.loaded_frequency else simulation.step
     displacements = simulation.displacements
     content: dict[str, Any] = {
         "header": dict(net.header) | {"springs_without_stiffness_left_out": int((~there).sum())},
