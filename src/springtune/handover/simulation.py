@@ -18,8 +18,8 @@ from ..problem.status import Status
 from .terms import Terms
 
 STEP_SHARE = 0.8
-"""Step that is written, over the largest stable one at rest: springs that are stretched by a quarter vibrate faster by
-a tenth, and a load that is switched on stretches them twice as far as it does in the end."""
+"""Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
+fronts of waves stretch springs further."""
 
 WORDS = {"area": "areas", "angle": "angles", "biquadratic": "squared lengths"}
 """What energies besides springs are of, by their kind."""
@@ -55,7 +55,7 @@ class Simulation:
     largest_step : float
         Largest stable step of explicit schemes about rest, undamped [s].
     step : float
-        Step that stays stable while the net moves [s]: `STEP_SHARE` of it.
+        Step that stays stable while the net moves [s]: `STEP_SHARE` of it, or less where its way makes it stiffer.
     frequency : float
         Lowest frequency [rad/s]; 0 without a load.
     loaded_frequency : float
@@ -124,7 +124,27 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
             displacements = found.displacements if status is Status.SOLVED else None
         except SingularError as error:
             why = str(error)
-    return Simulation(net.masses, force, largest, STEP_SHARE * largest, lowest, loaded, 2 * lowest, displacements, why)
+    stable = largest
+    if displacements is not None:
+        # The loaded mode swings beyond its place, as damping that is critical for the lowest one lets it.
+        ratio = min(lowest / loaded, 1.0)
+        beyond = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
+        stiffest = max(_highest_frequency(motion, share * displacements) for share in (1.0, 1.0 + beyond))
+        stable = min(stable, 2 / stiffest)
+    step = STEP_SHARE * stable
+    return Simulation(net.masses, force, largest, step, lowest, loaded, 2 * lowest, displacements, why)
+
+
+def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:
+    """Highest frequency about displacements [rad/s], by Lanczos' method; `Motion.omega_max` is that at rest."""
+    root = diags_array(1 / np.sqrt(motion.mass))
+    matrix = root @ motion.network.tangent(displacements) @ root
+    size = matrix.shape[0]
+    if size < 40:
+        return float(np.sqrt(np.linalg.eigvalsh(matrix.toarray())[-1]))
+    start = np.random.default_rng(0).standard_normal(size)
+    (square,) = eigsh(matrix, 1, which="LA", v0=start, tol=1e-6, ncv=min(size - 1, 40), return_eigenvectors=False)
+    return float(np.sqrt(square))
 
 
 def _lowest_frequency(motion: Motion) -> float:
