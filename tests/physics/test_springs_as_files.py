@@ -163,6 +163,28 @@ def test_two_springs_by_hand(ending, tmp_path):
     assert unbalanced(back, moved) < 5e-15  # some roundings of lengths of 3.5 m, at 5 N/m
 
 
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_cells_of_both_kinds(ending, tmp_path):
+    """A square and two triangles beside it; in numbers that binary fractions do not hold."""
+    x, y = np.array([0, 1, 1, 0, 2, 2]) / 30, np.array([0, 0, 1, 1, 0, 1]) / 30
+    triangles, quads = np.array([[1, 4, 5], [1, 5, 2]]), np.array([[0, 1, 2, 3]])
+
+    def both(mesh, material, thickness):
+        """Springs and areas, without a thought."""
+        energies = tuple(AreaEnergy(mesh.points, cells, np.full(len(cells), 0.1)) for cells in mesh.cells.values())
+        return st.Springs(1e8, np.ones(len(mesh.edges)) / 3, energies)
+
+    net = st.SpringNet.from_mesh(st.Mesh(np.stack([x, y], axis=1), triangles, quads), STEEL, both)
+    net.write(tmp_path / f"net{ending}")
+    back = st.SpringNet.read(tmp_path / f"net{ending}")
+    assert [terms.cells.tolist() for terms in back.energies] == [triangles.tolist(), quads.tolist()]
+    for given, found in zip(net.energies, back.energies):
+        assert all((found.values[name] == values).all() for name, values in given.values.items())
+    assert (back.quads == quads).all() and (back.triangles == triangles).all()
+    moved = back.points * [1.01, 0.99]
+    assert np.array_equal(forces_of(back, moved), forces_of(net, moved))
+
+
 def test_terms_of_one_kind_are_one():
     """Energies are in proportion to their moduli."""
     mesh = st.make_mesh(BEAM, "structured", "5 mm")
@@ -191,6 +213,14 @@ class TestHeader:
         for load, error in header["expected_error"].items():
             solved = scene_of("area", load=load, force="1 N", kinematics="linear").solve()
             assert error == pytest.approx(solved.error, abs=1e-9), load
+
+    def test_errors_are_those_of_a_prediction(self):
+        mesh = scene_of("patch").mesh
+        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL)}
+        for name in ("patch", "area", "delingette"):
+            errors = st.SpringNet.from_mesh(mesh, STEEL, name, beam=BEAM).header["expected_error"]
+            for load, error in errors.items():
+                assert error == pytest.approx(getattr(choices[name], load), abs=1e-9), (name, load)
 
     def test_error_under_a_load_of_another_kind(self):
         """Above zero where too soft, whatever the force's sign; a result's, where it has moved further up."""

@@ -3,14 +3,16 @@
 import csv
 import io
 import json
+import warnings
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..jobs.atomic import replacing, write_text
+from ..mesh.formats import LONGEST_SAID
 from .mujoco import mjcf
 from .paraview import comment_of, write_vtu
 from .simulation import Net
@@ -58,7 +60,7 @@ def write(path: str | Path, content: Content) -> list[Path]:
     Parameters
     ----------
     path : str or Path
-        Ending in one of `ENDINGS`.
+        Ending in one of `ENDINGS` or `FOR_SIMULATORS`.
     content : Content
 
     Returns
@@ -93,15 +95,23 @@ def read(path: str | Path) -> Content:
     ------
     ValueError
         If there is no such file, or it is not as springtune writes nets.
+    OSError
+        If the file cannot be read.
     """
     path = Path(path)
     form = _format_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
+    told = io.StringIO()
     try:
-        return _checked(form.read(path))
-    except (AttributeError, LookupError, TypeError, ValueError, OSError, RuntimeError, SystemExit) as error:
-        said = " ".join(str(error).split())[:200] or type(error).__name__
+        # meshio tells people of what it trips over, and exits.
+        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _checked(form.read(path))
+    except (Exception, SystemExit) as error:  # of a damaged file the libraries raise whatever they trip over
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 
@@ -129,6 +139,13 @@ def _checked(content: Content) -> Content:
                 raise ValueError(f"{name} have the shape {array.shape}")
         elif name != "masses":
             raise ValueError(f"it has no {name}")
+    numbers = [array for name, array in arrays.items() if ARRAYS[name][0] is float]
+    numbers += [values for terms in content.energies for values in terms.values.values()]
+    if not all(np.isfinite(array).all() for array in numbers):
+        raise ValueError("some of its numbers are not finite")
+    for terms in content.energies:
+        if any(len(values) != len(terms.cells) for values in terms.values.values()):
+            raise ValueError(f"{terms.kind} terms are not as many as cells")
     count = len(arrays["points"])
     for names, length in (
         (("masses", "held", "forces"), count),
@@ -565,6 +582,12 @@ _FORMATS = {
     ".json": _Format(_write_json, _read_json),
     ".vtu": _Format(_write_vtu, _read_vtu),
     ".h5": _Format(_write_h5, _read_h5),
+}
+
+ENDINGS = tuple(_FORMATS)
+"""Endings of the names of files of nets."""
+
+_SIMULATORS = {
     ".xml": _for_simulator("MuJoCo", mjcf),
     ".mjcf": _for_simulator("MuJoCo", mjcf),
     ".scn": _for_simulator("SOFA", sofa_xml),
@@ -572,14 +595,14 @@ _FORMATS = {
     ".xpbd.json": _for_simulator("XPBD", xpbd),
 }
 
-ENDINGS = tuple(_FORMATS)
-"""Endings of the names of files of nets."""
+FOR_SIMULATORS = tuple(_SIMULATORS)
+"""Endings of the names of files for simulators, which are not read."""
 
 
 def _format_of(path: Path) -> _Format:
     # The longest ending that fits: .xpbd.json is not .json.
-    ending = max((one for one in ENDINGS if path.name.lower().endswith(one)), key=len, default="")
-    form = _FORMATS.get(ending)
-    if form is None:
-        raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(ENDINGS)}")
-    return form
+    known = _FORMATS | _SIMULATORS
+    ending = max((one for one in known if path.name.lower().endswith(one)), key=len, default="")
+    if not ending:
+        raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(known)}")
+    return known[ending]

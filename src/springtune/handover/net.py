@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse.linalg import ArpackError
 
 from .. import __version__
 from ..linalg.factors import SingularError
@@ -59,6 +60,9 @@ MEANING = (
     "kinematics, small strain"
 )
 """What an expected error is."""
+
+STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
+"""What a largest stable step is."""
 
 NOT_COMPUTED = "not computed"
 """How a text begins that stands in the place of a number."""
@@ -240,7 +244,8 @@ class SpringNet:
         path : str or Path
             ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
             beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
-            ``.vtu`` has springs as lines, for ParaView and meshio.
+            ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
+            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.xpbd.json`` for XPBD.
 
         Returns
         -------
@@ -404,6 +409,7 @@ def _header(
         "expected_error": f"{NOT_COMPUTED}: not asked for",
         "expected_error_means": MEANING,
         "largest_stable_step": _stable_steps(sheet, springs, material, kind),
+        "largest_stable_step_means": STEP_MEANING,
         "units": UNITS
         | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
     }
@@ -490,4 +496,7 @@ def _stable_steps(
         motion = Motion(Network(sheet.mesh, free, springs.relative, springs.energies), inertia)
     else:
         motion = motion_of(sheet, kind, springs, material.density)
-    return {name: "unlimited" if name in IMPLICIT else motion.step_limit(name) for name in INTEGRATORS}
+    try:
+        return {name: "unlimited" if name in IMPLICIT else motion.step_limit(name) for name in INTEGRATORS}
+    except ArpackError as error:
+        return f"{NOT_COMPUTED}: {error}"

@@ -117,6 +117,11 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     displacements, lowest, loaded, why = None, 0.0, 0.0, "there is no load"
     if force:
         try:
+            if network.rest_factor.negative_pivots:
+                raise ValueError(
+                    f"definition '{net.header['definition']}': is unstable at rest, without any load, since springs "
+                    f"push where others pull, and would fly apart in {program}; take another definition or mesh"
+                )
             lowest, loaded = _lowest_frequency(motion), motion.loaded_frequency
             problem = StaticProblem(network, net.forces / force)
             found = problem.nonlinear(force / reference)

@@ -147,6 +147,7 @@ def _reference(folder, one, fields=()):
 
 def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    compared = set()  # places of fields that have their reference
     calibration = _calibration(study, folder)
     arrays = ["face_profile"] * (block is not None)
     shown = plan.shown_meshes(study) if fields else ()
@@ -170,6 +171,23 @@ def _scenes(study, folder, root, block, fields, objections):
                 x, y = result["displacements"].T
                 of_springs = {"stiffness": result["spring_stiffnesses"], "force": result["spring_forces"]}
                 fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **labels)
+                place = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
+                if tuple(place.values()) not in compared:  # scenes differ in their definitions
+                    compared.add(tuple(place.values()))
+                    fields.put_rows(_at_particles(folder, scene, fields.data), **place)
+
+
+def _at_particles(folder, scene, fields):
+    """Displacements of the reference of a scene where its particles are at rest [m]; nothing without a reference."""
+    reference = plan.reference_of(scene.mesh.beam, scene.material, scene.load)
+    found = stored_reference.read(folder / "references", reference, ["x", "y", "displacements"])
+    if "x" not in found:
+        return {}
+    places = fields[["x", "y"]].sel(_mesh_labels(scene.mesh))
+    points = np.stack([places.x.values, places.y.values], axis=1)
+    points = points[~np.isnan(points[:, 0])]
+    x, y = scene.force * interpolate(found["x"], found["y"], found["displacements"], points).T
+    return {"particle_reference_x": x, "particle_reference_y": y}
 
 
 def _printed(study, root):
@@ -292,8 +310,7 @@ def _fields(study, folder, axes):
         mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))
     ]
     meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
-    # Whole references of a large study are more than memory has: what is wanted of each is taken at once.
-    looked_at = {one: _looked_at(folder, one, meshes) for one in study.references}
+    outlines = {one: _outline(folder, one) for one in study.references}
     cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
     lengths = {
         "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
@@ -301,7 +318,7 @@ def _fields(study, folder, axes):
         "spring_end": 2,
         "cell": max((len(corners) for corners in cells.values()), default=1),
         "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
-        "outline_point": max(len(points) for points, _, _ in looked_at.values()),
+        "outline_point": max(len(points) for points, _ in outlines.values()),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
     fields = Filler(FIELDS.empty(axes | numbers))
@@ -311,16 +328,13 @@ def _fields(study, folder, axes):
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
     for one in study.references:
-        points, displacements, of_meshes = looked_at[one]
+        points, displacements = outlines[one]
         moved = one.force * displacements
         beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
         fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
         fields.put_rows(
             {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
         )
-        for spec, field in of_meshes.items():
-            x, y = one.force * field.T
-            fields.put_rows({"particle_reference_x": x, "particle_reference_y": y}, **_mesh_labels(spec), **load)
     return fields
 
 
@@ -334,14 +348,9 @@ def _cells(mesh):
     return cells
 
 
-def _looked_at(folder, one, meshes):
-    """What is kept of a reference: points of its outline and their displacements; those of the particles of meshes.
-
-    Displacements are for 1 N [m]; nothing is there of a reference that has none.
-    """
+def _outline(folder, one):
+    """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
     result = _reference(folder, one, ["x", "y", "displacements"])
     if "x" not in result:
-        return np.zeros((0, 2)), np.zeros((0, 2)), {}
-    grid = result["x"], result["y"], result["displacements"]
-    fields = {spec: interpolate(*grid, mesh.points) for spec, mesh in meshes.items() if spec.beam == one.beam}
-    return *outline(*grid), fields
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    return outline(result["x"], result["y"], result["displacements"])
