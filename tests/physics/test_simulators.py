@@ -226,12 +226,27 @@ def test_accelerations_beyond_those_of_mujoco_start_nothing_anew(tmp_path):
 
 def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
     net = SpringNet.from_mesh(st.make_mesh(BEAM, "free", "5 mm"), STEEL, "lattice", errors=False)
-    [path] = net.write(tmp_path / "net.mjcf")
-    model = mujoco.MjModel.from_xml_path(str(path))
+    for ending in PROGRAMS:
+        net.write(tmp_path / f"net{ending}")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.mjcf"))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert model.nu == 0 and model.nq == 2 * len(net.points) and not model.dof_damping.any()
     assert np.abs(data.qfrc_passive).max() < 1e-12 * net.stiffness.max() * net.rest_lengths.max()
+    sofa = as_sofa_reads((tmp_path / "net.scn").read_text())
+    assert "ConstantForceField" not in sofa and len(sofa["MechanicalObject"]) == 1
+    constraints = json.loads((tmp_path / "net.xpbd.json").read_text())
+    assert constraints["mass_damping"] == 0 and constraints["displacements"] is None
+
+
+@pytest.mark.parametrize("ending", PROGRAMS)
+def test_a_file_of_springs_is_enough_for_a_simulator(ending, tmp_path):
+    """What is read from a file of arrays is written as the scene itself is."""
+    one = scene("free", "shear", "patch")
+    direct = written(one, tmp_path, ending)
+    [path] = one.springs.write(tmp_path / "arrays.h5", errors=False)
+    [again] = SpringNet.read(path).write(tmp_path / f"again{ending}")
+    assert again.read_text() == direct
 
 
 def odd(mesh, material, thickness):

@@ -7,7 +7,7 @@ control added to it: whoever opens the file sees it move, and changes the load b
 joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
 
 Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
-and so is MuJoCo's flex of two dimensions (3.5 and later), but for what it calls young and poisson. Its shear modulus
+and so is MuJoCo's flex of two dimensions (3.3.7 and later), but for what it calls young and poisson. Its shear modulus
 and Lame's first constant, times the thickness, are
 
     mu t = thickness young / (8 (1 + poisson)),
