@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..problem.geometry import Beam
     from ..problem.materials import Material
 
-OPTIONS = re.compile(r"^(?=(load|force|definition|stiffness)\b)")
+OPTIONS = re.compile(r"^(?=(load|force|definition|stiffness|density)\b)")
 """Beginnings of messages that name an argument, which is an option here."""
 
 
@@ -74,7 +74,8 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
     "target",
     required=True,
     type=click.Path(path_type=Path),
-    help="File: .csv, .json, .vtu (ParaView) or .h5; one that is there is replaced.",
+    help="File: .csv, .json, .vtu (ParaView), .h5, .xml (MuJoCo), .scn or .py (SOFA) or .xpbd.json; one that is there "
+    "is replaced.",
 )
 def springs(
     beam: str,

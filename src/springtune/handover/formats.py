@@ -13,8 +13,12 @@ import numpy as np
 
 from ..jobs.atomic import replacing, write_text
 from ..mesh.formats import LONGEST_SAID
+from .mujoco import mjcf
 from .paraview import comment_of, write_vtu
+from .simulation import Net
+from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Terms
+from .xpbd import xpbd
 
 ARRAYS = {
     "points": (float, 2, "m"),
@@ -56,7 +60,7 @@ def write(path: str | Path, content: Content) -> list[Path]:
     Parameters
     ----------
     path : str or Path
-        Ending in one of `ENDINGS`.
+        Ending in one of `ENDINGS` or `FOR_SIMULATORS`.
     content : Content
 
     Returns
@@ -550,6 +554,22 @@ def _read_h5(path: Path) -> Content:
         return Content(arrays, energies, _header_in(file["header"]))
 
 
+# -- simulators ----------------------------------------------------------------------------------------------------
+
+
+def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
+    """Format of a simulator, which is not read."""
+
+    def write_it(path: Path, content: Content) -> list[Path]:
+        write_text(path, text(Net(**content.arrays, energies=content.energies, header=content.header)))
+        return [path]
+
+    def refuse(path: Path) -> Content:
+        raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
+
+    return _Format(write_it, refuse)
+
+
 class _Format(NamedTuple):
     """How a net is written in a format, and read."""
 
@@ -567,9 +587,22 @@ _FORMATS = {
 ENDINGS = tuple(_FORMATS)
 """Endings of the names of files of nets."""
 
+_SIMULATORS = {
+    ".xml": _for_simulator("MuJoCo", mjcf),
+    ".mjcf": _for_simulator("MuJoCo", mjcf),
+    ".scn": _for_simulator("SOFA", sofa_xml),
+    ".py": _for_simulator("SOFA", sofa_python),
+    ".xpbd.json": _for_simulator("XPBD", xpbd),
+}
+
+FOR_SIMULATORS = tuple(_SIMULATORS)
+"""Endings of the names of files for simulators, which are not read."""
+
 
 def _format_of(path: Path) -> _Format:
-    form = _FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(ENDINGS)}")
-    return form
+    # The longest ending that fits: .xpbd.json is not .json.
+    known = _FORMATS | _SIMULATORS
+    ending = max((one for one in known if path.name.lower().endswith(one)), key=len, default="")
+    if not ending:
+        raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(known)}")
+    return known[ending]

@@ -401,7 +401,8 @@ class SceneSprings(Springs):
         Parameters
         ----------
         path : str or Path
-            Ending in ``.csv``, ``.json``, ``.vtu`` or ``.h5``, see `springtune.SpringNet.write`.
+            Ending in ``.csv``, ``.json``, ``.vtu`` or ``.h5``, or in one of those for simulators, see
+            `springtune.SpringNet.write`.
         **options
             ``mesh_name``, what the header calls the mesh, and ``errors``, whether it says the expected errors.
 

@@ -1,0 +1,231 @@
+"""MuJoCo's models (MJCF): particles on slides, springs as tendons.
+
+Each particle that can move is a body on a slide joint for each direction that is not held, each spring a spatial tendon
+with its stiffness and its rest length: MuJoCo's law is ``stiffness (springlength - length)`` along the tendon, which is
+that of springtune, in tension and in compression. A fixed tendon spreads the load, and one actuator is the load, its
+control added to it: whoever opens the file sees it move, and changes the load by a slider. Damping is that of the
+joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
+
+Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
+and so is MuJoCo's flex of two dimensions (3.3.7 and later), but for what it calls young and poisson. Its shear modulus
+and Lame's first constant, times the thickness, are
+
+    mu t = thickness young / (8 (1 + poisson)),
+    lambda t = thickness young poisson / (2 (1 + poisson) (1 - 2 poisson)),
+
+as the stiffness matrices of single triangles in MuJoCo 3.5.0 and 3.17.0 have it, to rounding. The file has the young
+and poisson with which they are those of plane stress. Bodies of a flex may have no damping in their joints, so a
+fixed tendon for each joint has it.
+"""
+
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..mesh import corner_angles, signed_areas
+from .simulation import Net, Simulation, about, commented, numbers, simulate
+from .terms import Terms
+
+LEAST_MASS = 1e-15
+"""Mass below which MuJoCo takes no body that moves [kg]."""
+
+LARGEST_ACCELERATION = 1e9
+"""Acceleration beyond which MuJoCo may take a run for a diverged one, a tenth of its limit [m/s2]."""
+
+
+def mjcf(net: Net) -> str:
+    """Model of a net for MuJoCo.
+
+    Parameters
+    ----------
+    net : Net
+
+    Returns
+    -------
+    str
+        XML. Opened as it is, it moves to its equilibrium, which is the keyframe ``predicted``.
+
+    Raises
+    ------
+    ValueError
+        If MuJoCo has no law of the net's energies, or the net has no masses, linear kinematics or a load that turns.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("40 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), steel, "traction", "1 kN", definition="lattice")
+    >>> [path] = scene.springs.write("net.xml")
+    >>> next(line for line in path.read_text().splitlines() if "<spatial" in line).strip()
+    '<spatial stiffness="90932667.39736606" springlength="0.02"><site site="p0"/><site site="p1"/></spatial>'
+    """
+    simulation = simulate(net, "MuJoCo", ("biquadratic",))
+    moving = ~net.held.all(axis=1)
+    least = float(simulation.masses[moving].min())
+    if least < LEAST_MASS:
+        raise ValueError(
+            f"masses: the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more; take larger "
+            "cells or a thicker sheet"
+        )
+    size = float(net.rest_lengths.mean())
+    moved = 0.0 if simulation.displacements is None else simulation.displacements
+    seen = np.concatenate([net.points, net.points + moved])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    centre = " ".join(f"{value:.6g}" for value in (low + high) / 2)
+    accelerations = np.abs(np.where(net.held, 0, net.forces)).max(axis=1) / simulation.masses
+    keep = ' autoreset="disable"' if accelerations.max() > LARGEST_ACCELERATION else ""
+    said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
+    flex = [_flex(net, terms, size) for terms in net.energies]
+    lines = [
+        f"<mujoco model={quoteattr(_model(net))}>",
+        *commented(about(net, simulation, said), "  "),
+        f'  <option timestep="{simulation.step!r}" integrator="Euler" gravity="0 0 0">',
+        f'    <flag contact="disable"{keep}/>',
+        "  </option>",
+        f'  <statistic center="{centre} 0" extent="{0.6 * float(np.hypot(*(high - low))):.6g}" meansize="{size:.6g}"/>',
+        "  <visual>",
+        '    <global azimuth="90" elevation="-90"/>',
+        '    <headlight ambient="0.6 0.6 0.6" diffuse="0.4 0.4 0.4"/>',
+        "  </visual>",
+        "  <asset>",
+        '    <texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/>',
+        "  </asset>",
+        "  <default>",
+        f'    <site size="{size / 8:.6g}" rgba="0.2 0.2 0.25 1"/>',
+        f'    <tendon width="{size / 16:.6g}" rgba="0.2 0.45 0.7 1"/>',
+        '    <default class="x"><joint type="slide" axis="1 0 0"/></default>',
+        '    <default class="y"><joint type="slide" axis="0 1 0"/></default>',
+        "  </default>",
+        "  <worldbody>",
+        *_particles(net, simulation, bool(flex)),
+        "  </worldbody>",
+        *flex,
+        *_tendons(net, simulation, bool(flex)),
+        *_load(net, simulation),
+        "</mujoco>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _model(net: Net) -> str:
+    load = net.header.get("load")
+    return net.header["definition"] + (f", {load['name']} of {abs(load['force']):g} N" if load else "")
+
+
+def _particles(net: Net, simulation: Simulation, bodies: bool) -> list[str]:
+    """Bodies of particles that can move; others are places in the world, or bodies without joints for a flex."""
+    lines = []
+    masses = simulation.masses.tolist()
+    for number, ((x, y), held) in enumerate(zip(net.points.tolist(), net.held.tolist())):
+        place = f'pos="{x!r} {y!r} 0"'
+        if all(held):
+            body = f'<body name="b{number}" {place}><site name="p{number}"/></body>'
+            lines.append(f"    {body}" if bodies else f'    <site name="p{number}" {place}/>')
+            continue
+        mass = masses[number]
+        joints = "".join(
+            f'<joint class="{axis}" name="{axis}{number}"{_damping(simulation, number, not bodies)}/>'
+            for axis, fixed in zip("xy", held)
+            if not fixed
+        )
+        inertia = f'<inertial pos="0 0 0" mass="{mass!r}" diaginertia="{mass!r} {mass!r} {mass!r}"/>'
+        lines.append(f'    <body name="b{number}" {place}>{joints}{inertia}<site name="p{number}"/></body>')
+    return lines
+
+
+def _damping(simulation: Simulation, number: int, here: bool) -> str:
+    """Damping of a particle, in proportion to its mass."""
+    return f' damping="{float(simulation.mass_damping * simulation.masses[number])!r}"' if here else ""
+
+
+def _tendons(net: Net, simulation: Simulation, dampers: bool) -> list[str]:
+    """Tendons: springs, what spreads the load, and dampers of joints that may have none: of the bodies of a flex."""
+    rows = zip(net.springs.tolist(), net.stiffness.tolist(), net.rest_lengths.tolist())
+    lines = [
+        f'    <spatial stiffness="{stiffness!r}" springlength="{length!r}">'
+        f'<site site="p{first}"/><site site="p{second}"/></spatial>'
+        for (first, second), stiffness, length in rows
+        if stiffness
+    ]
+    load = net.header.get("load")
+    if load:
+        shares = np.where(net.held, 0.0, net.forces / load["force"])
+        joints = "".join(
+            f'<joint joint="{"xy"[axis]}{number}" coef="{float(shares[number, axis])!r}"/>'
+            for number, axis in np.argwhere(shares).tolist()
+        )
+        lines.append(f'    <fixed name="load">{joints}</fixed>')
+    if dampers and simulation.mass_damping:
+        lines += [
+            f'    <fixed{_damping(simulation, number, True)}><joint joint="{"xy"[axis]}{number}" coef="1"/></fixed>'
+            for number, axis in np.argwhere(~net.held).tolist()
+        ]
+    return ["  <tendon>", *lines, "  </tendon>"] if lines else []
+
+
+def _flex(net: Net, terms: Terms, size: float) -> str:
+    """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
+    first, second = _lame(net, terms)
+    ratio = first / second
+    poisson = ratio / (4 + 2 * ratio)
+    young = 8 * (1 + poisson) * second
+    bodies = " ".join(f"b{number}" for number in range(len(net.points)))
+    return "\n".join(
+        [
+            "  <deformable>",
+            *commented(
+                [
+                    "Delingette's springs: young and poisson are those with which a flex has the Lame constants of",
+                    f"plane stress, times the thickness: lambda t = {first:.6g} N/m, mu t = {second:.6g} N/m.",
+                ],
+                "    ",
+            ),
+            f'    <flex name="sheet" dim="2" radius="{size / 20:.6g}" rgba="0.2 0.45 0.7 1" body="{bodies}" '
+            f'element="{" ".join(map(str, terms.cells.ravel().tolist()))}">',
+            f'      <elasticity young="{young!r}" poisson="{poisson!r}" thickness="1" elastic2d="stretch"/>',
+            "    </flex>",
+            "  </deformable>",
+        ]
+    )
+
+
+def _lame(net: Net, terms: Terms) -> tuple[float, float]:
+    """Lame constants of plane stress, times the thickness [N/m], that give all triangles their springs."""
+    areas = 16 * signed_areas(net.points, terms.cells)[:, None]
+    cotangents = 1 / np.tan(corner_angles(net.points, terms.cells))
+    products = np.roll(cotangents, -1, axis=1) * np.roll(cotangents, -2, axis=1)
+    # tensile and coupling are linear in (lambda + 2 mu) t and 2 mu t, see `springtune.springs.delingette`.
+    given = np.concatenate([(areas * terms.values[name]).ravel() for name in ("tensile", "coupling")])
+    factors = np.concatenate([2 * cotangents.ravel() ** 2, 2 * products.ravel()])
+    signs = np.repeat([1.0, -1.0], cotangents.size)
+    (total, twice), *_ = np.linalg.lstsq(np.column_stack([factors, signs]), given, rcond=None)
+    first = float(total - twice)
+    away = np.abs(factors * total + signs * twice - given).max() / np.abs(given).max()
+    if away > 1e-9 or not (twice > 0 and first > -1e-9 * twice):
+        raise ValueError(
+            f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
+            f"MuJoCo's flex has the law of a material alone; take 'delingette', or a definition of springs alone, "
+            "such as 'patch'"
+        )
+    return max(first, 0.0), float(twice) / 2
+
+
+def _load(net: Net, simulation: Simulation) -> list[str]:
+    """Actuator that holds the load, and the equilibrium as a keyframe."""
+    lines = []
+    if simulation.force:
+        most = abs(simulation.force)
+        lines += [
+            "  <actuator>",
+            "    <!-- The load [N]; the control is added to it. -->",
+            f'    <general name="load" tendon="load" gaintype="fixed" gainprm="1" biastype="affine" '
+            f'biasprm="{simulation.force!r} 0 0" ctrllimited="true" ctrlrange="{-most!r} {most!r}"/>',
+            "  </actuator>",
+        ]
+    if simulation.displacements is not None:
+        lines += [
+            "  <keyframe>",
+            f'    <key name="predicted" qpos="{numbers(simulation.displacements[~net.held])}"/>',
+            "  </keyframe>",
+        ]
+    return lines

@@ -1,0 +1,261 @@
+"""What simulators need besides springs: masses, a damping, a step that is stable, and where it all should come to."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ..linalg.factors import SingularError
+from ..mechanics.dynamics import Motion
+from ..mechanics.energies import BiquadraticEnergy
+from ..mechanics.network import Network
+from ..mechanics.statics import StaticProblem
+from ..mesh import Mesh
+from ..problem.status import Status
+from .terms import Terms
+
+STEP_SHARE = 0.8
+"""Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
+fronts of waves stretch springs further."""
+
+WORDS = {"area": "areas", "angle": "angles", "biquadratic": "squared lengths"}
+"""What energies besides springs are of, by their kind."""
+
+
+@dataclass(frozen=True, eq=False)
+class Net:
+    """A network as plain arrays; the attributes are those of `springtune.SpringNet`, the header with the thickness."""
+
+    points: np.ndarray
+    springs: np.ndarray
+    rest_lengths: np.ndarray
+    stiffness: np.ndarray
+    held: np.ndarray
+    forces: np.ndarray
+    triangles: np.ndarray
+    quads: np.ndarray
+    energies: tuple[Terms, ...]
+    header: Mapping[str, Any]
+    masses: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How a net is to be moved, and where it should come to.
+
+    Attributes
+    ----------
+    masses : ndarray of float, shape (n_points,)
+        [kg]
+    force : float
+        Of the load, with its sign [N]; 0 without a load.
+    largest_step : float
+        Largest stable step of explicit schemes about rest, undamped [s].
+    step : float
+        Step that stays stable while the net moves [s]: `STEP_SHARE` of it, or less where its way makes it stiffer.
+    frequency : float
+        Lowest frequency [rad/s]; 0 without a load.
+    loaded_frequency : float
+        Lowest frequency that the load excites [rad/s]; 0 without a load.
+    mass_damping : float
+        Damping over mass that is critical for the lowest frequency [1/s]: all others oscillate, and none is later at
+        rest.
+    displacements : ndarray of float, shape (n_points, 2), or None
+        Equilibrium under the load [m]; None where there is none that is stable.
+    why : str
+        Why there is none; empty where there is one.
+    """
+
+    masses: np.ndarray
+    force: float
+    largest_step: float
+    step: float
+    frequency: float
+    loaded_frequency: float
+    mass_damping: float
+    displacements: np.ndarray | None
+    why: str
+
+
+def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
+    """What a simulator is told of a net besides its springs.
+
+    Parameters
+    ----------
+    net : Net
+    program : str
+        Name of the simulator, for messages.
+    laws : iterable of str, optional
+        Kinds of energies besides springs that it has, of `springtune.handover.terms.FORMULAS`.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    ValueError
+        If the net has energies that the simulator lacks, no masses, linear kinematics or a load that turns; the message
+        says what to take instead.
+
+    Notes
+    -----
+    Frequencies are those at rest, see `springtune.mechanics.dynamics.Motion`; the equilibrium is that of springs which
+    keep their length law, as simulators have them.
+    """
+    _check(net, program, laws)
+    assert net.masses is not None
+    reference = float(net.header["reference_stiffness"])
+    load = net.header.get("load")
+    force = float(load["force"]) if load else 0.0
+    network = _network(net, reference)
+    motion = Motion(network, net.masses / reference, net.forces / reference)
+    largest = motion.step_limit("symplectic-euler")
+    displacements, lowest, loaded, why = None, 0.0, 0.0, "there is no load"
+    if force:
+        try:
+            if network.rest_factor.negative_pivots:
+                raise ValueError(
+                    f"definition '{net.header['definition']}': is unstable at rest, without any load, since springs "
+                    f"push where others pull, and would fly apart in {program}; take another definition or mesh"
+                )
+            lowest, loaded = _lowest_frequency(motion), motion.loaded_frequency
+            problem = StaticProblem(network, net.forces / force)
+            found = problem.nonlinear(force / reference)
+            status, why, _ = problem.judge(force / reference, found)
+            displacements = found.displacements if status is Status.SOLVED else None
+        except SingularError as error:
+            why = str(error)
+    stable = largest
+    if displacements is not None:
+        # The loaded mode swings beyond its place, as damping that is critical for the lowest one lets it.
+        ratio = min(lowest / loaded, 1.0)
+        beyond = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
+        stiffest = max(_highest_frequency(motion, share * displacements) for share in (1.0, 1.0 + beyond))
+        stable = min(stable, 2 / stiffest)
+    step = STEP_SHARE * stable
+    return Simulation(net.masses, force, largest, step, lowest, loaded, 2 * lowest, displacements, why)
+
+
+def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:
+    """Highest frequency about displacements [rad/s], by Lanczos' method; `Motion.omega_max` is that at rest."""
+    root = diags_array(1 / np.sqrt(motion.mass))
+    matrix = root @ motion.network.tangent(displacements) @ root
+    size = matrix.shape[0]
+    if size < 40:
+        return float(np.sqrt(np.linalg.eigvalsh(matrix.toarray())[-1]))
+    start = np.random.default_rng(0).standard_normal(size)
+    (square,) = eigsh(matrix, 1, which="LA", v0=start, tol=1e-6, ncv=min(size - 1, 40), return_eigenvectors=False)
+    return float(np.sqrt(square))
+
+
+def _lowest_frequency(motion: Motion) -> float:
+    """Lowest frequency at rest [rad/s], by Lanczos' method on the factorized tangent."""
+    size, mass = len(motion.mass), motion.mass
+    if size < 10:
+        root = 1 / np.sqrt(mass)
+        return float(np.sqrt(np.linalg.eigvalsh(root[:, None] * motion.stiffness_matrix.toarray() * root)[0]))
+    inverse = LinearOperator((size, size), matvec=motion.network.rest_factor.solve, dtype=float)
+    start = np.random.default_rng(0).standard_normal(size)
+    (square,) = eigsh(
+        motion.stiffness_matrix, 1, diags_array(mass), sigma=0.0, OPinv=inverse, v0=start, return_eigenvectors=False
+    )
+    return float(np.sqrt(square))
+
+
+def _check(net: Net, program: str, laws: Iterable[str]) -> None:
+    """Refuse what no file for a simulator can hold."""
+    name = net.header["definition"]
+    lacking = [WORDS[terms.kind] for terms in net.energies if terms.kind not in laws]
+    if lacking:
+        raise ValueError(
+            f"definition '{name}': has energies of {lacking[0]} besides springs, and {program} has no such law; take a "
+            "definition of springs alone, such as 'patch' or 'lattice'"
+        )
+    if net.masses is None:
+        raise ValueError(
+            f"density: material '{net.header['material']['name']}' has none, and {program} moves masses; give a "
+            "density such as '7850 kg/m^3'"
+        )
+    load = net.header.get("load")
+    if load and load["follower"]:
+        raise ValueError(
+            f"load '{load['name']}': turns with the side that it acts on, and forces in a file for {program} do not; "
+            "take 'pressure'"
+        )
+    if load and load["kinematics"] == "linear":
+        raise ValueError(
+            f"kinematics: 'linear', and springs of {program} keep their length law; take 'nonlinear', which is the "
+            "same under small loads"
+        )
+
+
+def _network(net: Net, reference: float) -> Network:
+    """The network that a net was written from; everything over the reference stiffness."""
+    mesh = Mesh(net.points, net.triangles, net.quads)
+    if not np.array_equal(mesh.edges, net.springs):
+        raise ValueError("springs: are not the edges of the cells in their order; write the springs of a scene anew")
+    energies = [
+        BiquadraticEnergy(
+            net.points, terms.cells, terms.values["tensile"] / reference, terms.values["coupling"] / reference
+        )
+        for terms in net.energies
+    ]
+    return Network(mesh, net.held, net.stiffness / reference, energies)
+
+
+def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
+    """Lines that say in a file what it is of: definition, material, load, expected errors, and its step.
+
+    Parameters
+    ----------
+    net : Net
+    simulation : Simulation
+    integrator : str
+        What is said of the step that the file has.
+
+    Returns
+    -------
+    list of str
+    """
+    header = net.header
+    material, load, errors = header["material"], header.get("load"), header.get("expected_error")
+    left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
+    lines = [
+        f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",
+        f"{len(net.points)} particles, {len(net.springs) - left_out} springs; m, kg, s, N.",
+        f"Material '{material['name']}': Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio "
+        f"{material['poisson_ratio']:g}, density {material['density']:g} kg/m3; thickness {header['thickness']:g} m.",
+    ]
+    if left_out:
+        lines.append(f"{left_out} springs of no stiffness are left out.")
+    if load:
+        lines.append(f"Load: {load['name']} of {abs(load['force']):g} N.")
+    if isinstance(errors, dict):
+        said = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
+        if said:
+            lines.append(f"Expected error of the displacement, small strain: {', '.join(said)}.")
+    lines.append(
+        f"The largest stable step of explicit schemes is {simulation.largest_step:.4g} s at rest; {integrator}."
+    )
+    if simulation.frequency:
+        lines.append(
+            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, critical for the lowest frequency; the one that "
+            f"the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} times as high."
+        )
+    if simulation.force and simulation.why:
+        lines.append(f"No equilibrium was found: {simulation.why}.")
+    return lines
+
+
+def numbers(values: np.ndarray) -> str:
+    """Numbers of an array one after the other, each as short as it can be read back exactly."""
+    return " ".join(map(repr, values.ravel().tolist()))
+
+
+def commented(lines: Iterable[str], indent: str) -> list[str]:
+    """Lines as comments of XML."""
+    return [f"{indent}<!-- {line.replace('--', '- -')} -->" for line in lines]

@@ -1,0 +1,263 @@
+"""Scenes for SOFA, as XML (.scn) and in Python (.py, for SofaPython3).
+
+Written after the sources of SOFA v24.06 to v26.06, not run there: SOFA has no wheel. `SpringForceField` reads
+``spring="first second stiffness damping rest_length ..."``, so each spring has its own stiffness [N/m] and rest
+length, and its law is ``stiffness (length - rest_length)``, that of springtune. `MeshSpringForceField` will not do: it
+has one stiffness for all edges, divides it by their lengths, and since v24.12 passes over springs that it is given
+(sofa issue 5135). Particles have three dimensions, that across the plane held: for those every component is there.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from .simulation import Net, Simulation, about, commented, numbers, simulate
+
+PERIOD = 50
+"""Steps of the slowest period that the load excites: backward Euler damps it by 6 % of the critical damping."""
+
+BACKWARD_EULER = (
+    ("Sofa.Component.ODESolver.Backward", "EulerImplicitSolver"),
+    ("Sofa.Component.IntegrationScheme.Backward", "EulerImplicitIntegrationScheme"),
+)
+"""Plugin and component of backward Euler, until v25.12 and since v26.06."""
+
+PLUGINS = (
+    "Sofa.Component.Constraint.Projective",
+    "Sofa.Component.LinearSolver.Direct",
+    "Sofa.Component.Mass",
+    "Sofa.Component.MechanicalLoad",
+    "Sofa.Component.SolidMechanics.Spring",
+    "Sofa.Component.StateContainer",
+    "Sofa.Component.Topology.Container.Dynamic",
+    "Sofa.Component.Visual",
+)
+
+
+class Component(NamedTuple):
+    """A component of a scene.
+
+    Attributes
+    ----------
+    name : str
+        Of its class.
+    data : mapping of str to str
+    """
+
+    name: str
+    data: Mapping[str, str]
+
+
+class SofaScene(NamedTuple):
+    """What a scene has, in the order in which SOFA is to make it.
+
+    Attributes
+    ----------
+    step : float
+        [s]
+    about : list of str
+        What the scene is of.
+    root, sheet, predicted : list of Component
+        Of the three nodes; the sheet's first two are the integrator, whose class goes by the version, and its solver.
+    """
+
+    step: float
+    about: list[str]
+    root: list[Component]
+    sheet: list[Component]
+    predicted: list[Component]
+
+
+def sofa_xml(net: Net) -> str:
+    """Scene of a net for SOFA v24.06 to v25.12, as XML.
+
+    Parameters
+    ----------
+    net : Net
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        If the net has energies, no masses, linear kinematics or a load that turns.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("40 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), steel, "traction", "1 kN", definition="lattice")
+    >>> [path] = scene.springs.write("net.scn")
+    >>> next(line for line in path.read_text().splitlines() if "<Fixed" in line).strip()
+    '<FixedProjectiveConstraint template="Vec3" indices="0 1"/>'
+    """
+    scene = _scene(net)
+    plugin, integrator = BACKWARD_EULER[0]
+    plugins = [Component("RequiredPlugin", {"pluginName": name}) for name in (*PLUGINS, plugin)]
+    lines = [
+        '<?xml version="1.0"?>',
+        f'<Node name="root" dt="{scene.step!r}" gravity="0 0 0">',
+        *commented(scene.about, "  "),
+        *_tags([*plugins, *scene.root], "  "),
+        '  <Node name="sheet">',
+        *_tags([Component(integrator, scene.sheet[0].data), *scene.sheet[1:]], "    "),
+        "  </Node>",
+    ]
+    if scene.predicted:
+        lines += ['  <Node name="predicted">', *_tags(scene.predicted, "    "), "  </Node>"]
+    return "\n".join([*lines, "</Node>", ""])
+
+
+def _tags(components: list[Component], indent: str) -> list[str]:
+    lines = []
+    for one in components:
+        data = "".join(f' {key}="{value}"' for key, value in one.data.items())
+        lines.append(f"{indent}<{one.name}{data}/>")
+    return lines
+
+
+PYTHON = '''
+def createScene(root):
+    root.dt.value = {step!r}
+    root.gravity.value = [0.0, 0.0, 0.0]
+    for plugin in PLUGINS:
+        root.addObject("RequiredPlugin", pluginName=plugin)
+    for name, data in ROOT:
+        root.addObject(name, **data)
+    sheet = root.addChild("sheet")
+    add_integrator(root, sheet)
+    for name, data in SHEET:
+        sheet.addObject(name, **data)
+    if PREDICTED:
+        predicted = root.addChild("predicted")
+        for name, data in PREDICTED:
+            predicted.addObject(name, **data)
+    return root
+
+
+def add_integrator(root, sheet):
+    """Backward Euler, whose plugin and component have other names since v26.06."""
+    for plugin, name in BACKWARD_EULER:
+        try:
+            root.addObject("RequiredPlugin", pluginName=plugin)
+            return sheet.addObject(name, **INTEGRATOR)
+        except Exception as error:
+            failed = error
+    raise failed
+'''
+
+
+def sofa_python(net: Net) -> str:
+    """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python.
+
+    Parameters and errors as of `sofa_xml`.
+
+    Returns
+    -------
+    str
+        Python with a function ``createScene``.
+    """
+    scene = _scene(net)
+    said = "\n".join(f"# {line}" for line in scene.about)
+    entries = {
+        "PLUGINS": repr(PLUGINS),
+        "BACKWARD_EULER": repr(BACKWARD_EULER),
+        "INTEGRATOR": repr(dict(scene.sheet[0].data)),
+        "ROOT": _rows(scene.root),
+        "SHEET": _rows(scene.sheet[1:]),
+        "PREDICTED": _rows(scene.predicted),
+    }
+    values = "\n".join(f"{name} = {value}" for name, value in entries.items())
+    return f"{said}\n\n{values}\n\n{PYTHON.replace('{step!r}', repr(scene.step))}"
+
+
+def _rows(components: list[Component]) -> str:
+    if not components:
+        return "[]"
+    return "[\n" + "".join(f"    ({one.name!r}, {dict(one.data)!r}),\n" for one in components) + "]"
+
+
+def _scene(net: Net) -> SofaScene:
+    simulation = simulate(net, "SOFA")
+    step = float(2 * np.pi / simulation.loaded_frequency / PERIOD) if simulation.loaded_frequency else simulation.step
+    there = net.stiffness != 0
+    springs = " ".join(
+        f"{first} {second} {stiffness!r} 0 {length!r}"
+        for (first, second), stiffness, length in zip(
+            net.springs[there].tolist(), net.stiffness[there].tolist(), net.rest_lengths[there].tolist()
+        )
+    )
+    size = f"{float(net.rest_lengths.mean()):.6g}"
+    vec3 = {"template": "Vec3"}
+    sheet = [
+        Component("EulerImplicit", {"rayleighStiffness": "0", "rayleighMass": repr(simulation.mass_damping)}),
+        Component("SparseLDLSolver", {}),
+        Component("MechanicalObject", vec3 | {"name": "particles", "position": _positions(net.points)}),
+        Component(
+            "EdgeSetTopologyContainer",
+            {
+                "name": "edges",
+                "position": "@particles.position",
+                "edges": " ".join(map(str, net.springs[there].ravel().tolist())),
+            },
+        ),
+        Component(
+            "DiagonalMass",
+            vec3 | {"vertexMass": numbers(simulation.masses), "topology": "@edges", "geometryState": "@particles"},
+        ),
+        Component("SpringForceField", vec3 | {"name": "springs", "spring": springs}),
+        *_constraints(net),
+        *_forces(net, simulation, size),
+    ]
+    said = (
+        f"the one here is that of backward Euler, a {PERIOD}th of the slowest period that the load excites"
+        if simulation.loaded_frequency
+        else "the one here is below it"
+    )
+    predicted = []
+    if simulation.displacements is not None:
+        shown = {"showObject": "1", "showObjectScale": "4", "showColor": "0.1 0.6 0.2 1"}
+        moved = _positions(net.points + simulation.displacements)
+        predicted = [Component("MechanicalObject", vec3 | {"name": "particles", "position": moved} | shown)]
+    root = [
+        Component("DefaultAnimationLoop", {}),
+        Component("VisualStyle", {"displayFlags": "showBehaviorModels showForceFields"}),
+    ]
+    return SofaScene(step, about(net, simulation, said), root, sheet, predicted)
+
+
+def _positions(points: np.ndarray) -> str:
+    return numbers(np.column_stack([points, np.zeros(len(points))]))
+
+
+def _constraints(net: Net) -> list[Component]:
+    """Directions that are held; across the plane all are."""
+    found = []
+    for x, y in ((True, True), (True, False), (False, True), (False, False)):
+        which = np.flatnonzero((net.held == (x, y)).all(axis=1))
+        if len(which):
+            held = {"template": "Vec3", "indices": " ".join(map(str, which.tolist()))}
+            if x and y:
+                found.append(Component("FixedProjectiveConstraint", held))
+            else:
+                directions = {"fixedDirections": f"{int(x)} {int(y)} 1"}
+                found.append(Component("PartialFixedProjectiveConstraint", held | directions))
+    return found
+
+
+def _forces(net: Net, simulation: Simulation, size: str) -> list[Component]:
+    loaded = np.flatnonzero((np.where(net.held, 0, net.forces) != 0).any(axis=1))
+    if not len(loaded):
+        return []
+    arrows = float(size) / float(np.abs(net.forces).max())
+    data = {
+        "template": "Vec3",
+        "name": "load",
+        "indices": " ".join(map(str, loaded.tolist())),
+        "forces": _positions(net.forces[loaded]),
+        "showArrowSize": f"{arrows:.6g}",
+    }
+    return [Component("ConstantForceField", data)]
