@@ -248,7 +248,7 @@ class TestPredict:
         result = run("predict", *self.STEEL, "--size", "5 mm")
         assert result.exit_code == 0
         rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
-        names = {"delingette", "area", "patch-area", "patch", "lattice", "van-gelder", "uniform"}
+        names = {"delingette", "area", "patch-area", "patch", "lattice", "van-gelder", "oriented"}
         assert list(rows)[0] == "definition" and set(rows) == {"definition", *names}
         assert "recommended: patch-area; with springs alone: patch" in result.stdout
         # sqrt(3)/2 E t / (1 + sqrt(3)/2 a/H), a / H = 1/4
