@@ -15,6 +15,7 @@ the quadratic form of its second derivative at rest.
 import inspect
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,20 +35,11 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import motion_of
-from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, definition_of, named
+from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..springs import Definition, DefinitionError, Springs
-
-FORMULAS = {
-    "area": "W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area",
-    "angle": "W = 1/2 modulus sum_i (angle_i - rest_angle_i)^2 of each triangle, angle_i that at its corner i",
-    "biquadratic": (
-        "W = sum_i tensile_i / 4 q_i^2 + sum_i coupling_i / 2 q_j q_k of each triangle, with q_i = l_i^2 - "
-        "rest_length_i^2 of the side opposite corner i, and j, k the other two: coupling_i joins the sides that meet "
-        "in corner i"
-    ),
-}
-"""Energy of a cell by kind of terms."""
+from .formats import ARRAYS, Content, read, write
+from .terms import Terms
 
 UNITS = {
     "points": "m",
@@ -64,34 +56,6 @@ UNITS = {
 
 NOT_COMPUTED = "not computed"
 """How a text begins that stands in the place of a number."""
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """Energies of one kind, besides the springs': a row for each cell.
-
-    Attributes
-    ----------
-    kind : str
-        Key of `FORMULAS`: ``"area"``, ``"angle"`` or ``"biquadratic"``.
-    cells : ndarray of int, shape (n_cells, n_corners)
-        Particles of each cell, counter-clockwise.
-    values : dict of str to ndarray of float, shape (n_cells,) or (n_cells, n_corners)
-        ``rest_area`` and ``modulus``; ``rest_angle`` and ``modulus``; or ``rest_length``, ``tensile`` and ``coupling``,
-        of the side opposite each corner, and of the two sides that meet in it.
-    units : dict of str to str
-        Unit of each.
-    """
-
-    kind: str
-    cells: np.ndarray
-    values: dict[str, np.ndarray]
-    units: dict[str, str]
-
-    @property
-    def formula(self) -> str:
-        """Energy of a cell."""
-        return FORMULAS[self.kind]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +104,9 @@ class SpringNet:
     quads: np.ndarray = field(default_factory=lambda: no_cells(4))
 
     @classmethod
-    def from_scene(cls, scene: Scene, mesh_name: str = "", *, errors: bool = True) -> "SpringNet":
+    def from_scene(
+        cls, scene: Scene, mesh_name: str = "", *, springs: Springs | None = None, errors: bool = True
+    ) -> "SpringNet":
         """Springs of a scene, held and loaded as it is.
 
         Parameters
@@ -148,6 +114,8 @@ class SpringNet:
         scene : Scene
         mesh_name : str, optional
             What the header calls the mesh, such as ``"structured 2 mm"``.
+        springs : Springs, optional
+            In the place of the scene's own.
         errors : bool, optional
             Whether the header shall say the expected errors, which takes a solve a load.
 
@@ -160,21 +128,22 @@ class SpringNet:
         DefinitionError
             If the definition cannot live on the mesh or with the material.
         """
-        parts = _parts(scene.sheet, scene.springs, scene.material, scene.kind, scene.force)
+        springs = scene.springs if springs is None else springs
+        parts = _parts(scene.sheet, springs, scene.material, scene.kind, scene.force)
         load = {
             "name": scene.load,
             "force": scene.force,
             "kinematics": scene.kinematics,
             "follower": scene.follower,
         }
-        header = _header(scene.definition, scene.sheet, scene.material, scene.springs, mesh_name)
+        header = _header(scene.definition, scene.sheet, scene.material, springs, mesh_name)
         header |= {"beam": _beam(scene.beam), "load": load}
         header["expected_error"] = (
-            _expected_errors(scene.sheet, scene.definition, scene.springs, scene.beam, scene.material, scene.load)
+            _expected_errors(scene.sheet, scene.definition, springs, scene.beam, scene.material, scene.load)
             if errors
             else f"{NOT_COMPUTED}: not asked for"
         )
-        header["largest_stable_step"] = _stable_steps(scene.sheet, scene.springs, scene.material, scene.kind)
+        header["largest_stable_step"] = _stable_steps(scene.sheet, springs, scene.material, scene.kind)
         return cls(**parts, header=header)
 
     @classmethod
@@ -229,6 +198,7 @@ class SpringNet:
         chosen = definition_of(definition)
         sheet = Sheet(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
         if springs is None:
+            check_stiffness(chosen, stiffness)
             given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
             with named(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
@@ -243,6 +213,56 @@ class SpringNet:
         )
         header["largest_stable_step"] = _stable_steps(sheet, springs, material, None)
         return cls(**_parts(sheet, springs, material, None, 0.0), header=header)
+
+    def write(self, path: str | Path) -> list[Path]:
+        """Write the net in the format that the ending of a name says; files appear whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
+            beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
+            ``.vtu`` has springs as lines, for ParaView and meshio.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        ValueError
+            If the name has another ending.
+        """
+        return write(path, self.content)
+
+    @property
+    def content(self) -> Content:
+        """What its files hold."""
+        arrays = {name: getattr(self, name) for name in ARRAYS if getattr(self, name) is not None}
+        return Content(arrays, self.energies, self.header | {"thickness": float(self.thickness)})
+
+    @classmethod
+    def read(cls, path: str | Path) -> "SpringNet":
+        """Read a net; it has the very numbers that were written.
+
+        Parameters
+        ----------
+        path : str or Path
+            As of `write`.
+
+        Returns
+        -------
+        SpringNet
+
+        Raises
+        ------
+        ValueError
+            If there is no such file, or it is not as `write` writes it.
+        """
+        arrays, energies, header = read(path)
+        parts: dict[str, Any] = {"masses": None} | arrays
+        return cls(**parts, energies=energies, thickness=header["thickness"], header=header)
 
 
 def terms(energy: Energy, reference: float) -> Terms:
@@ -267,10 +287,10 @@ def terms(energy: Energy, reference: float) -> Terms:
     values: dict[str, np.ndarray]
     if isinstance(energy, AreaEnergy):
         values = {"rest_area": signed_areas(points, corners), "modulus": reference * energy.modulus}
-        return Terms("area", corners, values, {"rest_area": "m2", "modulus": "N/m"})
+        return Terms("area", corners, values)
     if isinstance(energy, AngleEnergy):
         values = {"rest_angle": corner_angles(points, corners), "modulus": reference * energy.modulus}
-        return Terms("angle", corners, values, {"rest_angle": "rad", "modulus": "J"})
+        return Terms("angle", corners, values)
     if isinstance(energy, BiquadraticEnergy):
         sides = np.roll(points[corners], 1, axis=1) - np.roll(points[corners], -1, axis=1)
         coupling = np.zeros(energy.tensile.shape) if energy.coupling is None else energy.coupling
@@ -279,7 +299,7 @@ def terms(energy: Energy, reference: float) -> Terms:
             "tensile": reference * energy.tensile,
             "coupling": reference * coupling,
         }
-        return Terms("biquadratic", corners, values, {"rest_length": "m", "tensile": "N/m3", "coupling": "N/m3"})
+        return Terms("biquadratic", corners, values)
     raise DefinitionError(
         f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
     )
@@ -294,7 +314,7 @@ def _parts(sheet: Sheet, springs: Springs, material: Material, kind: LoadKind | 
         "springs": mesh.edges,
         "rest_lengths": mesh.edge_lengths,
         "stiffness": springs.reference * springs.relative,
-        "energies": tuple(terms(energy, springs.reference) for energy in springs.energies),
+        "energies": _merged([terms(energy, springs.reference) for energy in springs.energies]),
         "masses": None if density is None else masses(mesh, density, sheet.thickness),
         "thickness": sheet.thickness,
         "held": none.astype(bool) if kind is None else sheet.held(kind),
@@ -302,6 +322,22 @@ def _parts(sheet: Sheet, springs: Springs, material: Material, kind: LoadKind | 
         "triangles": mesh.triangles,
         "quads": mesh.quads,
     }
+
+
+def _merged(given: list[Terms]) -> tuple[Terms, ...]:
+    """Terms of one kind and the same cells as one: energies are proportional to their moduli."""
+    found: dict[tuple[str, int], Terms] = {}
+    for one in given:
+        key = one.kind, one.cells.shape[1]
+        if key in found:
+            moduli = {
+                name: found[key].values[name] + values
+                for name, values in one.values.items()
+                if not name.startswith("rest_")
+            }
+            one = Terms(one.kind, one.cells, one.values | moduli)
+        found[key] = one
+    return tuple(found.values())
 
 
 def _header(
@@ -320,7 +356,10 @@ def _header(
         "definition": definition.name,
         "formula": formula,
         "source": source,
-        "reference_stiffness": springs.reference,
+        "reference_stiffness": float(springs.reference),
+        # Forces on the long faces that belong to the springs; they are part of the forces of a load.
+        **({"lateral_stress": springs.lateral} if springs.lateral else {}),
+        "thickness": float(sheet.thickness),
         "beam": None,
         "material": {
             "name": material.name,
@@ -330,7 +369,8 @@ def _header(
         },
         "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
         "load": None,
-        "units": UNITS | {"reference_stiffness": "N/m", "young_modulus": "Pa", "density": "kg/m3"},
+        "units": UNITS
+        | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
     }
 
 

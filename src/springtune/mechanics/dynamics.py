@@ -13,6 +13,7 @@ load. The tangent where a run came to rest is therefore factorized, once and for
 pivots are counted.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -347,6 +348,7 @@ class Motion:
         *,
         rest: float | None = None,
         sample: int = 0,
+        watch: Callable[[float, np.ndarray, np.ndarray], None] | None = None,
         precision: str = "float64",
     ) -> Run:
         """Move for a number of steps, or until rest.
@@ -367,6 +369,8 @@ class Motion:
             a critical one as the run is to balance may be misjudged.
         sample : int, optional
             Steps between samples of energy and momentum; none without.
+        watch : callable, optional
+            Told time [s], displacements [m] and velocities [m/s], shape (n_points, 2), with every sample.
         precision : str, optional
             ``"float64"`` or ``"float32"``, of explicit schemes.
 
@@ -396,6 +400,8 @@ class Motion:
                 break
             if sample:
                 samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
+                if watch is not None:
+                    watch(done * step, u, v)
             if rest is not None and done and self._at_rest(u, v, rest):
                 end = self._rest_end(u, name, done)
                 break

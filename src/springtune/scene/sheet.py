@@ -116,6 +116,31 @@ def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
+def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -> None:
+    """Refuse a definition that lacks the uniform stiffness that it is told, or has one that it does not use.
+
+    Parameters
+    ----------
+    definition : Definition or OwnDefinition
+    stiffness : float, str or None
+        What is given.
+
+    Raises
+    ------
+    ValueError
+    """
+    if (definition.needs == "stiffness") == (stiffness is not None):
+        return
+    if stiffness is None:
+        raise ValueError(
+            f"stiffness: definition {definition.name!r} needs a uniform one; give a stiffness such as '170e6 N/m'"
+        )
+    raise ValueError(
+        f"stiffness: {stiffness!r} is not used, since definition {definition.name!r} derives its own; leave it out, or "
+        "choose 'paper'"
+    )
+
+
 @contextmanager
 def named(definition: Definition | OwnDefinition) -> Iterator[None]:
     """Context in which a definition that refuses a mesh or material is named.

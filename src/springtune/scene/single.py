@@ -1,8 +1,9 @@
 """One scene: a meshed beam of springs under a load, its equilibrium, and the finite-element answer beside it."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,12 +21,12 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..springs import Springs
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
-from .sheet import AnyDefinition, Sheet, chosen, definition_of, named
+from .sheet import AnyDefinition, Sheet, check_stiffness, chosen, definition_of, named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..mechanics.dynamics import Motion
+    from ..mechanics.dynamics import Motion, Run
     from ..reference.small_strain import ReferenceSolution
 
 
@@ -126,16 +127,7 @@ class Scene:
             raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
         self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
-        if (self.definition.needs == "stiffness") != (stiffness is not None):
-            if stiffness is None:
-                raise ValueError(
-                    f"stiffness: definition {self.definition.name!r} needs a uniform one; give a stiffness such as "
-                    "'170e6 N/m'"
-                )
-            raise ValueError(
-                f"stiffness: {stiffness!r} is not used, since definition {self.definition.name!r} derives its own; "
-                "leave it out, or choose 'paper'"
-            )
+        check_stiffness(self.definition, stiffness)
         if sheet is not None:
             is_a(sheet, Sheet, "sheet", "that of another scene")
         self.sheet = Sheet(mesh, beam.thickness) if sheet is None else sheet
@@ -156,10 +148,20 @@ class Scene:
         with named(self.definition):
             return self.sheet.derive(self.definition, self.material, self.uniform_stiffness, case)
 
-    @property
-    def springs(self) -> Springs:
-        """Springs of the definition: stiffnesses over a reference stiffness, and energies besides them."""
-        return self._derived[0]
+    @cached_property
+    def springs(self) -> "SceneSprings":
+        """Springs of the definition: stiffnesses over a reference stiffness, and energies besides them.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
+        >>> [path.name for path in scene.springs.write("net.csv")]
+        ['net.csv', 'net.particles.csv', 'net.triangles.csv']
+        """
+        springs = self._derived[0]
+        return SceneSprings(**{part.name: getattr(springs, part.name) for part in fields(Springs)}, scene=self)
 
     @property
     def network(self) -> Network:
@@ -293,6 +295,63 @@ class Scene:
         options = {"linear": self.kinematics == "linear"} | options
         return motion_of(self.sheet, self.kind, self.springs, self.material.density, self.force, **options)
 
+    def write_motion(
+        self,
+        path: str | Path,
+        motion: "Motion",
+        integrator: str,
+        step: float,
+        steps: int,
+        *,
+        frames: int = 50,
+        **options: Any,
+    ) -> "Run":
+        """Move, and write the network as it moves, for ParaView.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ending in ``.pvd``: a collection of files that stand in the folder of its name, such as
+            ``swing/swing_0000.vtu``, each with displacement, velocity, and stiffness and force of the springs.
+        motion : Motion
+            What `motion` gave, critically damped or not.
+        integrator : str
+            One of `springtune.mechanics.integrators.INTEGRATORS`.
+        step : float
+            [s]
+        steps : int
+        frames : int, optional
+            About so many files besides the first.
+        **options
+            As `springtune.mechanics.dynamics.Motion.run` takes them.
+
+        Returns
+        -------
+        Run
+            What became of it.
+
+        Raises
+        ------
+        ValueError
+            If the name has another ending, a number is out of its range, or the motion diverged; nothing is written
+            then.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "bending", "100 N")
+        >>> motion = scene.motion()
+        >>> step = 0.9 * motion.step_limit("central-difference")
+        >>> run = scene.write_motion("swing.pvd", motion, "central-difference", step, 1000, frames=20)
+        >>> run.status, len(list(Path("swing").iterdir()))
+        ('moving', 21)
+        """
+        from .writing import writer
+
+        found: Run = writer().write_motion(path, self, motion, integrator, step, steps, frames, **options)
+        return found
+
     def buckling_load(self) -> float:
         """Size of the force at which the path from rest loses its stability, by bifurcation.
 
@@ -321,6 +380,43 @@ class Scene:
 
         reference = self.springs.reference
         return float(abs(buckling_load(self.problem, self.force / reference)) * reference)
+
+
+@dataclass(frozen=True, eq=False)
+class SceneSprings(Springs):
+    """Springs of a scene, which knows what their numbers are of.
+
+    Attributes
+    ----------
+    scene : Scene
+    """
+
+    scene: Scene | None = field(default=None, repr=False)
+
+    def write(self, path: str | Path, **options: Any) -> list[Path]:
+        """Write the springs for another program, see `springtune.SpringNet`.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ending in ``.csv``, ``.json``, ``.vtu`` or ``.h5``, see `springtune.SpringNet.write`.
+        **options
+            ``mesh_name``, what the header calls the mesh, and ``errors``, whether it says the expected errors.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        ValueError
+            If the name has another ending.
+        """
+        from .writing import writer
+
+        written: list[Path] = writer().write_springs(path, self.scene, self, **options)
+        return written
 
 
 @dataclass(frozen=True)
@@ -424,6 +520,41 @@ class Result:
         `Scene.objection` says where the reference of small strain does not apply.
         """
         return float(deformation_error(self.displacement, self.reference().displacement))
+
+    def write(self, path: str | Path, steps: int = 10) -> list[Path]:
+        """Write the deformed network for ParaView, or whatever else reads VTU.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.vtu``: particles with displacement, that of the reference and the difference (``error``), springs as
+            lines with stiffness and force, cells. ``.pvd``: the path to it from rest, in equal steps of the force, as a
+            collection of such files in the folder of its name, whose times are the size of the force [N].
+        steps : int, optional
+            Of a path.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        ValueError
+            If the name has another ending, or there is no equilibrium.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> result = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN").solve()
+        >>> result.write("traction.vtu")[0].name, len(result.write("traction.pvd", steps=4))
+        ('traction.vtu', 6)
+        """
+        from .writing import writer
+
+        written: list[Path] = writer().write_result(path, self, steps)
+        return written
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the springs where they have come to, coloured by their force.

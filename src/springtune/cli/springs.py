@@ -1,0 +1,186 @@
+"""The springs of a mesh, as files for other programs."""
+
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .completion import mesh_types
+from .examples import examples
+from .options import asked_beam, asked_material, asked_mesh, asked_size, is_made, known_materials
+
+if TYPE_CHECKING:
+    from ..handover.net import SpringNet
+    from ..problem.geometry import Beam
+    from ..problem.materials import Material
+
+OPTIONS = re.compile(r"^(?=(load|force|definition|stiffness)\b)")
+"""Beginnings of messages that name an argument, which is an option here."""
+
+
+def known_definitions(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Definitions whose names begin so, for a shell to complete."""
+    from ..springs import DEFINITIONS
+
+    return [name for name in DEFINITIONS if name.startswith(begun)]
+
+
+def known_loads(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Loads whose names begin so, for a shell to complete."""
+    from ..problem.loads import LOADS
+
+    return [name for name in LOADS if name.startswith(begun)]
+
+
+@click.command(
+    epilog=examples(
+        'springtune springs --beam 200x40 --size "5 mm" --material steel --definition patch --out net.csv',
+        'springtune springs --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber --out net.vtu',
+        'springtune springs --beam 200x40 --size "5 mm" --material steel --density "7850 kg/m^3" --load traction '
+        '--force "400 kN" --out net.json',
+    )
+)
+@click.option("--beam", required=True, help="Length x height in mm, such as 200x40.")
+@click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
+@click.option(
+    "--mesh",
+    "mesh_type",
+    default="structured",
+    show_default=True,
+    shell_complete=mesh_types,
+    help="A mesh type, or a mesh file.",
+)
+@click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
+@click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
+@click.option("--material", shell_complete=known_materials, help="steel or rubber; or give --young and --poisson.")
+@click.option("--young", help="Young's modulus, such as '210 GPa'.")
+@click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
+@click.option("--density", help="Density, such as '7850 kg/m^3': for masses, and the largest stable time steps.")
+@click.option(
+    "--definition",
+    default="patch",
+    show_default=True,
+    shell_complete=known_definitions,
+    help="Rule for the stiffness; `springtune definitions` lists them, `springtune predict` recommends one.",
+)
+@click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
+@click.option("--load", shell_complete=known_loads, help="What holds and pulls the beam; nothing without.")
+@click.option("--force", help="Size of the load's force, such as '400 kN'.")
+@click.option(
+    "--out",
+    "target",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="File: .csv, .json, .vtu (ParaView) or .h5; one that is there is replaced.",
+)
+def springs(
+    beam: str,
+    thickness: str,
+    mesh_type: str,
+    size: str | None,
+    unit: str,
+    material: str | None,
+    young: str | None,
+    poisson: str | None,
+    density: str | None,
+    definition: str,
+    stiffness: str | None,
+    load: str | None,
+    force: str | None,
+    target: Path,
+) -> None:
+    """Write the springs of a mesh: their rest lengths and stiffnesses, masses, and energies besides them.
+
+    The file says what its numbers are: definition, formula and source, and how far off the network is under three
+    loads, solved on this very mesh.
+    """
+    from ..handover.formats import check_ending
+    from ..springs import DefinitionError
+
+    try:
+        check_ending(target)
+        sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
+        made = is_made(mesh_type)
+        edge = asked_size(sheet, mesh_type, size) if made else None
+        mesh = asked_mesh(sheet, mesh_type, edge, unit)
+        name = f"{mesh_type} {size}" if made else Path(mesh_type).name
+        net = _net(sheet, solid, mesh, name, definition, stiffness, load, force)
+        written = net.write(target)
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else error
+        raise SystemExit(_refused(f"--out: {target}: {why}; give a file that can be written")) from None
+    except (click.ClickException, DefinitionError, ValueError) as error:
+        raise SystemExit(_refused(OPTIONS.sub("--", str(getattr(error, "message", error)), count=1))) from None
+    click.echo(written_text(net, written))
+
+
+def _refused(message: str) -> int:
+    click.echo(message, err=True)
+    return 1
+
+
+def _net(
+    beam: "Beam",
+    material: "Material",
+    mesh: Any,
+    name: str,
+    definition: str,
+    stiffness: str | None,
+    load: str | None,
+    force: str | None,
+) -> "SpringNet":
+    from ..handover.net import SpringNet
+    from ..linalg.factors import SingularError
+    from ..scene.single import Scene
+
+    if (load is None) != (force is None):
+        if load is None:
+            raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
+        raise ValueError(f"--force: missing; give the size of the force of --load {load}, such as '400 kN'")
+    try:
+        if load is None or force is None:
+            return SpringNet.from_mesh(mesh, material, definition, beam=beam, stiffness=stiffness, mesh_name=name)
+        scene = Scene(beam, mesh, material, load, force, definition=definition, stiffness=stiffness)
+        return SpringNet.from_scene(scene, name)
+    except SingularError as error:  # of the patch test that scales springs
+        raise ValueError(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
+
+
+def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:
+    """What was written, and how far off it is.
+
+    Parameters
+    ----------
+    net : SpringNet
+    written : iterable of Path
+
+    Returns
+    -------
+    str
+    """
+    header = net.header
+    first, *others = written
+    besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
+    counts = [f"{len(net.points)} particles", f"{len(net.springs)} springs", *besides]
+    lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
+    lines += [f"beside it: {', '.join(str(other) for other in others)}"] if others else []
+    errors = header["expected_error"]
+    if isinstance(errors, dict):
+        known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]
+        why: dict[str, list[str]] = {}
+        for load, error in errors.items():
+            if isinstance(error, str):
+                why.setdefault(error, []).append(load)
+        unknown = [f"{', '.join(loads)}: {reason}" for reason, loads in why.items()]
+        lines += [f"error of the displacement, solved on this mesh: {', '.join(known)}"] if known else []
+        lines += unknown
+    else:
+        lines.append(f"error of the displacement: {errors}")
+    steps = header["largest_stable_step"]
+    if isinstance(steps, dict):
+        step = min(step for step in steps.values() if isinstance(step, float))
+        lines.append(f"largest stable step of explicit integrators, undamped: {step:.4g} s")
+    return "\n".join(lines)

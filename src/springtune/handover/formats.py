@@ -1,0 +1,555 @@
+"""Files of nets: CSV, JSON, VTU and HDF5, each of which gives back what was written, number by number."""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..jobs.atomic import replacing, write_text
+from .paraview import comment_of, write_vtu
+from .terms import OF_CORNERS, VALUES, Terms
+
+ARRAYS = {
+    "points": (float, 2, "m"),
+    "masses": (float, 0, "kg"),
+    "held": (bool, 2, ""),
+    "forces": (float, 2, "N"),
+    "springs": (np.int64, 2, ""),
+    "rest_lengths": (float, 0, "m"),
+    "stiffness": (float, 0, "N/m"),
+    "triangles": (np.int64, 3, ""),
+    "quads": (np.int64, 4, ""),
+}
+"""Arrays of a net: type, columns, of which 0 is none, and unit."""
+
+CELL_ARRAYS = {3: "triangles", 4: "quads"}
+"""Arrays that cells stand in, by their corners."""
+
+
+class Content(NamedTuple):
+    """What a file of a net holds.
+
+    Attributes
+    ----------
+    arrays : dict of str to ndarray
+        By the names of `ARRAYS`; those that a net does not have are left out.
+    energies : tuple of Terms
+    header : dict
+        Plain texts, numbers and dicts of them.
+    """
+
+    arrays: dict[str, np.ndarray]
+    energies: tuple[Terms, ...]
+    header: dict[str, Any]
+
+
+def write(path: str | Path, content: Content) -> list[Path]:
+    """Write the content of a net in the format that the ending of a name says; files appear whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ending in one of `ENDINGS`.
+    content : Content
+
+    Returns
+    -------
+    list of Path
+        What was written, the file of that name first.
+
+    Raises
+    ------
+    ValueError
+        If the ending is another one.
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    return _format_of(path).write(path, content)
+
+
+def read(path: str | Path) -> Content:
+    """Read the content of a net.
+
+    Parameters
+    ----------
+    path : str or Path
+        That `write` wrote.
+
+    Returns
+    -------
+    Content
+
+    Raises
+    ------
+    ValueError
+        If there is no such file, or it is not as springtune writes nets.
+    """
+    path = Path(path)
+    form = _format_of(path)
+    if not path.is_file():
+        raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
+    try:
+        return _checked(form.read(path))
+    except (AttributeError, LookupError, TypeError, ValueError, OSError, RuntimeError, SystemExit) as error:
+        said = " ".join(str(error).split())[:200] or type(error).__name__
+        raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
+
+
+def check_ending(path: str | Path) -> None:
+    """Refuse a name whose ending is no format of a net.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    ValueError
+    """
+    _format_of(Path(path))
+
+
+def _checked(content: Content) -> Content:
+    """Content whose arrays fit each other."""
+    arrays = content.arrays
+    for name, (kind, columns, _) in ARRAYS.items():
+        if name in arrays:
+            arrays[name] = array = np.ascontiguousarray(arrays[name], dtype=kind)
+            if array.ndim != (2 if columns else 1) or (columns and array.shape[1] != columns):
+                raise ValueError(f"{name} have the shape {array.shape}")
+        elif name != "masses":
+            raise ValueError(f"it has no {name}")
+    count = len(arrays["points"])
+    for names, length in (
+        (("masses", "held", "forces"), count),
+        (("rest_lengths", "stiffness"), len(arrays["springs"])),
+    ):
+        for name in names:
+            if name in arrays and len(arrays[name]) != length:
+                raise ValueError(f"{len(arrays[name])} {name} for {length}")
+    for name in ("springs", "triangles", "quads"):
+        if len(arrays[name]) and not (0 <= arrays[name].min() and arrays[name].max() < count):
+            raise ValueError(f"{name} of particles that it does not have")
+    if not isinstance(content.header.get("thickness"), float):
+        raise ValueError("its header has no thickness")
+    return content
+
+
+# -- tables of cells: the terms of their energies, column by column ------------------------------------------------
+
+
+def _columns(terms: Terms) -> dict[str, np.ndarray]:
+    """Columns of terms by name: ``area_modulus``; ``angle_rest_angle``, which has a component for each corner."""
+    return {f"{terms.kind}_{name}": values for name, values in terms.values.items()}
+
+
+def _terms(cells: np.ndarray, columns: Mapping[str, np.ndarray]) -> Iterable[Terms]:
+    """Terms of the columns of cells."""
+    for kind, names in VALUES.items():
+        found = {name: columns[f"{kind}_{name}"] for name in names if f"{kind}_{name}" in columns}
+        if found and len(found) < len(names):
+            raise ValueError(f"{kind} terms without {', '.join(sorted(set(names) - set(found)))}")
+        if found:
+            yield Terms(kind, cells, {name: np.ascontiguousarray(values, float) for name, values in found.items()})
+
+
+def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
+    """Columns of all terms by the corners of their cells."""
+    found: dict[int, dict[str, np.ndarray]] = {}
+    for terms in energies:
+        found.setdefault(terms.cells.shape[1], {}).update(_columns(terms))
+    return found
+
+
+# -- CSV -----------------------------------------------------------------------------------------------------------
+
+PARTICLE_COLUMNS = ("points", "masses", "held", "forces")
+SPRING_COLUMNS = ("springs", "rest_lengths", "stiffness")
+"""Arrays that stand beside each other in a table."""
+
+TITLES = {
+    "points": ("x", "y"),
+    "masses": ("mass",),
+    "held": ("held_x", "held_y"),
+    "forces": ("force_x", "force_y"),
+    "springs": ("first", "second"),
+    "rest_lengths": ("rest_length",),
+    "stiffness": ("stiffness",),
+    "triangles": ("a", "b", "c"),
+    "quads": ("a", "b", "c", "d"),
+}
+"""Names of the columns of each array."""
+
+
+def companions(path: Path) -> dict[str, Path]:
+    """Tables beside that of the springs, ``net.particles.csv`` and so on, by what they hold.
+
+    Parameters
+    ----------
+    path : Path
+        Of the springs, such as ``net.csv``.
+
+    Returns
+    -------
+    dict of str to Path
+    """
+    return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in ("particles", *CELL_ARRAYS.values())}
+
+
+def _write_csv(path: Path, content: Content) -> list[Path]:
+    arrays, others = content.arrays, companions(path)
+    tables = {others["particles"]: _table(arrays, PARTICLE_COLUMNS)}
+    terms = _by_corners(content.energies)
+    for count, name in CELL_ARRAYS.items():
+        if len(arrays[name]):
+            tables[others[name]] = _table(arrays, (name,)) | _corner_columns(terms.get(count, {}), count)
+    said = [f"# springs of a network; particles are counted from 0, and stand in {others['particles'].name}"]
+    said += [
+        f"# cells of {count} corners, and what energies they have, stand in {others[name].name}"
+        for count, name in CELL_ARRAYS.items()
+        if others[name] in tables
+    ]
+    said += [f"# {line}" for line in _header_lines(content.header)]
+    for other, table in tables.items():
+        write_text(other, _csv_text(table))
+    write_text(path, "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS)))
+    for other in set(others.values()) - set(tables):
+        other.unlink(missing_ok=True)  # of another net, written before
+    return [path, *tables]
+
+
+def _table(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Columns of arrays by title."""
+    table: dict[str, np.ndarray] = {}
+    for name in names:
+        if name not in arrays:
+            continue
+        unit = f" [{ARRAYS[name][2]}]" if ARRAYS[name][2] else ""
+        values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
+        table |= {f"{title}{unit}": column for title, column in zip(TITLES[name], values.reshape(len(values), -1).T)}
+    return table
+
+
+def _corner_columns(columns: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    """Columns of terms by title, one for each corner where corners have their own."""
+    table: dict[str, np.ndarray] = {}
+    for name, values in columns.items():
+        kind, _, value = name.partition("_")
+        unit = VALUES[kind][value]
+        names = [f"{name}_{corner}" for corner in "abcd"[:count]] if values.ndim > 1 else [name]
+        table |= {f"{title} [{unit}]": column for title, column in zip(names, values.reshape(len(values), -1).T)}
+    return table
+
+
+def _csv_text(table: Mapping[str, np.ndarray]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows(zip(*(column.tolist() for column in table.values())))
+    return text.getvalue()
+
+
+def _read_csv(path: Path) -> Content:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    head = [line[2:] for line in lines if line.startswith("#")]
+    others = companions(path)
+    tables = {"": _csv_table(lines)} | {
+        name: _csv_table(other.read_text(encoding="utf-8").splitlines())
+        for name, other in others.items()
+        if other.is_file()
+    }
+    of_table = {"": SPRING_COLUMNS, "particles": PARTICLE_COLUMNS} | {name: (name,) for name in CELL_ARRAYS.values()}
+    arrays: dict[str, np.ndarray] = {"triangles": np.zeros((0, 3)), "quads": np.zeros((0, 4))}
+    energies: list[Terms] = []
+    for place, table in tables.items():
+        for name in of_table[place]:
+            titles, columns = TITLES[name], ARRAYS[name][1]
+            if titles[0] in table:
+                found = np.array([[float(text) for text in table[title]] for title in titles]).T
+                arrays[name] = (found if columns else found[:, 0]).astype(ARRAYS[name][0])
+        if place in CELL_ARRAYS.values():
+            energies += _terms(arrays[place], _joined(table, len(TITLES[place])))
+    return Content(arrays, tuple(energies), _header_of(head))
+
+
+def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Columns of a table, without their units."""
+    titles, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    columns = list(zip(*rows)) if rows else [()] * len(titles)
+    return {title.partition(" [")[0]: column for title, column in zip(titles, columns, strict=True)}
+
+
+def _joined(table: Mapping[str, tuple[str, ...]], count: int) -> dict[str, np.ndarray]:
+    """Columns of terms, those of the corners together."""
+    found = {}
+    for kind, names in VALUES.items():
+        for name in names:
+            full = f"{kind}_{name}"
+            titles = [f"{full}_{corner}" for corner in "abcd"[:count]] if name in OF_CORNERS else [full]
+            if titles[0] in table:
+                values = np.array([[float(text) for text in table[title]] for title in titles]).T
+                found[full] = values if name in OF_CORNERS else values[:, 0]
+    return found
+
+
+def _header_lines(header: Mapping[str, Any], before: str = "") -> Iterable[str]:
+    """Header as lines ``key: value``, values as in JSON; a text of several lines follows its key, behind bars."""
+    for key, value in header.items():
+        if isinstance(value, dict):
+            yield from _header_lines(value, f"{before}{key}.")
+        elif isinstance(value, str) and "\n" in value:
+            yield f"{before}{key}:"
+            yield from (f"| {line}" for line in value.split("\n"))
+        else:
+            yield f"{before}{key}: {json.dumps(value, ensure_ascii=False)}"
+
+
+def _header_of(lines: Iterable[str]) -> dict[str, Any]:
+    """Header from the lines of `_header_lines`; others are left out."""
+    header: dict[str, Any] = {}
+    here, last = header, ""
+    for line in lines:
+        if line.startswith("| ") or line == "|":
+            here[last] = line[2:] if here[last] is None else f"{here[last]}\n{line[2:]}"
+            continue
+        path, colon, value = line.partition(":")
+        if not colon or " " in path:
+            continue
+        *parents, last = path.split(".")
+        here = header
+        for parent in parents:
+            here = here.setdefault(parent, {})
+        here[last] = json.loads(value) if value else None
+    return header
+
+
+# -- JSON ----------------------------------------------------------------------------------------------------------
+
+
+def as_json(content: Content) -> dict[str, Any]:
+    """Content of a net as JSON has it: lists, numbers, texts.
+
+    Parameters
+    ----------
+    content : Content
+
+    Returns
+    -------
+    dict
+        ``header``, the arrays by name, and ``energies``: a list of ``kind``, ``formula``, ``cells`` (the name of the
+        array that they stand in), ``units`` and ``values``.
+    """
+    return {
+        "header": content.header,
+        **{name: content.arrays[name].tolist() if name in content.arrays else None for name in ARRAYS},
+        "energies": [
+            {
+                "kind": terms.kind,
+                "formula": terms.formula,
+                "cells": CELL_ARRAYS[terms.cells.shape[1]],
+                "units": terms.units,
+                "values": {name: values.tolist() for name, values in terms.values.items()},
+            }
+            for terms in content.energies
+        ],
+    }
+
+
+def _write_json(path: Path, content: Content) -> list[Path]:
+    # An array a line: rows of their own would make most of the file blanks.
+    parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in as_json(content).items()]
+    write_text(path, "{\n" + ",\n".join(parts) + "\n}\n")
+    return [path]
+
+
+def _read_json(path: Path) -> Content:
+    found = json.loads(path.read_text(encoding="utf-8"))
+    arrays = {
+        name: np.array(found[name], dtype=kind).reshape((-1, columns) if columns else -1)
+        for name, (kind, columns, _) in ARRAYS.items()
+        if found[name] is not None
+    }
+    energies = tuple(
+        Terms(
+            one["kind"],
+            arrays[one["cells"]],
+            {name: np.array(one["values"][name], dtype=float) for name in VALUES[one["kind"]]},
+        )
+        for one in found["energies"]
+    )
+    return Content(arrays, energies, found["header"])
+
+
+# -- VTU -----------------------------------------------------------------------------------------------------------
+
+POINT_NAMES = {"masses": "mass", "held": "held", "forces": "load"}
+LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
+"""Names of arrays in ParaView."""
+
+
+def _write_vtu(path: Path, content: Content) -> list[Path]:
+    write_vtu_with(path, content, {}, {})
+    return [path]
+
+
+def write_vtu_with(
+    path: str | Path,
+    content: Content,
+    of_particles: Mapping[str, np.ndarray],
+    of_springs: Mapping[str, np.ndarray],
+    numbers: Mapping[str, float] | None = None,
+) -> None:
+    """Write the content of a net, and more data of its particles and springs, for ParaView.
+
+    Parameters
+    ----------
+    path : str or Path
+    content : Content
+    of_particles : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
+    of_springs : mapping of str to ndarray of float, shape (n_springs,)
+    numbers : mapping of str to float, optional
+        Field data besides those of the header.
+    """
+    arrays = content.arrays
+    data = {new: arrays[old] for old, new in POINT_NAMES.items() if old in arrays}
+    data["held"] = data["held"].astype(np.int8)
+    cell_data = {new: {2: arrays[old]} for old, new in LINE_NAMES.items()}
+    cell_data |= {name: {2: values} for name, values in of_springs.items()}
+    for count, columns in _by_corners(content.energies).items():
+        for name, values in columns.items():
+            cell_data.setdefault(name, {})[count] = values
+    write_vtu(
+        path,
+        arrays["points"],
+        {2: arrays["springs"], 3: arrays["triangles"], 4: arrays["quads"]},
+        data | dict(of_particles),
+        cell_data,
+        _numbers(content.header) | dict(numbers or {}),
+        json.dumps(content.header, indent=1),
+    )
+
+
+def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
+    """Numbers of a header that one looks for in ParaView."""
+    found = {"thickness": header["thickness"]}
+    for group in ("expected_error", "largest_stable_step"):
+        values = header.get(group)
+        if isinstance(values, dict):
+            found |= {f"{group}_{name}": value for name, value in values.items() if isinstance(value, float)}
+    return found
+
+
+def _read_vtu(path: Path) -> Content:
+    import meshio
+
+    grid = meshio.read(path)
+    arrays: dict[str, np.ndarray] = {"points": grid.points[:, :2]}
+    for old, new in POINT_NAMES.items():
+        if new in grid.point_data:
+            values = grid.point_data[new]
+            arrays[old] = values[:, :2] if values.ndim > 1 else values
+    blocks = {block.data.shape[1]: number for number, block in enumerate(grid.cells)}
+    for count, name in ({2: "springs"} | CELL_ARRAYS).items():
+        arrays[name] = grid.cells[blocks[count]].data if count in blocks else np.zeros((0, count))
+    for old, new in LINE_NAMES.items():
+        arrays[old] = grid.cell_data[new][blocks[2]]
+    energies: list[Terms] = []
+    for count in (count for count in CELL_ARRAYS if count in blocks):
+        columns = {name: parts[blocks[count]] for name, parts in grid.cell_data.items()}
+        there = {name: values for name, values in columns.items() if not np.isnan(values).all()}
+        energies += _terms(arrays[CELL_ARRAYS[count]], there)
+    return Content(arrays, tuple(energies), json.loads(comment_of(path)))
+
+
+# -- HDF5 ----------------------------------------------------------------------------------------------------------
+
+
+def _write_h5(path: Path, content: Content) -> list[Path]:
+    import h5py
+
+    with replacing(path) as unfinished, h5py.File(unfinished, "w", track_order=True) as file:
+        _put_header(file.create_group("header", track_order=True), content.header)
+        for name, (_, _, unit) in ARRAYS.items():
+            if name in content.arrays:
+                made = file.create_dataset(name, data=content.arrays[name])
+                if unit:
+                    made.attrs["units"] = unit
+        for number, terms in enumerate(content.energies):
+            group = file.create_group(f"energies/{number}", track_order=True)
+            group.attrs.update(
+                {"kind": terms.kind, "formula": terms.formula, "cells": f"/{CELL_ARRAYS[terms.cells.shape[1]]}"}
+            )
+            for name, values in terms.values.items():
+                group.create_dataset(name, data=values).attrs["units"] = terms.units[name]
+    return [path]
+
+
+def _put_header(group: Any, header: Mapping[str, Any]) -> None:
+    """Header as attributes of groups: HDF5 has no None, and an empty attribute is one."""
+    import h5py
+
+    for key, value in header.items():
+        if isinstance(value, dict):
+            _put_header(group.create_group(key, track_order=True), value)
+        else:
+            group.attrs[key] = h5py.Empty("f8") if value is None else value
+    # Attributes and groups have orders of their own.
+    group.attrs["keys"] = json.dumps(list(header))
+
+
+def _header_in(group: Any) -> dict[str, Any]:
+    import h5py
+
+    header = {}
+    for key in json.loads(group.attrs["keys"]):
+        value = _header_in(group[key]) if key in group else group.attrs[key]
+        value = value.item() if isinstance(value, np.generic) else value
+        header[key] = None if isinstance(value, h5py.Empty) else value
+    return header
+
+
+def _read_h5(path: Path) -> Content:
+    import h5py
+
+    with h5py.File(path) as file:
+        arrays = {name: file[name][()] for name in ARRAYS if name in file}
+        groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]
+        energies = tuple(
+            Terms(
+                group.attrs["kind"],
+                arrays[group.attrs["cells"][1:]],
+                {name: group[name][()] for name in VALUES[group.attrs["kind"]]},
+            )
+            for group in groups
+        )
+        return Content(arrays, energies, _header_in(file["header"]))
+
+
+class _Format(NamedTuple):
+    """How a net is written in a format, and read."""
+
+    write: Callable[[Path, Content], list[Path]]
+    read: Callable[[Path], Content]
+
+
+_FORMATS = {
+    ".csv": _Format(_write_csv, _read_csv),
+    ".json": _Format(_write_json, _read_json),
+    ".vtu": _Format(_write_vtu, _read_vtu),
+    ".h5": _Format(_write_h5, _read_h5),
+}
+
+ENDINGS = tuple(_FORMATS)
+"""Endings of the names of files of nets."""
+
+
+def _format_of(path: Path) -> _Format:
+    form = _FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(ENDINGS)}")
+    return form

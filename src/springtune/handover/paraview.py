@@ -1,0 +1,107 @@
+"""Files for ParaView: an unstructured grid with its data (.vtu), and collections of such files (.pvd)."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..jobs.atomic import replacing, write_text
+
+CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
+"""meshio's names of cells by their corners."""
+
+
+def write_vtu(
+    path: str | Path,
+    points: np.ndarray,
+    cells: Mapping[int, np.ndarray],
+    point_data: Mapping[str, np.ndarray],
+    cell_data: Mapping[str, Mapping[int, np.ndarray]],
+    numbers: Mapping[str, float] | None = None,
+    comment: str = "",
+) -> None:
+    """Write points and cells with their data; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    points : ndarray of float, shape (n_points, 2)
+        [m]
+    cells : mapping of int to ndarray of int, shape (n, corners)
+        Particles of the cells by number of corners: 2 are lines, and are drawn as such.
+    point_data : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
+        Vectors get a third component of zero, as ParaView wants them.
+    cell_data : mapping of str to mapping of int to ndarray
+        By name, and by the corners of the cells that have it; NaN on the others.
+    numbers : mapping of str to float, optional
+        Of the whole: the grid's field data.
+    comment : str, optional
+        For whoever opens the file with an editor.
+    """
+    import meshio
+
+    def flat(values: np.ndarray) -> np.ndarray:
+        if values.ndim == 1:
+            return values
+        return np.column_stack([values, np.zeros(len(values), dtype=values.dtype)])
+
+    present = {count: corners for count, corners in cells.items() if len(corners)}
+    data = {}
+    for name, given in cell_data.items():
+        shape = next(iter(given.values())).shape[1:]
+        data[name] = [
+            given[count] if count in given else np.full((len(corners), *shape), np.nan)
+            for count, corners in present.items()
+        ]
+    grid = meshio.Mesh(
+        flat(points),
+        [(CELL_NAMES[count], corners) for count, corners in present.items()],
+        point_data={name: flat(values) for name, values in point_data.items()},
+        cell_data=data,
+    )
+    with replacing(path) as unfinished:
+        grid.write(unfinished, file_format="vtu")
+        if numbers or comment:
+            added = "".join(
+                f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{value!r}'
+                "</DataArray>"
+                for name, value in (numbers or {}).items()
+            )
+            # A comment must not have two hyphens in a row; as JSON has them they are the same.
+            said = comment.replace("--", "-\\u002d")
+            head = f"<!--\n{said}\n-->" if comment else ""
+            fields = f"<FieldData>{added}</FieldData>" if added else ""
+            grid_tag = b"<UnstructuredGrid>"
+            content = unfinished.read_bytes()
+            unfinished.write_bytes(content.replace(grid_tag, head.encode() + grid_tag + fields.encode(), 1))
+
+
+def comment_of(path: str | Path) -> str:
+    """Comment of a file that `write_vtu` wrote; empty where it has none.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    str
+    """
+    found = re.search(rb"<!--\n(.*?)\n--><UnstructuredGrid>", Path(path).read_bytes(), re.DOTALL)
+    return found.group(1).decode() if found else ""
+
+
+def write_pvd(path: str | Path, pieces: Sequence[tuple[float, str]]) -> None:
+    """Write a collection of files, which ParaView opens as one that changes in time.
+
+    Parameters
+    ----------
+    path : str or Path
+    pieces : sequence of (float, str)
+        Time of each piece [s], or whatever takes its place, and its file, as seen from the folder of the collection.
+    """
+    rows = [f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(file)}/>' for time, file in pieces]
+    lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
+    write_text(path, "\n".join([*lines, *rows, "  </Collection>", "</VTKFile>", ""]))

@@ -1,0 +1,223 @@
+"""Scenes and results as files: springs for other programs, deformed networks and series of them for ParaView."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..jobs.atomic import UNFINISHED
+from ..mechanics.dynamics import Motion, Run
+from ..mechanics.integrators import BackwardEuler
+from ..reference.small_strain import ReferenceNotConvergedError
+from ..scene.single import Result, Scene
+from ..springs import Springs
+from .formats import check_ending, write_vtu_with
+from .net import NOT_COMPUTED, SpringNet
+from .paraview import write_pvd
+
+FRAMES = 50
+"""Files of a series, where no number is given."""
+
+MOST_FRAMES = 10_000
+"""Most files of a series: ParaView and file systems take no more gladly."""
+
+
+def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: Any) -> list[Path]:
+    """Write springs of a scene, see `springtune.handover.net.SpringNet.write`.
+
+    Parameters
+    ----------
+    path : str or Path
+    scene : Scene
+    springs : Springs
+        The scene's, or others on its mesh.
+    **options
+        As `springtune.handover.net.SpringNet.from_scene` takes them.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+    """
+    check_ending(path)
+    return SpringNet.from_scene(scene, springs=springs, **options).write(path)
+
+
+def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path]:
+    """Write a deformed network, or the path to it, for ParaView; see `springtune.Result.write`.
+
+    Parameters
+    ----------
+    path : str or Path
+    result : Result
+    steps : int, optional
+        Steps of a path.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    ValueError
+        If the name has another ending, there is no equilibrium to write, or none at a step of the path.
+    """
+    path, scene = Path(path), result.scene
+    if path.suffix.lower() not in (".vtu", ".pvd"):
+        raise ValueError(
+            f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu, or, for its path, .pvd"
+        )
+    if not np.isfinite(result.displacement):
+        raise ValueError(f"there is no equilibrium to write: {result.message}")
+    if path.suffix.lower() == ".vtu":
+        _Frames(scene).write(path, result.displacements)
+        return [path]
+    if not 1 <= steps <= MOST_FRAMES:
+        raise ValueError(f"steps: {steps!r} is not from 1 to {MOST_FRAMES}; give the number of load steps")
+    frames, reference = _Frames(scene), scene.springs.reference
+    with _series(path) as add:
+        add(0.0, partial(frames.write, displacements=np.zeros(scene.mesh.points.shape), share=0.0))
+        for share in np.arange(1, steps + 1) / steps:
+            load = share * scene.force / reference
+            linear = scene.kinematics == "linear"
+            found = scene.problem.linear(load) if linear else scene.problem.nonlinear(load)
+            if not found.converged:
+                raise ValueError(f"no equilibrium at {100 * share:g} % of the force; give another number of steps")
+            add(float(share * abs(scene.force)), partial(frames.write, displacements=found.displacements, share=share))
+    return _written(path)
+
+
+def write_motion(
+    path: str | Path,
+    scene: Scene,
+    motion: Motion,
+    integrator: str | BackwardEuler,
+    step: float,
+    steps: int,
+    frames: int = FRAMES,
+    **options: Any,
+) -> Run:
+    """Move a scene and write it as it moves, for ParaView; see `springtune.Scene.write_motion`.
+
+    Parameters
+    ----------
+    path : str or Path
+    scene : Scene
+    motion : Motion
+    integrator, step, steps, **options
+        As `springtune.mechanics.dynamics.Motion.run` takes them.
+    frames : int, optional
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    ValueError
+        If the name does not end in ``.pvd``, a number is out of its range, or the motion came to nothing.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".pvd":
+        raise ValueError(f"{path}: '{path.suffix}' is no format of a motion; give a name ending in .pvd")
+    if not 1 <= frames <= MOST_FRAMES:
+        raise ValueError(f"frames: {frames!r} is not from 1 to {MOST_FRAMES}; give the number of files")
+    if not (isinstance(steps, int) and steps >= 1):
+        raise ValueError(f"steps: {steps!r} is not a whole number above zero; give the number of time steps")
+    pieces = _Frames(scene, compared=False)
+    with _series(path) as add:
+
+        def watch(time: float, u: np.ndarray, v: np.ndarray) -> None:
+            add(time, partial(pieces.write, displacements=u, velocities=v, linear=motion.linear))
+
+        run = motion.run(integrator, step, steps, sample=-(-steps // frames), watch=watch, **options)
+        if run.status == "diverged":
+            raise ValueError(run.message)
+    return run
+
+
+class _Frames:
+    """Deformed networks of a scene as files, with what they have in common computed once."""
+
+    def __init__(self, scene: Scene, compared: bool = True) -> None:
+        self.scene, self.net = scene, SpringNet.from_scene(scene, errors=False)
+        self.content = self.net.content
+        self.reference: np.ndarray | None = None
+        if not compared:
+            return
+        try:
+            reference = scene.reference()
+        except ReferenceNotConvergedError as error:
+            self.content.header["reference"] = f"{NOT_COMPUTED}: {error}"
+        else:
+            self.reference = reference.at(scene.mesh.points)
+            self.content.header["reference"] = scene.objection or "finite elements, small strain, converged"
+
+    def write(
+        self,
+        path: Path,
+        displacements: np.ndarray,
+        share: float = 1.0,
+        velocities: np.ndarray | None = None,
+        linear: bool | None = None,
+    ) -> None:
+        """Write displacements [m] under a share of the force [1]; the reference's, too, where that is known."""
+        scene = self.scene
+        linear = scene.kinematics == "linear" if linear is None else linear
+        of_particles = {"displacement": displacements}
+        if velocities is not None:
+            of_particles["velocity"] = velocities
+        if self.reference is not None:
+            expected = share * self.reference
+            of_particles |= {"reference_displacement": expected, "error": displacements - expected}
+        forces = scene.springs.reference * scene.network.spring_forces(displacements, linear)
+        numbers = {"displacement_of_the_load": scene.sheet.displacement(scene.kind, displacements)}
+        write_vtu_with(path, self.content, of_particles, {"force": forces}, numbers)
+
+
+Add = Callable[[float, Callable[[Path], None]], None]
+"""Adds a piece to a series: its time, and what writes it to a file of a given name."""
+
+
+@contextmanager
+def _series(path: Path) -> Iterator[Add]:
+    """Context in which a series is written: ``swing.pvd`` and ``swing/swing_0000.vtu`` and so on, all of it or nothing.
+
+    What was there of a longer series of that name is removed.
+    """
+    folder = path.with_suffix("")
+    made = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    times: list[float] = []
+    pieces: list[Path] = []
+
+    def add(time: float, write: Callable[[Path], None]) -> None:
+        unfinished = folder / f"{folder.name}_{len(pieces):04}.vtu{UNFINISHED}"
+        pieces.append(unfinished)
+        times.append(time)
+        write(unfinished)
+
+    try:
+        yield add
+        finished = [piece.with_suffix("") for piece in pieces]
+        for old in folder.glob(f"{folder.name}_[0-9]*.vtu"):
+            if old not in finished:
+                old.unlink()
+        for piece, name in zip(pieces, finished):
+            piece.replace(name)
+        write_pvd(path, [(time, f"{folder.name}/{name.name}") for time, name in zip(times, finished)])
+    except BaseException:
+        for piece in pieces:
+            piece.unlink(missing_ok=True)
+        if made:
+            folder.rmdir()
+        raise
+
+
+def _written(path: Path) -> list[Path]:
+    folder = path.with_suffix("")
+    return [path, *sorted(folder.glob(f"{folder.name}_[0-9]*.vtu"))]
