@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from springtune import prediction
 from springtune.cli import COMMANDS, main
-from springtune.cli.predict import prediction_text
+from springtune.cli.recommendation import prediction_text
 from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
@@ -241,6 +241,9 @@ def choices():
     return beam, material, known, prediction.predict(beam, mesh, material, known)
 
 
+ABOUT = {"particles": 105, "springs": 268}
+
+
 class TestPredict:
     STEEL = ("--beam", "100x20", "--material", "steel")
 
@@ -251,8 +254,6 @@ class TestPredict:
         names = {"delingette", "area", "patch-area", "patch", "lattice", "van-gelder", "oriented"}
         assert list(rows)[0] == "definition" and set(rows) == {"definition", *names}
         assert "recommended: patch-area; with springs alone: patch" in result.stdout
-        # sqrt(3)/2 E t / (1 + sqrt(3)/2 a/H), a / H = 1/4
-        assert "1.495e+08 N/m" in rows["uniform"]
         assert "+0.00 %" in rows["patch"]
         # Traction, bending and shear as in tests/physics/test_predict.py, in order of the worst of them.
         assert rows["delingette"].split("each its own")[2].split()[:6] == ["-0.09", "%", "-7.77", "%", "-1.36", "%"]
@@ -271,17 +272,19 @@ class TestPredict:
         beam, material, known, _ = choices
         known = known | {"bending": "its error estimate is 1"}
         mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-        lines = prediction_text("", beam, material, prediction.predict(beam, mesh, material, known), known).splitlines()
+        found = prediction.predict(beam, mesh, material, known)
+        lines = prediction_text("", ABOUT, beam, material, found, known).splitlines()
         rows = [line for line in lines if line.startswith("  ")]
         assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
         assert "bending: no reference; its error estimate is 1" in lines
 
     def test_unstable_networks_are_marked(self, choices):
         beam, material, known, found = choices
-        numbers = dict.fromkeys(("traction", "bending", "shear", "young_modulus_error", "poisson_ratio"), np.nan)
+        numbers = dict.fromkeys(("young_modulus_error", "poisson_ratio"), np.nan)
+        numbers["errors"] = dict.fromkeys(prediction.CASES, np.nan)
         failed = numbers | {"extra": "", "failures": {"patch test": "unstable: the network is unstable at rest"}}
         found = [replace(one, **failed) if one.definition == "patch" else one for one in found]
-        text = prediction_text("", beam, material, sorted(found, key=lambda one: one.worst), known)
+        text = prediction_text("", ABOUT, beam, material, sorted(found, key=lambda one: one.worst), known)
         assert "with springs alone: van-gelder" in text
         rows = {line.split()[0]: line for line in text.splitlines() if line.startswith("  ")}
         assert rows["patch"].split()[-5:] == ["unstable"] * 5
@@ -321,8 +324,8 @@ class TestPredict:
             assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
             assert f"--size: '{size}' makes some " in result.stderr
             assert "of beam '100x20', more than can be meshed (1e+07); give at least 0.01" in result.stderr
-        slender = run("predict", "--beam", "1e9x1", "--material", "steel", "--mesh", mesh_type, "--size", "1 mm")
-        assert "of beam '1e9x1', more than can be meshed (1e+07); give a shorter beam" in slender.stderr
+        slender = run("predict", "--beam", "1e4x1", "--material", "steel", "--mesh", mesh_type, "--size", "1e-3 mm")
+        assert "of beam '1e4x1', more than can be meshed (1e+07); give at least 0.0" in slender.stderr
 
     def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
         write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))

@@ -25,15 +25,15 @@ from ..scene.sheet import Sheet
 from ..springs import DefinitionError, Springs
 
 PREDICTED = tuple(name for name, load in LOADS.items() if not load.follower)
-"""Loads that can be predicted, keys of `springtune.problem.loads.LOADS`: all but those that turn with the side that they
-act on, which linear kinematics do not tell from the others."""
+"""Loads that can be predicted, keys of `springtune.problem.loads.LOADS`: all but those that turn with the side that
+they act on, which linear kinematics do not tell from the others."""
 
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
 
 SHORTEST, LONGEST, MOST_SLENDER = 1e-9, 1e7, 1e4
-"""Sides [m] and aspect ratio beyond which a beam is taken for an error of units: atoms are next, the Earth is no larger,
-and more slender beams are beyond what the references of bending resolve."""
+"""Sides [m] and aspect ratio beyond which a beam is taken for an error of units: atoms are next, the Earth is no
+larger, and more slender beams are beyond what the references of bending resolve."""
 
 ON_TRIANGLES = ("patch", "lattice", "van-gelder", "oriented", "delingette", "area", "patch-area")
 """Definitions that are tried on triangles, springs alone first: of all that need no tuning, those that are the best one
@@ -365,8 +365,9 @@ class TriedMesh:
         Choice
         """
         springs = self._springs[name]
-        errors = {load: self.error(name, load) for load in self.known}
-        failures = {load: error for load, error in errors.items() if isinstance(error, str)}
+        found = {load: self.error(name, load) for load in self.known}
+        errors: dict[str, Number] = {load: nan if isinstance(error, str) else error for load, error in found.items()}
+        failures = {load: error for load, error in found.items() if isinstance(error, str)}
         key = _key(springs)
         if key not in self._moduli:
             try:
@@ -382,7 +383,7 @@ class TriedMesh:
             name,
             *self._parts(name, springs),
             bool(springs.energies),
-            errors={load: nan if isinstance(error, str) else error for load, error in errors.items()},
+            errors=errors,
             young_modulus_error=float(young) - 1,
             poisson_ratio=float(moduli[1]),
             failures=failures,
@@ -400,7 +401,7 @@ class TriedMesh:
         -------
         Choice
         """
-        errors = dict.fromkeys(self.known, nan)
+        errors: dict[str, Number] = dict.fromkeys(self.known, nan)
         return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
 
     def _displacement(self, springs: Springs, kind: LoadKind) -> float | str:
@@ -415,8 +416,7 @@ class TriedMesh:
         """Stiffness of sides inside and on the outline, and in words what else there is."""
         outline, several = self.mesh.on_outline, self.mesh.cells_per_edge > 1
         inside, at_outline, diagonals = (
-            self._common(springs.reference * springs.relative[part])
-            for part in (several, outline, ~outline & ~several)
+            self._common(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
         )
         extra = list(self._terms(springs))
         if len(self.mesh.quads):

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import count, takewhile
 
 import numpy as np
@@ -44,11 +45,12 @@ FINER, FEWEST_FINER = 2.0, 2
 least."""
 
 FEWEST_CELLS, LEFT = 4, 1.5
-"""Cells across from which on errors are taken to tend to a limit, and what may be left of the way to it, over the change
-by the last doubling of the cells."""
+"""Cells across from which on errors are taken to tend to a limit, and what may be left of the way to it, over the
+change by the last doubling of the cells."""
 
-RUNGS_PER_DOUBLING, BETWEEN = 2, 3
-"""Meshes tried for each doubling of the cells across; most of them between two of these."""
+EVERY, STEPS, BETWEEN = 16, 4, 2
+"""Cells across up to which every number of them is tried; steps by which they double beyond that; and numbers that are
+tried between two of these, where the coarsest mesh is."""
 
 DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
 """Definitions of which some live on each mesh."""
@@ -277,11 +279,12 @@ def find_mesh(
 
     Notes
     -----
-    Of each type meshes are solved from one cell across the beam's smaller side on, with 2, 3, 4, 6, 8, 11, 16, ...
-    cells, until a definition has kept the error on all meshes from one of them on up to another that has at least twice
-    as many cells across, two finer ones at least. Then the meshes between that one and the next coarser one are tried, from
-    the finer end, as long as the definition keeps the error. Meshes are ranked by their particles, and each error
-    counts with the error estimate of its reference added to its size. Kinematics are linear.
+    Of each type meshes are solved from one cell across the beam's smaller side on, every number of cells up to 16 and
+    four for each doubling beyond, until a definition has kept the error on all meshes from one of them on up to another
+    that has at least twice as many cells across. Beyond 16 cells meshes between that one and the next coarser one are
+    tried, too, from the finer end. A definition is given up where its error, by its change over the last doubling, will
+    be too large on the finest mesh as well. Meshes are ranked by their particles, and to the size of each error the
+    error estimate of its reference is added. Kinematics are linear.
 
     Examples
     --------
@@ -341,8 +344,8 @@ def _enough(cells: int, finer: Sequence[int]) -> bool:
 
 
 def _cells(rung: int) -> int:
-    """Cells across of the meshes that are tried first: 1, 2, 2, 3, 4, 6, 8, 12, 16, 23, ..."""
-    return math.ceil(2 ** (rung / RUNGS_PER_DOUBLING))
+    """Cells across of the meshes that are tried first: 1, 2, 3, ..., 15, 16, 20, 23, 27, 32, 39, ..."""
+    return rung + 1 if rung < EVERY else math.ceil(EVERY * 2 ** ((rung + 1 - EVERY) / STEPS))
 
 
 def _number(error: float | str) -> float:
@@ -366,7 +369,7 @@ class _TypeSearch:
         self._type, self._estimates, self._most = MESH_TYPES[name], estimates, most
         self._tried: dict[int, SolvedMesh] = {}  # by cells across
         self._found: dict[tuple[int, str], MeshChoice] = {}
-        self._finest = next(cells for cells in map(_cells, count(1)) if self._particles(cells) > most)
+        self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
 
     def climb(self) -> None:
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
@@ -440,7 +443,7 @@ class _TypeSearch:
         self._tried[cells] = SolvedMesh(self.name, size, cells, particles, len(mesh.edges), errors)
         return True
 
-    def _keeps(self, cells: int, name: str) -> bool:
+    def _keeps(self, name: str, cells: int) -> bool:
         """Whether a definition keeps the error on a mesh, even if the reference is off by its estimate."""
         errors = self._tried[cells].errors[name]
         return all(abs(error) + self._estimates[load] <= self.error for load, error in errors.items())  # not NaN
@@ -469,7 +472,7 @@ class _TypeSearch:
         """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
         starts: dict[int, list[str]] = {}
         for name in SPRINGS_ALONE if springs_alone else DEFINITIONS_TRIED:
-            kept = list(takewhile(lambda cells: self._keeps(cells, name), reversed(self._on(name))))
+            kept = list(takewhile(partial(self._keeps, name), reversed(self._on(name))))
             # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
             taken = [cells for cells in kept if not confirmed or _enough(cells, kept[: kept.index(cells)])]
             if taken:
@@ -489,7 +492,7 @@ class _TypeSearch:
                 continue
             self._try(cells, names)
             if cells in self._tried:
-                names = [name for name in names if self._keeps(cells, name)]
+                names = [name for name in names if self._keeps(name, cells)]
                 if not names:
                     return
 
