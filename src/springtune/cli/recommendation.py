@@ -71,7 +71,7 @@ def prediction_text(
         "",
         aligned(rows, left=2, right=range(3, 5 + len(loads))),
         "",
-        f"Errors are of the displacement of the loaded side, above zero where too soft: {how},",
+        f"Errors are of the displacement of the loaded side, {_soft(loads)}: {how},",
         f"{KINEMATICS_TEXT} (error estimate {_estimate(known)}).",
         "The first row is the best one by its worst error. E, its error, and nu are of a patch test between rollers.",
         *notes,
@@ -126,14 +126,17 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
             lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
     unsure = any(one and not one.confirmed for _, found, _ in tables for one in found.values())
     if unsure:
-        notes.insert(0, f"* kept on all finer meshes tried, but these are too few: at most {search.most:,} particles")
+        notes.insert(
+            0, f"* kept on all finer meshes tried, up to {search.most:,} particles, but these are too few to be sure"
+        )
     counts = [one.particles for one in search.tried]
     lines += [
         "",
         f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
         f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
-        "tried on, up to one with twice as many cells across or more. Meshes are ranked by their particles.",
-        "Errors are of the displacement of the loaded side, above zero where too soft, solved on each mesh,",
+        "tried on, up to one with twice as many cells across, and would if its errors changed once more by as much as",
+        "over the last doubling. Meshes are ranked by their particles.",
+        f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,",
         f"{KINEMATICS_TEXT} (error estimate {_estimate(search.known)}).",
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
@@ -252,6 +255,20 @@ def size_text(size: float) -> str:
 
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
 """How errors are measured."""
+
+ABOVE = "above zero where too soft"
+"""What the sign of an error means, where displacements are positive."""
+
+
+def _soft(loads: Sequence[str]) -> str:
+    """What the signs of errors mean, (network - reference) / |reference|."""
+    from ..problem.loads import LOADS
+
+    against = [load for load in loads if LOADS[load].sign < 0]
+    along = [load for load in loads if load not in against]
+    if not against:
+        return ABOVE
+    return f"{ABOVE}, but under {_listed(against)} below" if along else "below zero where too soft"
 
 
 def _body_text(beam: "Beam", material: "Material") -> str:

@@ -31,7 +31,7 @@ they act on, which linear kinematics do not tell from the others."""
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
 
-SHORTEST, LONGEST, MOST_SLENDER = 1e-9, 1e7, 1e4
+SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
 """Sides [m] and aspect ratio beyond which a beam is taken for an error of units: atoms are next, the Earth is no
 larger, and more slender beams are beyond what the references of bending resolve."""
 
@@ -76,8 +76,9 @@ class Choice:
     energies : bool
         Whether a simulator needs more than springs for it.
     errors : dict of str to float
-        Deformation error by load, linear kinematics against the reference of small strain [1]; NaN where there is none,
-        because of the reference or for the reason in `failures`.
+        Deformation error by load, linear kinematics against the reference of small strain, (network - reference) /
+        abs(reference) [1]: above zero where the network is too soft, but below under compression and pressure, whose
+        displacements are negative. NaN where there is none, because of the reference or for the reason in `failures`.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
@@ -134,8 +135,8 @@ def check_beam(beam: Beam) -> None:
     is_a(beam, Beam, "beam", A_BEAM)
     sides = {"long": beam.length, "high": beam.height, "thick": beam.thickness}
     for word, side in sides.items():
-        if not SHORTEST <= side <= LONGEST:
-            remedy = f"give {1e3 * SHORTEST:g} to {1e3 * LONGEST:g} mm, or correct its unit"
+        if not SHORTEST_SIDE <= side <= LONGEST_SIDE:
+            remedy = f"give {1e3 * SHORTEST_SIDE:g} to {1e3 * LONGEST_SIDE:g} mm, or correct its unit"
             raise ValueError(f"beam {beam.name!r}: is {1e3 * side:.6g} mm {word}, which no beam is; {remedy}")
     slenderness = max(beam.length, beam.height) / min(beam.length, beam.height)
     if slenderness > MOST_SLENDER:
@@ -163,13 +164,13 @@ def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
     """
     if isinstance(loads, str) or not isinstance(loads, Iterable):
         raise ValueError(f"loads: {loads!r} is no list of loads; give one such as {list(CASES)}")
-    names = tuple(dict.fromkeys(loads))
+    names = tuple(loads)
     for name in names:
         if name not in PREDICTED:
             raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), PREDICTED)}")
     if not names:
         raise ValueError(f"loads: none; give some of {', '.join(PREDICTED)}")
-    return names
+    return tuple(dict.fromkeys(names))
 
 
 def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> References:
@@ -258,8 +259,11 @@ def predict(
     is_a(material, Material, "material", A_MATERIAL)
     check_filled(mesh, beam)
     loads = check_loads(loads)
-    if known is not None and not (isinstance(known, dict) and set(loads) <= set(known)):
-        raise ValueError(f"known: {known!r} has no references; give what springtune.prediction.references returns")
+    missing = [load for load in loads if known is not None and not (isinstance(known, dict) and load in known)]
+    if missing:
+        raise ValueError(
+            f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
+        )
     known = references(beam, material, loads) if known is None else known
     tried = TriedMesh(mesh, beam, material, {load: known[load] for load in loads})
     choices = [tried.choice(name) for name in tried.names]
@@ -350,7 +354,9 @@ class TriedMesh:
         displacement = self._displacements[key]
         if isinstance(displacement, str):
             return displacement
-        return nan if isinstance(known, str) else displacement / (springs.reference * float(known.displacement)) - 1
+        if isinstance(known, str):
+            return nan
+        return float(LOADS[load].sign * (displacement / (springs.reference * known.displacement) - 1))
 
     def choice(self, name: str) -> Choice:
         """What a definition is worth.

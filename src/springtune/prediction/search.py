@@ -3,7 +3,8 @@
 Errors do not fall evenly with the mesh size: the error of one load may pass through zero, and whole numbers of cells
 stretch a mesh now more, now less. So a mesh is not taken because it happens to keep the error. It is taken with a
 definition that keeps it there and on every finer mesh of its type that was tried, up to one with at least twice as many
-cells across the beam, two finer ones at least.
+cells across the beam, two finer ones at least; and that would still keep it there if its error changed once more by as
+much as it did over the last doubling of the cells, so that it is not just passing by zero.
 """
 
 import math
@@ -26,6 +27,7 @@ from ..scene.meshes import A_MATERIAL, check_filled, is_a
 from ..scene.sheet import Sheet
 from ..springs import Springs
 from ..units import parse
+from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
     NEED_ENERGIES,
@@ -40,15 +42,15 @@ from .choices import (
     references,
 )
 
-FINER, FEWEST_FINER = 2.0, 2
+ENOUGH_FINER, FEWEST_FINER = 2.0, 2
 """Cells across the finest mesh that was tried over those of the one that is taken, and how many finer ones were, at
 least."""
 
-FEWEST_CELLS, LEFT = 4, 1.5
-"""Cells across from which on errors are taken to tend to a limit, and what may be left of the way to it, over the
-change by the last doubling of the cells."""
+LEFT_TO_GO = 1.5
+"""What may be left of an error's way to its limit, over what is left of one in proportion to the mesh size."""
 
-EVERY, STEPS, BETWEEN = 16, 4, 2
+
+EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
 """Cells across up to which every number of them is tried; steps by which they double beyond that; and numbers that are
 tried between two of these, where the coarsest mesh is."""
 
@@ -58,7 +60,7 @@ DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
 SPRINGS_ALONE = tuple(name for name in DEFINITIONS_TRIED if name not in NEED_ENERGIES)
 """Definitions that need nothing but springs."""
 
-DIGITS = 4
+SIZE_DIGITS = 4
 """Digits of a mesh size [mm], so that the one that is printed makes the same mesh."""
 
 
@@ -130,6 +132,9 @@ class MeshChoice:
         all supports; NaN where the material has no density.
     finer : tuple of SolvedMesh
         Finer meshes that were tried, on each of which the definition keeps the error, too.
+    confirmed : bool
+        Whether these are enough: two at least, up to one with twice as many cells across, and the error would be kept
+        even if it changed once more by as much as over the last doubling.
     """
 
     mesh_type: str
@@ -141,11 +146,7 @@ class MeshChoice:
     seconds: float
     step_limit: float
     finer: tuple[SolvedMesh, ...] = field(repr=False)
-
-    @property
-    def confirmed(self) -> bool:
-        """Whether two finer meshes at least were tried, up to one with twice as many cells across."""
-        return _enough(self.cells, [one.cells for one in self.finer])
+    confirmed: bool
 
     @property
     def _rank(self) -> tuple[bool, int, int, float]:
@@ -281,7 +282,8 @@ def find_mesh(
     -----
     Of each type meshes are solved from one cell across the beam's smaller side on, every number of cells up to 16 and
     four for each doubling beyond, until a definition has kept the error on all meshes from one of them on up to another
-    that has at least twice as many cells across. Beyond 16 cells meshes between that one and the next coarser one are
+    that has at least twice as many cells across, and would keep it if it changed once more by as much as over the last
+    doubling. Beyond 16 cells meshes between that one and the next coarser one are
     tried, too, from the finer end. A definition is given up where its error, by its change over the last doubling, will
     be too large on the finest mesh as well. Meshes are ranked by their particles, and to the size of each error the
     error estimate of its reference is added. Kinematics are linear.
@@ -329,23 +331,20 @@ def find_mesh(
 def _mesh_types(names: Sequence[str]) -> tuple[str, ...]:
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise ValueError(f"mesh types: {names!r} is no list of them; give one such as ['structured', 'free']")
-    chosen = tuple(dict.fromkeys(names))
+    chosen = tuple(names)
     for name in chosen:
-        if name not in MESH_TYPES:
+        if not (isinstance(name, str) and name in MESH_TYPES):
             raise ValueError(f"mesh types: {name!r} is unknown; {nearest(str(name), MESH_TYPES)}")
     if not chosen:
         raise ValueError(f"mesh types: none; give some of {', '.join(MESH_TYPES)}")
-    return chosen
-
-
-def _enough(cells: int, finer: Sequence[int]) -> bool:
-    """Whether meshes that keep an error, too, are finer ones enough."""
-    return len(finer) >= FEWEST_FINER and max(finer) >= FINER * cells
+    return tuple(dict.fromkeys(chosen))
 
 
 def _cells(rung: int) -> int:
     """Cells across of the meshes that are tried first: 1, 2, 3, ..., 15, 16, 20, 23, 27, 32, 39, ..."""
-    return rung + 1 if rung < EVERY else math.ceil(EVERY * 2 ** ((rung + 1 - EVERY) / STEPS))
+    return (
+        rung + 1 if rung < EVERY_UP_TO else math.ceil(EVERY_UP_TO * 2 ** ((rung + 1 - EVERY_UP_TO) / STEPS_A_DOUBLING))
+    )
 
 
 def _number(error: float | str) -> float:
@@ -389,9 +388,9 @@ class _TypeSearch:
         length, height = self.beam.length, self.beam.height
         side = min(length, height)
         exact = 1e3 * (height / self._type.row_height if height <= length else length) / cells
-        digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - DIGITS)
+        digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
         # By its text, as the option of a command has it; what is a hair above a digit is that digit.
-        return min(side, parse(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{DIGITS}g} mm", "length"))
+        return min(side, parse(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm", "length"))
 
     def _particles(self, cells: int) -> float:
         return self._type.particles(self.beam.length, self.beam.height, self.size(cells))
@@ -402,7 +401,8 @@ class _TypeSearch:
 
     def found(self, springs_alone: bool) -> MeshChoice | None:
         """The coarsest mesh that is taken, and what it costs; None where there is none."""
-        start = self._start(springs_alone) or self._start(springs_alone, confirmed=False)
+        sure = self._start(springs_alone)
+        start = sure or self._start(springs_alone, confirmed=False)
         if start is None:
             return None
         cells, names = start
@@ -420,6 +420,7 @@ class _TypeSearch:
                 one.springs,
                 *_cost(mesh, self.beam, self.material, tried.springs(name), list(self.known)),
                 tuple(self._tried[finer] for finer in self._on(name) if finer > cells),
+                sure is not None,
             )
         return self._found[cells, name]
 
@@ -458,15 +459,31 @@ class _TypeSearch:
         An error that changes in proportion to the mesh size changes from n cells to m by the 1 - n/m of what it changed
         by from n/2 to n, and by less if in proportion to a higher power.
         """
-        on = [cells for cells in self._on(name) if cells >= FEWEST_CELLS]
-        coarser = [cells for cells in on if FINER * cells <= on[-1]]
-        if not coarser:
-            return bool(self._on(name)) or not self._tried
-        left = LEFT * (1 - on[-1] / self._finest)
-        before, last = (self._tried[cells].errors[name] for cells in (coarser[-1], on[-1]))
+        on = self._on(name)
+        doubling = self._doubling(name)
+        if doubling is None or ENOUGH_FINER * FEWEST_CELLS > on[-1]:
+            return bool(on) or not self._tried
+        left = LEFT_TO_GO * (1 - on[-1] / self._finest)
+        before, last = doubling
         if any(before[load] != before[load] and last[load] != last[load] for load in last):
             return False
         return not any(abs(last[load]) - left * abs(last[load] - before[load]) > self.error for load in last)
+
+    def _steady(self, name: str) -> bool:
+        """Whether a definition would keep the error if it changed once more by as much as over the last doubling."""
+        doubling = self._doubling(name)
+        if doubling is None:
+            return False
+        before, last = doubling
+        return all(abs(2 * last[load] - before[load]) <= self.error for load in last)
+
+    def _doubling(self, name: str) -> tuple[dict[str, float], dict[str, float]] | None:
+        """Errors on a mesh of half as many cells across as the finest one that was tried, or fewer, and on that."""
+        on = self._on(name)
+        coarser = [cells for cells in on if ENOUGH_FINER * cells <= on[-1]]
+        if not coarser:
+            return None
+        return self._tried[coarser[-1]].errors[name], self._tried[on[-1]].errors[name]
 
     def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
         """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
@@ -474,8 +491,8 @@ class _TypeSearch:
         for name in SPRINGS_ALONE if springs_alone else DEFINITIONS_TRIED:
             kept = list(takewhile(partial(self._keeps, name), reversed(self._on(name))))
             # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
-            taken = [cells for cells in kept if not confirmed or _enough(cells, kept[: kept.index(cells)])]
-            if taken:
+            taken = [cells for cells in kept[FEWEST_FINER:] if ENOUGH_FINER * cells <= kept[0]] if confirmed else kept
+            if taken and (not confirmed or self._steady(name)):
                 starts.setdefault(taken[-1], []).append(name)
         return min(starts.items()) if starts else None
 
@@ -486,7 +503,7 @@ class _TypeSearch:
             return
         upper, names = start
         lower = max((cells for cells in self._tried if cells < upper), default=upper)
-        steps = (round(lower * (upper / lower) ** (step / (BETWEEN + 1))) for step in range(BETWEEN, 0, -1))
+        steps = (round(lower * (upper / lower) ** (step / (TRIED_BETWEEN + 1))) for step in range(TRIED_BETWEEN, 0, -1))
         for cells in dict.fromkeys(steps):
             if cells in self._tried:
                 continue
