@@ -20,8 +20,8 @@ FEWEST_CELLS = 4
 COARSER, TRIED = 6, 30
 """Meshes that a band is from, and sizes of which each of them is chosen."""
 
-MARGIN, LEAST_MARGIN = 1.0, 5e-4
-"""What is added to a band at either end, over its width, and at least [1]."""
+MARGIN, LEAST_MARGIN, LEAST_OF_ERROR = 1.0, 5e-4, 0.05
+"""What is added to a band at either end: over its width, at least [1], and at least over the error itself."""
 
 
 def extrapolate(
@@ -39,7 +39,7 @@ def extrapolate(
     What a network gets wrong depends on the shape of its cells, which are stretched to fit the beam, and changes about
     in proportion to the mesh size or to a higher power of it. So a band holds what meshes give whose sizes cover an
     octave, chosen for cells that are stretched a little more and a little less than those asked for, and what a
-    straight line through these gives; its width is added at either end.
+    straight line through these gives; its width is added at either end, a twentieth of an error at least.
 
     Parameters
     ----------
@@ -103,13 +103,13 @@ def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int)
 def _band(choices: list[Choice], sizes: list[float], size: float) -> Choice:
     """Bands of a definition at a size, from choices on meshes of other sizes."""
 
-    def band(numbers: Iterable[Number], least: float = LEAST_MARGIN) -> tuple[float, float]:
+    def band(numbers: Iterable[Number], least: float = LEAST_MARGIN, own: float = 0.0) -> tuple[float, float]:
         values = np.array([*numbers], dtype=float)
         values = np.append(values, np.polyval(np.polyfit(sizes, values, 1), size))
         low, high = values.min(), values.max()
         margin = MARGIN * (high - low)
         if margin > 1e-9:  # what is exact is so on every mesh
-            margin = max(margin, least)
+            margin = max(margin, least, own * np.abs(values).max())
         return float(low - margin), float(high + margin)
 
     failures: dict[str, str] = {}
@@ -119,7 +119,9 @@ def _band(choices: list[Choice], sizes: list[float], size: float) -> Choice:
         choices[0],
         inside=band((choice.inside for choice in choices), least=0.0),
         outline=band((choice.outline for choice in choices), least=0.0),
-        errors={load: band(choice.errors[load] for choice in choices) for load in choices[0].errors},
+        errors={
+            load: band((choice.errors[load] for choice in choices), own=LEAST_OF_ERROR) for load in choices[0].errors
+        },
         young_modulus_error=band(choice.young_modulus_error for choice in choices),
         poisson_ratio=band(choice.poisson_ratio for choice in choices),
         extra="" if failures else _band_in_words([choice.extra.split(" ") for choice in choices]),
