@@ -308,8 +308,12 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
     worst, one, name = min(near, key=lambda found: found[0])
     most = max(other.particles for other, _ in names)
-    near_to = f"{name} at {size_text(one.size)} ({one.particles:,} particles), {100 * worst:.3g} % off at worst"
-    return f"none up to {most:,} particles; nearest is {near_to}"
+    where = f"{name} at {size_text(one.size)} ({one.particles:,} particles)"
+    if worst <= search.error:
+        return (
+            f"none up to {most:,} particles; {where} keeps it, {100 * worst:.3g} % off at worst, but finer ones do not"
+        )
+    return f"none up to {most:,} particles; nearest is {where}, {100 * worst:.3g} % off at worst"
 
 
 def _head_json(beam: "Beam", material: "Material", known: "References") -> dict[str, Any]:

@@ -86,6 +86,7 @@ class SolvedMesh:
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
     >>> coarsest = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).tried[0]
     >>> coarsest.cells, coarsest.particles, f"{100 * coarsest.worst('patch'):.1f} %"
+    (1, 13, '63.3 %')
     """
 
     mesh_type: str
@@ -135,6 +136,19 @@ class MeshChoice:
     confirmed : bool
         Whether these are enough: two at least, up to one with twice as many cells across, and the error would be kept
         even if it changed once more by as much as over the last doubling.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> best = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).best
+    >>> best.size, best.cells, best.particles, best.confirmed
+    (0.009238, 5, 141, True)
+    >>> [finer.cells for finer in best.finer]
+    [6, 7, 8, 9, 10]
+    >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
+    >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
+    >>> print(f"{100 * best.choice.errors['bending']:.3f} %, {100 * scene.solve().error:.3f} %")
     """
 
     mesh_type: str
@@ -179,9 +193,11 @@ class MeshSearch:
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-    >>> search = st.find_mesh(beam, steel, "1 %", mesh_types=["structured", "right"])
+    >>> search = st.find_mesh(beam, steel, "5 %", mesh_types=["structured", "right"])
     >>> search.best.mesh_type, search.best.choice.definition
+    ('structured', 'lattice')
     >>> {name: found and found.choice.definition for name, found in search.springs_by_type.items()}
+    {'structured': 'lattice', 'right': None}
     """
 
     error: float
@@ -295,7 +311,9 @@ def find_mesh(
     >>> search = st.find_mesh(beam, steel, "2 %", loads=["traction", "bending"], mesh_types=["structured"])
     >>> best = search.best
     >>> print(f"{best.mesh_type} {1e3 * best.size:g} mm, {best.choice.definition}: {best.particles} particles")
+    structured 5.774 mm, lattice: 328 particles
     >>> print(f"at worst {100 * best.choice.worst:.1f} %, steps up to {1e9 * best.step_limit:.0f} ns")
+    at worst 2.0 %, steps up to 716 ns
     >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=500).best is None
     True
     """
