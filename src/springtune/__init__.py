@@ -15,6 +15,7 @@ solved: 9.51 mm, error +0.1 %
 __version__ = "0.1.0"
 
 _NAMES = {
+    "handover.net": ("SpringNet",),
     "kinds": ("load_study",),
     "kinds.benchmark.figures": (
         "plot_benchmark",
@@ -71,6 +72,7 @@ __all__ = [
     "Result",
     "Scene",
     "SolvedMesh",
+    "SpringNet",
     "Springs",
     "Status",
     "StudyError",

@@ -1,5 +1,6 @@
 """Types of the public names, for checkers and editors; `__init__.py` imports each when it is first asked for."""
 
+from .handover.net import SpringNet as SpringNet
 from .kinds import load_study as load_study
 from .kinds.benchmark.figures import plot_benchmark as plot_benchmark
 from .kinds.benchmark.figures import plot_benchmark_costs as plot_benchmark_costs

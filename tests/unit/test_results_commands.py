@@ -6,8 +6,10 @@ import os
 import platform
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
@@ -174,6 +176,59 @@ class TestExport:
         (tmp_path / "mine.zarr/thesis.txt").write_text("all of it")
         refused(run("export", path, "--to", tmp_path / "mine.zarr", "--force"), "no Zarr store")
         assert (tmp_path / "mine.zarr/thesis.txt").exists()
+
+    @pytest.fixture
+    def fields(self, tmp_path):
+        """Dataset of two scenes of a triangle that have fields."""
+        axes = AXES | {name: tuple(range(4)) for name in ("particle", "spring", "cell_corner", "outline_point")}
+        fields, root = FIELDS.empty(axes | {"spring_end": (0, 1), "cell": (0,)}), ROOT.empty(AXES)
+        place = {"beam": "200x40", "mesh_type": "free", "mesh_size": 5e-3}
+        fields["x"].loc[place], fields["y"].loc[place] = [0.0, 1.0, 0.0, np.nan], [0.0, 0.0, 1.0, np.nan]
+        fields["spring_nodes"].loc[place] = np.array([[0, 1], [0, 2], [1, 2], [-1, -1]])
+        fields["cell_nodes"].loc[place] = np.array([[0, 1, 2, -1]])
+        load = place | {"material": "steel", "load": "bending"}
+        for number, axis in enumerate("xy"):
+            fields[f"particle_reference_{axis}"].loc[load] = [0.0, 0.5, 0.25 * number, np.nan]
+            for shift, definition in enumerate(("lattice", "patch")):
+                cell = load | {"definition": definition, "kinematics": "linear"}
+                fields[f"displacement_{axis}"].loc[cell] = [0.0, 0.75 + shift, 0.0, np.nan]
+                fields["stiffness"].loc[cell], fields["force"].loc[cell] = [1, 2, 3, np.nan], [4, 5, 6, np.nan]
+                root["deformation_error"].loc[cell] = 0.125
+        dataset.write(tmp_path / "dataset.nc", {"/": root, "/fields": fields}, {"springtune_version": "0"})
+        return tmp_path
+
+    def test_a_scene_is_written_for_paraview(self, fields):
+        result = run("export", fields, "--to", fields / "net.vtu", "--select", "definition=lattice")
+        assert result.exit_code == 0, result.stderr
+        net = meshio.read(fields / "net.vtu")
+        assert {block.type: block.data.tolist() for block in net.cells} == {
+            "line": [[0, 1], [0, 2], [1, 2]],
+            "triangle": [[0, 1, 2]],
+        }
+        assert net.point_data["displacement"].tolist() == [[0, 0, 0], [0.75, 0.75, 0], [0, 0, 0]]
+        assert net.point_data["error"].tolist() == [[0, 0, 0], [0.25, 0.25, 0], [0, -0.25, 0]]
+        assert net.cell_data["stiffness"][0].tolist() == [1, 2, 3] and net.cell_data["force"][0].tolist() == [4, 5, 6]
+        assert net.field_data["deformation_error"] == [0.125]
+
+    def test_scenes_are_a_collection(self, fields):
+        for _ in range(2):  # a second time in the place of the first
+            result = run("export", fields, "--to", fields / "all.pvd", "--force")
+            assert result.exit_code == 0, result.stderr
+        rows = ElementTree.parse(fields / "all.pvd").getroot().findall("Collection/DataSet")
+        names = [f"all/200x40_free_5mm_steel_bending_{definition}_linear.vtu" for definition in ("lattice", "patch")]
+        assert [row.get("file") for row in rows] == names
+        moved = [meshio.read(fields / name).point_data["displacement"][1, 0] for name in names]
+        assert moved == [0.75, 1.75]
+        run("export", fields, "--to", fields / "all.pvd", "--force", "--select", "definition=patch")
+        assert os.listdir(fields / "all") == [Path(names[1]).name]
+
+    def test_what_paraview_does_not_get(self, path, fields):
+        before = sorted(os.listdir(fields))
+        refused(run("export", fields, "--to", fields / "net.vtu"), "2 scenes", "--select one definition", ".pvd")
+        refused(run("export", fields, "--to", fields / "net.vtu", "--select", "load=traction"), "no solved scene")
+        refused(run("export", fields, "--to", fields / "net.pvd", "--group", "moduli"), "leave --group")
+        refused(run("export", path, "--to", fields / "net.pvd"), "no group '/fields'; add 'deformed'")
+        assert sorted(os.listdir(fields)) == before
 
     def test_one_network_is_written_as_a_mesh(self, tmp_path):
         axes = AXES | {name: tuple(range(3)) for name in ("particle", "spring", "cell_corner", "outline_point")}

@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from click.testing import CliRunner
 
 import springtune as st
 from cf import complaints
 from springtune.campaign.orphans import orphans
+from springtune.cli import main
 from springtune.kinds import load_study
 from springtune.output import dataset
 
@@ -151,6 +153,21 @@ def test_fields_are_meshes_in_equilibrium(tree, mesh_type):
     axis, size = {"traction": (0, 20e3), "bending": (1, 200.0)}[load]
     right = points[:, 0] >= 0.1 - 1e-9
     assert abs(total[right, axis].sum()) == pytest.approx(size, rel=1e-5)
+
+
+def test_paraview_gets_what_each_particle_is_off_its_reference(run, tree, tmp_path):
+    """Its mean over the loaded side is what the scene is off its reference."""
+    labels = {"beam": "100x20", "mesh_type": "free", "material": "steel", "load": "traction", "definition": "lattice"}
+    chosen = ",".join(f"{name}={label}" for name, label in (labels | {"kinematics": "linear"}).items())
+    told = ["export", str(run.folder / "results/quick"), "--to", str(tmp_path / "net.vtu"), "--select", chosen]
+    assert CliRunner().invoke(main, told).exit_code == 0
+    net, cell = meshio.read(tmp_path / "net.vtu"), tree.sel(labels | {"kinematics": "linear", "mesh_size": 5e-3})
+    right = np.flatnonzero(net.points[:, 0] >= 0.1 - 1e-9)
+    right = right[np.argsort(net.points[right, 1])]
+    mean = np.trapezoid(net.point_data["error"][right, 0], net.points[right, 1]) / 0.02
+    # The reference is interpolated from a grid, within 1e-5 of its displacement.
+    expected = float(cell.reference_displacement)
+    assert mean == pytest.approx(float(cell.displacement) - expected, abs=2e-5 * expected)
 
 
 def test_nothing_lies_there_that_the_study_does_not_ask_for(run, tree):

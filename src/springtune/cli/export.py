@@ -12,11 +12,16 @@ from .examples import examples
         "springtune export results/paper --to cells.csv",
         "springtune export results/paper --group sensitivity --select beam=200x30 --to curves.parquet",
         "springtune export results/paper --group fields --select beam=200x40,mesh_type=free --to network.nc",
+        "springtune export results/paper --select beam=200x40,load=traction --to traction.pvd",
     )
 )
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option(
-    "--to", "target", required=True, type=click.Path(path_type=Path), help="File: .csv, .parquet, .zarr or .nc."
+    "--to",
+    "target",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="File: .csv, .parquet, .zarr, .nc, .vtu or .pvd.",
 )
 @click.option("--group", default="/", show_default=True, help="Group of the table, such as sensitivity.")
 @click.option("--variables", default="", help="Names of variables, with commas between; all without.")
@@ -24,6 +29,9 @@ from .examples import examples
 @click.option("--force", is_flag=True, help="Replace the file if it is there.")
 def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[str, ...], force: bool) -> None:
     """Write a dataset as a long table, one row a cell (CSV, Parquet), whole (Zarr), or one mesh with its fields (.nc).
+
+    For ParaView: one scene with displacements, their error, and each spring's stiffness and force (.vtu), or a
+    collection of all that are selected (.pvd).
 
     PATH is results/<study>, or its dataset.nc.
     """

@@ -164,7 +164,8 @@ def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:
     header = net.header
     first, *others = written
     besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
-    counts = [f"{len(net.points)} particles", f"{len(net.springs)} springs", *besides]
+    springs = f"{len(net.springs)} springs" if net.stiffness.any() else f"{len(net.springs)} edges with no own springs"
+    counts = [f"{len(net.points)} particles", springs, *besides]
     lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
     lines += [f"beside it: {', '.join(str(other) for other in others)}"] if others else []
     errors = header["expected_error"]

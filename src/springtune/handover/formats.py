@@ -3,13 +3,16 @@
 import csv
 import io
 import json
+import warnings
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..jobs.atomic import replacing, write_text
+from ..mesh.formats import LONGEST_SAID
 from .paraview import comment_of, write_vtu
 from .terms import OF_CORNERS, VALUES, Terms
 
@@ -88,15 +91,23 @@ def read(path: str | Path) -> Content:
     ------
     ValueError
         If there is no such file, or it is not as springtune writes nets.
+    OSError
+        If the file cannot be read.
     """
     path = Path(path)
     form = _format_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
+    told = io.StringIO()
     try:
-        return _checked(form.read(path))
-    except (AttributeError, LookupError, TypeError, ValueError, OSError, RuntimeError, SystemExit) as error:
-        said = " ".join(str(error).split())[:200] or type(error).__name__
+        # meshio tells people of what it trips over, and exits.
+        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _checked(form.read(path))
+    except (Exception, SystemExit) as error:  # of a damaged file the libraries raise whatever they trip over
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 
@@ -124,6 +135,13 @@ def _checked(content: Content) -> Content:
                 raise ValueError(f"{name} have the shape {array.shape}")
         elif name != "masses":
             raise ValueError(f"it has no {name}")
+    numbers = [array for name, array in arrays.items() if ARRAYS[name][0] is float]
+    numbers += [values for terms in content.energies for values in terms.values.values()]
+    if not all(np.isfinite(array).all() for array in numbers):
+        raise ValueError("some of its numbers are not finite")
+    for terms in content.energies:
+        if any(len(values) != len(terms.cells) for values in terms.values.values()):
+            raise ValueError(f"{terms.kind} terms are not as many as cells")
     count = len(arrays["points"])
     for names, length in (
         (("masses", "held", "forces"), count),
@@ -215,9 +233,11 @@ def _write_csv(path: Path, content: Content) -> list[Path]:
         if others[name] in tables
     ]
     said += [f"# {line}" for line in _header_lines(content.header)]
-    for other, table in tables.items():
-        write_text(other, _csv_text(table))
-    write_text(path, "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS)))
+    texts = {other: _csv_text(table) for other, table in tables.items()}
+    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
+    with ExitStack() as unfinished:  # the last one is the first to get its name: where it cannot, none does
+        for one, text in texts.items():
+            unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
     for other in set(others.values()) - set(tables):
         other.unlink(missing_ok=True)  # of another net, written before
     return [path, *tables]

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse.linalg import ArpackError
 
 from .. import __version__
 from ..linalg.factors import SingularError
@@ -54,6 +55,15 @@ UNITS = {
 }
 """Units of what a net holds; those of terms stand with them."""
 
+MEANING = (
+    "displacement of the load over that of finite elements, less 1: above zero where the springs are too soft; linear "
+    "kinematics, small strain"
+)
+"""What an expected error is."""
+
+STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
+"""What a largest stable step is."""
+
 NOT_COMPUTED = "not computed"
 """How a text begins that stands in the place of a number."""
 
@@ -88,6 +98,23 @@ class SpringNet:
     triangles : ndarray of int, shape (n_triangles, 3)
         Cells of the mesh.
     quads : ndarray of int, shape (n_quads, 4)
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> net = st.SpringNet.from_mesh(mesh, steel, "area", beam=beam)
+    >>> print(f"{net.stiffness.max():.4g} N/m, {net.masses.sum():.4g} kg, {net.energies[0].formula}")
+    1.865e+08 N/m, 0.0628 kg, W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area
+    >>> print({load: f"{100 * error:+.1f} %" for load, error in net.header["expected_error"].items()})
+    {'traction': '+4.0 %', 'bending': '+1.7 %', 'shear': '-0.2 %'}
+    >>> print(f"{1e9 * net.header['largest_stable_step']['central-difference']:.0f} ns")
+    634 ns
+    >>> [path.name for path in net.write("net.json")]
+    ['net.json']
+    >>> (st.SpringNet.read("net.json").stiffness == net.stiffness).all().item()
+    True
     """
 
     points: np.ndarray
@@ -136,14 +163,12 @@ class SpringNet:
             "kinematics": scene.kinematics,
             "follower": scene.follower,
         }
-        header = _header(scene.definition, scene.sheet, scene.material, springs, mesh_name)
+        header = _header(scene.definition, scene.sheet, scene.material, springs, scene.kind, mesh_name)
         header |= {"beam": _beam(scene.beam), "load": load}
-        header["expected_error"] = (
-            _expected_errors(scene.sheet, scene.definition, springs, scene.beam, scene.material, scene.load)
-            if errors
-            else f"{NOT_COMPUTED}: not asked for"
-        )
-        header["largest_stable_step"] = _stable_steps(scene.sheet, springs, scene.material, scene.kind)
+        if errors:
+            header["expected_error"] = _expected_errors(
+                scene.sheet, scene.definition, springs, scene.beam, scene.material, scene.load
+            )
         return cls(**parts, header=header)
 
     @classmethod
@@ -202,16 +227,13 @@ class SpringNet:
             given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
             with named(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
-        header = _header(chosen, sheet, material, springs, mesh_name)
-        why = "the mesh is of no beam" if beam is None else "" if errors else "not asked for"
-        if beam is not None:
+        header = _header(chosen, sheet, material, springs, None, mesh_name)
+        if beam is None:
+            header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
+        else:
             header["beam"] = _beam(beam)
-        header["expected_error"] = (
-            f"{NOT_COMPUTED}: {why}"
-            if beam is None or not errors
-            else _expected_errors(sheet, chosen, springs, beam, material)
-        )
-        header["largest_stable_step"] = _stable_steps(sheet, springs, material, None)
+            if errors:
+                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material)
         return cls(**_parts(sheet, springs, material, None, 0.0), header=header)
 
     def write(self, path: str | Path) -> list[Path]:
@@ -234,13 +256,7 @@ class SpringNet:
         ValueError
             If the name has another ending.
         """
-        return write(path, self.content)
-
-    @property
-    def content(self) -> Content:
-        """What its files hold."""
-        arrays = {name: getattr(self, name) for name in ARRAYS if getattr(self, name) is not None}
-        return Content(arrays, self.energies, self.header | {"thickness": float(self.thickness)})
+        return write(path, content_of(self))
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
@@ -263,6 +279,21 @@ class SpringNet:
         arrays, energies, header = read(path)
         parts: dict[str, Any] = {"masses": None} | arrays
         return cls(**parts, energies=energies, thickness=header["thickness"], header=header)
+
+
+def content_of(net: SpringNet) -> Content:
+    """What the files of a net hold.
+
+    Parameters
+    ----------
+    net : SpringNet
+
+    Returns
+    -------
+    Content
+    """
+    arrays = {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
+    return Content(arrays, net.energies, net.header | {"thickness": float(net.thickness)})
 
 
 def terms(energy: Energy, reference: float) -> Terms:
@@ -341,7 +372,12 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
 
 
 def _header(
-    definition: Definition | OwnDefinition, sheet: Sheet, material: Material, springs: Springs, mesh_name: str
+    definition: Definition | OwnDefinition,
+    sheet: Sheet,
+    material: Material,
+    springs: Springs,
+    kind: LoadKind | None,
+    mesh_name: str,
 ) -> dict[str, Any]:
     """What a net says of itself, but for what a scene adds."""
     mesh, (formula, source) = sheet.mesh, described(definition)
@@ -369,6 +405,10 @@ def _header(
         },
         "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
         "load": None,
+        "expected_error": f"{NOT_COMPUTED}: not asked for",
+        "expected_error_means": MEANING,
+        "largest_stable_step": _stable_steps(sheet, springs, material, kind),
+        "largest_stable_step_means": STEP_MEANING,
         "units": UNITS
         | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
     }
@@ -455,4 +495,7 @@ def _stable_steps(
         motion = Motion(Network(sheet.mesh, free, springs.relative, springs.energies), inertia)
     else:
         motion = motion_of(sheet, kind, springs, material.density)
-    return {name: "unlimited" if name in IMPLICIT else motion.step_limit(name) for name in INTEGRATORS}
+    try:
+        return {name: "unlimited" if name in IMPLICIT else motion.step_limit(name) for name in INTEGRATORS}
+    except ArpackError as error:
+        return f"{NOT_COMPUTED}: {error}"

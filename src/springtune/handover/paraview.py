@@ -1,13 +1,14 @@
 """Files for ParaView: an unstructured grid with its data (.vtu), and collections of such files (.pvd)."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import quoteattr, unescape
 
 import numpy as np
 
-from ..jobs.atomic import replacing, write_text
+from ..jobs.atomic import UNFINISHED, replacing, write_text
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
 """meshio's names of cells by their corners."""
@@ -93,15 +94,80 @@ def comment_of(path: str | Path) -> str:
     return found.group(1).decode() if found else ""
 
 
-def write_pvd(path: str | Path, pieces: Sequence[tuple[float, str]]) -> None:
-    """Write a collection of files, which ParaView opens as one that changes in time.
+MOST_PIECES = 10_000
+"""Most files of a collection: ParaView and file systems take no more gladly."""
+
+Add = Callable[..., None]
+"""Adds a piece to a collection: its time, what writes it to a file of a given name, and a name where it has one."""
+
+
+@contextmanager
+def series(path: str | Path) -> Iterator[Add]:
+    """Context in which a collection of files is written, which ParaView opens as one that changes in time.
+
+    ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none is, and those that a collection of
+    that name had before, and has no more, are removed.
 
     Parameters
     ----------
     path : str or Path
-    pieces : sequence of (float, str)
-        Time of each piece [s], or whatever takes its place, and its file, as seen from the folder of the collection.
+        Ending in ``.pvd``.
+
+    Yields
+    ------
+    callable
+        ``add(time, write, name="")``: time of a piece [s], or whatever takes its place; what writes it, told a path;
+        and a name in the place of a number.
     """
-    rows = [f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(file)}/>' for time, file in pieces]
-    lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
-    write_text(path, "\n".join([*lines, *rows, "  </Collection>", "</VTKFile>", ""]))
+    path = Path(path)
+    folder, before = path.with_suffix(""), pieces_of(path)[1:]
+    made = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    times: list[float] = []
+    pieces: list[Path] = []
+
+    def add(time: float, write: Callable[[Path], None], name: str = "") -> None:
+        name = name or f"{folder.name}_{len(pieces):04}"
+        pieces.append(folder / f"{name}.vtu{UNFINISHED}")
+        times.append(time)
+        write(pieces[-1])
+
+    try:
+        yield add
+        finished = [piece.with_suffix("") for piece in pieces]
+        for piece, final in zip(pieces, finished):
+            piece.replace(final)
+        rows = [
+            f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(f"{folder.name}/{final.name}")}/>'
+            for time, final in zip(times, finished)
+        ]
+        lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
+        write_text(path, "\n".join([*lines, *rows, "  </Collection>", "</VTKFile>", ""]))
+        for old in set(before) - set(finished):
+            old.unlink(missing_ok=True)
+    except BaseException:
+        for piece in pieces:
+            piece.unlink(missing_ok=True)
+        if made:
+            folder.rmdir()
+        raise
+
+
+def pieces_of(path: str | Path) -> list[Path]:
+    """A collection that `series` wrote and the files that it names; none where there is no such file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    list of Path
+    """
+    path = Path(path)
+    if not path.is_file():
+        return []
+    folder = path.with_suffix("")
+    named = re.findall(r' file="([^"]*)"', path.read_text(encoding="utf-8", errors="replace"))
+    mine = re.compile(rf"{re.escape(folder.name)}/([^/]*\.vtu)")  # another program's collection may name anything
+    return [path, *(folder / found.group(1) for name in named if (found := mine.fullmatch(unescape(name))))]

@@ -1,28 +1,22 @@
 """Scenes and results as files: springs for other programs, deformed networks and series of them for ParaView."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..jobs.atomic import UNFINISHED
 from ..mechanics.dynamics import Motion, Run
 from ..mechanics.integrators import BackwardEuler
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..scene.single import Result, Scene
 from ..springs import Springs
 from .formats import check_ending, write_vtu_with
-from .net import NOT_COMPUTED, SpringNet
-from .paraview import write_pvd
+from .net import NOT_COMPUTED, SpringNet, content_of
+from .paraview import MOST_PIECES, pieces_of, series
 
 FRAMES = 50
 """Files of a series, where no number is given."""
-
-MOST_FRAMES = 10_000
-"""Most files of a series: ParaView and file systems take no more gladly."""
 
 
 def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: Any) -> list[Path]:
@@ -76,10 +70,10 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
     if path.suffix.lower() == ".vtu":
         _Frames(scene).write(path, result.displacements)
         return [path]
-    if not 1 <= steps <= MOST_FRAMES:
-        raise ValueError(f"steps: {steps!r} is not from 1 to {MOST_FRAMES}; give the number of load steps")
+    if not 1 <= steps <= MOST_PIECES:
+        raise ValueError(f"steps: {steps!r} is not from 1 to {MOST_PIECES}; give the number of load steps")
     frames, reference = _Frames(scene), scene.springs.reference
-    with _series(path) as add:
+    with series(path) as add:
         add(0.0, partial(frames.write, displacements=np.zeros(scene.mesh.points.shape), share=0.0))
         for share in np.arange(1, steps + 1) / steps:
             load = share * scene.force / reference
@@ -88,7 +82,7 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
             if not found.converged:
                 raise ValueError(f"no equilibrium at {100 * share:g} % of the force; give another number of steps")
             add(float(share * abs(scene.force)), partial(frames.write, displacements=found.displacements, share=share))
-    return _written(path)
+    return pieces_of(path)
 
 
 def write_motion(
@@ -124,12 +118,12 @@ def write_motion(
     path = Path(path)
     if path.suffix.lower() != ".pvd":
         raise ValueError(f"{path}: '{path.suffix}' is no format of a motion; give a name ending in .pvd")
-    if not 1 <= frames <= MOST_FRAMES:
-        raise ValueError(f"frames: {frames!r} is not from 1 to {MOST_FRAMES}; give the number of files")
+    if not 1 <= frames <= MOST_PIECES:
+        raise ValueError(f"frames: {frames!r} is not from 1 to {MOST_PIECES}; give the number of files")
     if not (isinstance(steps, int) and steps >= 1):
         raise ValueError(f"steps: {steps!r} is not a whole number above zero; give the number of time steps")
     pieces = _Frames(scene, compared=False)
-    with _series(path) as add:
+    with series(path) as add:
 
         def watch(time: float, u: np.ndarray, v: np.ndarray) -> None:
             add(time, partial(pieces.write, displacements=u, velocities=v, linear=motion.linear))
@@ -144,8 +138,8 @@ class _Frames:
     """Deformed networks of a scene as files, with what they have in common computed once."""
 
     def __init__(self, scene: Scene, compared: bool = True) -> None:
-        self.scene, self.net = scene, SpringNet.from_scene(scene, errors=False)
-        self.content = self.net.content
+        self.scene = scene
+        self.content = content_of(SpringNet.from_scene(scene, errors=False))
         self.reference: np.ndarray | None = None
         if not compared:
             return
@@ -177,47 +171,3 @@ class _Frames:
         forces = scene.springs.reference * scene.network.spring_forces(displacements, linear)
         numbers = {"displacement_of_the_load": scene.sheet.displacement(scene.kind, displacements)}
         write_vtu_with(path, self.content, of_particles, {"force": forces}, numbers)
-
-
-Add = Callable[[float, Callable[[Path], None]], None]
-"""Adds a piece to a series: its time, and what writes it to a file of a given name."""
-
-
-@contextmanager
-def _series(path: Path) -> Iterator[Add]:
-    """Context in which a series is written: ``swing.pvd`` and ``swing/swing_0000.vtu`` and so on, all of it or nothing.
-
-    What was there of a longer series of that name is removed.
-    """
-    folder = path.with_suffix("")
-    made = not folder.exists()
-    folder.mkdir(parents=True, exist_ok=True)
-    times: list[float] = []
-    pieces: list[Path] = []
-
-    def add(time: float, write: Callable[[Path], None]) -> None:
-        unfinished = folder / f"{folder.name}_{len(pieces):04}.vtu{UNFINISHED}"
-        pieces.append(unfinished)
-        times.append(time)
-        write(unfinished)
-
-    try:
-        yield add
-        finished = [piece.with_suffix("") for piece in pieces]
-        for old in folder.glob(f"{folder.name}_[0-9]*.vtu"):
-            if old not in finished:
-                old.unlink()
-        for piece, name in zip(pieces, finished):
-            piece.replace(name)
-        write_pvd(path, [(time, f"{folder.name}/{name.name}") for time, name in zip(times, finished)])
-    except BaseException:
-        for piece in pieces:
-            piece.unlink(missing_ok=True)
-        if made:
-            folder.rmdir()
-        raise
-
-
-def _written(path: Path) -> list[Path]:
-    folder = path.with_suffix("")
-    return [path, *sorted(folder.glob(f"{folder.name}_[0-9]*.vtu"))]

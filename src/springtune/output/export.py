@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import shutil
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -285,7 +287,7 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
         shutil.rmtree(before, ignore_errors=True)
 
 
-EXPORTS = (".csv", ".parquet", ".zarr", ".nc")
+EXPORTS = (".csv", ".parquet", ".zarr", ".nc", ".vtu", ".pvd")
 """Endings of the names of files to export to."""
 
 
@@ -303,7 +305,8 @@ def export(
     ----------
     tree : xarray.DataTree
     path : str or Path
-        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh.
+        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh, ``.vtu`` one
+        scene of it for ParaView, and ``.pvd`` a collection of all that are chosen.
     group, variables, selection
         As of `table`; a Zarr store has the whole tree.
     force : bool, optional
@@ -327,6 +330,10 @@ def export(
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
     if ending == ".nc":
         return _mesh(tree, path, group, variables, selection or {})
+    if ending in (".vtu", ".pvd"):
+        if group.strip("/") not in ("", "fields") or variables:
+            raise ValueError(f"{path}: ParaView gets the group 'fields'; leave --group and --variables out")
+        return _paraview(tree, path, selection or {})
     if ending == ".zarr":
         if group.strip("/") or variables or selection:
             raise ValueError(
@@ -367,6 +374,82 @@ def _mesh(
         found.to_netcdf(unfinished, engine="netcdf4")
     sizes = found.sizes
     return f"{path}: {sizes['particle']} particles, {sizes['spring']} springs, {sizes['cell']} cells, as UGRID has them"
+
+
+def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
+    """Write scenes of the group of fields as files for ParaView."""
+    from ..handover.paraview import MOST_PIECES, series
+
+    if "fields" not in tree.children:
+        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
+    scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
+    if not scenes:
+        raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")
+    if path.suffix.lower() == ".vtu":
+        if len(scenes) > 1:
+            several = {name: len({labels[name] for labels in scenes}) for name in scenes[0]}
+            choose = ", ".join(name for name, count in several.items() if count > 1)
+            raise ValueError(
+                f"{path}: {len(scenes)} scenes, and a .vtu file has one; --select one {choose}, or give a name ending "
+                "in .pvd for all of them"
+            )
+        _write_scene(tree, scenes[0], path)
+        return f"{path}: {', '.join(map(_label_text, scenes[0].values()))}"
+    if len(scenes) > MOST_PIECES:
+        raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
+    with series(path) as add:
+        for number, labels in enumerate(scenes):
+            name = "_".join(map(_label_text, labels.values())).replace(" ", "")
+            add(float(number), partial(_write_scene, tree, labels), name)
+    return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
+
+
+def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
+    """Labels of the scenes that have fields, in the order of a dataset."""
+    order = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
+    names = [*(name for name in order if name in solved.dims), *(name for name in solved.dims if name not in order)]
+    solved = solved.transpose(*names)
+    for place in np.argwhere(solved.values):
+        yield {str(name): solved[name].values[one].item() for name, one in zip(names, place)}
+
+
+def _label_text(label: str | float) -> str:
+    """A label in words: mesh sizes in mm."""
+    return label if isinstance(label, str) else f"{1e3 * label:.6g} mm"
+
+
+def _write_scene(tree: xr.DataTree, labels: Mapping[str, str | float], path: Path) -> None:
+    """Write one scene of the group of fields: particles and their displacements, springs as lines, cells."""
+    from ..handover.paraview import write_vtu
+
+    found = reading.field(tree, **labels)
+    points = np.stack([found.x.values, found.y.values], axis=1)
+    corners = found[reading.CELL_NODES].transpose("cell", ...).values
+    cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
+    for count in (3, 4):
+        cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+
+    def vectors(name: str) -> np.ndarray:
+        return np.stack([found[f"{name}_x"].values, found[f"{name}_y"].values], axis=1)
+
+    of_particles = {"displacement": vectors("displacement")}
+    if "particle_reference_x" in found:
+        expected = vectors("particle_reference")
+        if np.isfinite(expected).all():
+            error = of_particles["displacement"] - expected
+            of_particles |= {"reference_displacement": expected, "error": error}
+    of_springs = {name: {2: found[name].values} for name in ("stiffness", "force") if name in found}
+    root = tree.to_dataset()
+    numbers = {}
+    for name in ("displacement", "reference_displacement", "deformation_error"):
+        if name in root:
+            here = root[name].sel({dim: label for dim, label in labels.items() if dim in root[name].dims})
+            if here.ndim == 0 and np.isfinite(here):
+                numbers[name if name == "deformation_error" else f"{name}_of_the_load"] = float(here)
+    said = {"title": tree.attrs.get("title", ""), "study": tree.attrs.get("study", ""), **labels}
+    units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
+    write_vtu(path, points, cells, of_particles, of_springs, numbers, json.dumps(said | {"units": units}, indent=1))
 
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:

@@ -247,7 +247,7 @@ def predict(
     patch-area: 6.3 % at worst
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.definition, kinematics="linear")
     >>> print(f"{100 * best.errors['bending']:.4f} %, {100 * scene.solve().error:.4f} %")
-    -6.3057 %, -6.3057 %
+    -6.3087 %, -6.3087 %
 
     A part that is pulled, and pressed upon:
 

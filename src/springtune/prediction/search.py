@@ -15,6 +15,7 @@ from functools import partial
 from itertools import count, takewhile
 
 import numpy as np
+from scipy.sparse.linalg import ArpackError
 
 from ..mechanics.dynamics import Motion, masses
 from ..mechanics.network import Network
@@ -130,7 +131,7 @@ class MeshChoice:
         That one static solve takes with linear kinematics, springs at hand, the longest of the loads'; measured once.
     step_limit : float
         Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which is the least of
-        all supports; NaN where the material has no density.
+        all supports; NaN where the material has no density, or the eigenvalue could not be found.
     finer : tuple of SolvedMesh
         Finer meshes that were tried, on each of which the definition keeps the error, too.
     confirmed : bool
@@ -149,6 +150,7 @@ class MeshChoice:
     >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
     >>> print(f"{100 * best.choice.errors['bending']:.3f} %, {100 * scene.solve().error:.3f} %")
+    -3.675 %, -3.675 %
     """
 
     mesh_type: str
@@ -544,4 +546,7 @@ def _cost(mesh: Mesh, beam: Beam, material: Material, springs: Springs, loads: l
         return seconds, math.nan
     inertia = masses(mesh, material.density, beam.thickness) / springs.reference
     free = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
-    return seconds, Motion(free, inertia).step_limit("central-difference")
+    try:
+        return seconds, Motion(free, inertia).step_limit("central-difference")
+    except ArpackError:
+        return seconds, math.nan

@@ -338,6 +338,7 @@ class Scene:
 
         Examples
         --------
+        >>> from pathlib import Path
         >>> import springtune as st
         >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
         >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "bending", "100 N")

@@ -9,7 +9,7 @@ from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
 from ...problem.loads import LOADS
 from ...problem.status import Status
-from ...reference.field import outline
+from ...reference.field import interpolate, outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
 from . import plan, stored_mesh, stored_reference
@@ -147,6 +147,7 @@ def _reference(folder, one, fields=()):
 
 def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    compared = set()  # places of fields that have their reference
     calibration = _calibration(study, folder)
     arrays = ["face_profile"] * (block is not None)
     shown = plan.shown_meshes(study) if fields else ()
@@ -170,6 +171,23 @@ def _scenes(study, folder, root, block, fields, objections):
                 x, y = result["displacements"].T
                 of_springs = {"stiffness": result["spring_stiffnesses"], "force": result["spring_forces"]}
                 fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **labels)
+                place = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
+                if tuple(place.values()) not in compared:  # scenes differ in their definitions
+                    compared.add(tuple(place.values()))
+                    fields.put_rows(_at_particles(folder, scene, fields.data), **place)
+
+
+def _at_particles(folder, scene, fields):
+    """Displacements of the reference of a scene where its particles are at rest [m]; nothing without a reference."""
+    reference = plan.reference_of(scene.mesh.beam, scene.material, scene.load)
+    found = stored_reference.read(folder / "references", reference, ["x", "y", "displacements"])
+    if "x" not in found:
+        return {}
+    places = fields[["x", "y"]].sel(_mesh_labels(scene.mesh))
+    points = np.stack([places.x.values, places.y.values], axis=1)
+    points = points[~np.isnan(points[:, 0])]
+    x, y = scene.force * interpolate(found["x"], found["y"], found["displacements"], points).T
+    return {"particle_reference_x": x, "particle_reference_y": y}
 
 
 def _printed(study, root):

@@ -187,6 +187,18 @@ FIELDS = Group(
         "cell_nodes": ((*MESH, "cell", "cell_corner"), "1", "particles at the corners of a cell", NO_NODE),
         "displacement_x": (FIELD, "m", "displacement along x, network", np.nan),
         "displacement_y": (FIELD, "m", "displacement along y, network", np.nan),
+        "particle_reference_x": (
+            (*CELL, "particle"),
+            "m",
+            "displacement along x of the reference where the particles are at rest",
+            np.nan,
+        ),
+        "particle_reference_y": (
+            (*CELL, "particle"),
+            "m",
+            "displacement along y of the reference where the particles are at rest",
+            np.nan,
+        ),
         "stiffness": (SPRING, "N/m", "stiffness of each spring", np.float32(np.nan)),
         "force": (
             SPRING,
@@ -213,6 +225,7 @@ FIELDS = Group(
         "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
         "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
         **{name: {"mesh": "mesh", "location": "node"} for name in ("displacement_x", "displacement_y")},
+        **{name: {"mesh": "mesh", "location": "node"} for name in ("particle_reference_x", "particle_reference_y")},
         **{name: {"mesh": "mesh", "location": "edge"} for name in ("stiffness", "force")},
     },
 )

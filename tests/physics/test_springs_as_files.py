@@ -1,0 +1,494 @@
+"""Springs as other programs get them: forces from a file alone, what its header says, and series for ParaView."""
+
+import os
+import xml.etree.ElementTree as ElementTree
+from dataclasses import asdict, replace
+
+import meshio
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.cli import main
+from springtune.handover.formats import ENDINGS
+from springtune.kinds.scenes.solve import solve
+from springtune.mechanics.energies import AngleEnergy, AreaEnergy
+from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
+
+STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+BEAM = st.Beam("100 mm", "20 mm", thickness="2 mm")
+ARRAYS = ("points", "springs", "rest_lengths", "stiffness", "masses", "held", "forces", "triangles", "quads")
+
+
+def scene_of(definition, mesh_type="structured", load="traction", force="20 kN", **options):
+    return st.Scene(BEAM, st.make_mesh(BEAM, mesh_type, "5 mm"), STEEL, load, force, definition=definition, **options)
+
+
+def net_of(scene, **options):
+    return st.SpringNet.from_scene(scene, errors=False, **options)
+
+
+def turned(vectors):
+    """Vectors turned by a right angle, clockwise."""
+    return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)
+
+
+def forces_of(net, x):
+    """dW/dx of each particle [N] by the formulas that a file states, in plain differences of positions."""
+    total = np.zeros_like(x)
+    along = x[net.springs[:, 1]] - x[net.springs[:, 0]]
+    length = np.linalg.norm(along, axis=1)
+    pull = (net.stiffness * (length - net.rest_lengths) / length)[:, None] * along
+    np.add.at(total, net.springs[:, 0], -pull)
+    np.add.at(total, net.springs[:, 1], pull)
+    for terms in net.energies:
+        corners, value = x[terms.cells], terms.values
+        after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
+        if terms.kind == "area":
+            slopes = 0.5 * turned(after - before)
+            here = corners - corners[:, :1]
+            area = 0.5 * (here * turned(np.roll(here, -1, axis=1))).sum(axis=(1, 2))
+            part = (value["modulus"] * (area / value["rest_area"] - 1))[:, None, None] * slopes
+        elif terms.kind == "biquadratic":
+            sides = before - after  # opposite each corner
+            change = (sides**2).sum(axis=2) - value["rest_length"] ** 2
+            k, gamma = value["tensile"], value["coupling"]
+            pull = 0.5 * k * change  # dW/dq
+            for i in range(3):
+                j, m = (i + 1) % 3, (i + 2) % 3
+                pull[:, i] += 0.5 * (gamma[:, j] * change[:, m] + gamma[:, m] * change[:, j])
+            along = 2 * pull[:, :, None] * sides
+            part = np.roll(along, -1, axis=1) - np.roll(along, 1, axis=1)
+        else:
+            a, b = after - corners, before - corners
+            angle = np.arctan2((a * turned(b)).sum(axis=2), (a * b).sum(axis=2))
+            pull = (value["modulus"][:, None] * (angle - value["rest_angle"]))[:, :, None]
+            to_next = pull * turned(a) / (a**2).sum(axis=2, keepdims=True)
+            to_last = -pull * turned(b) / (b**2).sum(axis=2, keepdims=True)
+            part = np.roll(to_next, 1, axis=1) + np.roll(to_last, -1, axis=1) - to_next - to_last
+        np.add.at(total, terms.cells, part)
+    return total
+
+
+def unbalanced(net, x):
+    """Out-of-balance force of what can move, over the load [1]."""
+    missing = np.where(net.held, 0.0, net.forces - forces_of(net, x))
+    return np.linalg.norm(missing) / np.linalg.norm(net.forces)
+
+
+SCENES = {
+    "lattice": ("lattice", "structured"),
+    "uniform": ("uniform", "free"),
+    "paper": ("paper", "structured"),
+    "delingette": ("delingette", "free"),
+    "delingette-tensile": ("delingette-tensile", "structured"),
+    "angular": ("angular", "structured"),
+    "area": ("area", "free"),
+    "patch-area": ("patch-area", "structured"),
+    "element-fit on quads": ("element-fit", "braced"),
+    "baudet on quads": ("baudet", "braced"),
+    "baudet-corrected on quads": ("baudet-corrected", "braced"),
+    "flechon on quads": ("flechon", "braced"),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize(("definition", "mesh_type"), SCENES.values(), ids=SCENES)
+def test_a_file_alone_balances_the_scene(definition, mesh_type, ending, tmp_path):
+    """By its own formulas, to the rounding of differences of positions: digits are lost by the strain, a thousandth."""
+    stiffness = "170e6 N/m" if definition == "paper" else None
+    scene = scene_of(definition, mesh_type, stiffness=stiffness)
+    net_of(scene).write(tmp_path / f"net{ending}")
+    net = st.SpringNet.read(tmp_path / f"net{ending}")
+    found = scene.solve()
+    assert found.status == st.Status.SOLVED
+    assert unbalanced(net, net.points + found.displacements) < 1e-10
+    # A test that cannot fail is none: a thousandth of a displacement is seen.
+    assert unbalanced(net, net.points + 1.001 * found.displacements) > 1e-5
+
+
+@pytest.mark.parametrize("definition", ["lattice", "delingette", "area"])
+def test_forces_of_small_displacements_balance_linear_kinematics(definition):
+    """The mean of what two opposite displacements resist with is linear but for their third power."""
+    scene = scene_of(definition, force="1 N", kinematics="linear")
+    net, moved = net_of(scene), 1e4 * scene.solve().displacements
+    slope = 0.5 * (forces_of(net, net.points + moved) - forces_of(net, net.points - moved)) / 1e4
+    missing = np.where(net.held, 0.0, net.forces - slope)
+    # Strain of the trial to the second: 10 kN / (20 mm 2 mm 210 GPa) = 1.2e-3, whose square is 1.4e-6.
+    assert np.linalg.norm(missing) < 3e-5 * np.linalg.norm(net.forces)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize(("definition", "mesh_type"), [("delingette", "free"), ("flechon", "braced")])
+def test_what_is_read_is_what_was_written(definition, mesh_type, ending, tmp_path):
+    net = st.SpringNet.from_scene(scene_of(definition, mesh_type), 'own: "graded" -- 5 mm')
+    written = net.write(tmp_path / f"net{ending}")
+    assert sorted(written) == sorted(tmp_path.iterdir())
+    back = st.SpringNet.read(written[0])
+    for name in ARRAYS:
+        given, found = getattr(net, name), getattr(back, name)
+        assert (found.dtype, found.shape) == (given.dtype, given.shape) and found.tobytes() == given.tobytes(), name
+    assert back.header == net.header and back.thickness == net.thickness == 2e-3
+    assert [terms.kind for terms in back.energies] == [terms.kind for terms in net.energies]
+    for given, found in zip(net.energies, back.energies):
+        assert (found.cells == given.cells).all() and found.units == given.units
+        assert {name: values.tobytes() for name, values in found.values.items()} == {
+            name: values.tobytes() for name, values in given.values.items()
+        }
+    first = [path.read_bytes() for path in written]
+    net.write(tmp_path / f"net{ending}")
+    assert [path.read_bytes() for path in written] == first
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_two_springs_by_hand(ending, tmp_path):
+    """Two springs of 3 and 5 N/m on a line, pulled by 1 N: 1/3 m, and 1/5 m more."""
+    net = st.SpringNet(
+        points=np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]),
+        springs=np.array([[0, 1], [1, 2]]),
+        rest_lengths=np.array([1.0, 2.0]),
+        stiffness=np.array([3.0, 5.0]),
+        energies=(),
+        masses=None,
+        thickness=1e-3,
+        held=np.array([[True, True], [False, True], [False, True]]),
+        forces=np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),
+        header={"definition": "by hand"},
+    )
+    net.write(tmp_path / f"net{ending}")
+    back = st.SpringNet.read(tmp_path / f"net{ending}")
+    assert back.masses is None and not back.energies and back.header == {"definition": "by hand", "thickness": 1e-3}
+    moved = back.points + [[0.0, 0.0], [1 / 3, 0.0], [1 / 3 + 1 / 5, 0.0]]
+    assert unbalanced(back, moved) < 5e-15  # some roundings of lengths of 3.5 m, at 5 N/m
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_cells_of_both_kinds(ending, tmp_path):
+    """A square and two triangles beside it; in numbers that binary fractions do not hold."""
+    x, y = np.array([0, 1, 1, 0, 2, 2]) / 30, np.array([0, 0, 1, 1, 0, 1]) / 30
+    triangles, quads = np.array([[1, 4, 5], [1, 5, 2]]), np.array([[0, 1, 2, 3]])
+
+    def both(mesh, material, thickness):
+        """Springs and areas, without a thought."""
+        energies = tuple(AreaEnergy(mesh.points, cells, np.full(len(cells), 0.1)) for cells in mesh.cells.values())
+        return st.Springs(1e8, np.ones(len(mesh.edges)) / 3, energies)
+
+    net = st.SpringNet.from_mesh(st.Mesh(np.stack([x, y], axis=1), triangles, quads), STEEL, both)
+    net.write(tmp_path / f"net{ending}")
+    back = st.SpringNet.read(tmp_path / f"net{ending}")
+    assert [terms.cells.tolist() for terms in back.energies] == [triangles.tolist(), quads.tolist()]
+    for given, found in zip(net.energies, back.energies):
+        assert all((found.values[name] == values).all() for name, values in given.values.items())
+    assert (back.quads == quads).all() and (back.triangles == triangles).all()
+    moved = back.points * [1.01, 0.99]
+    assert np.array_equal(forces_of(back, moved), forces_of(net, moved))
+
+
+def test_terms_of_one_kind_are_one():
+    """Energies are in proportion to their moduli."""
+    mesh = st.make_mesh(BEAM, "structured", "5 mm")
+
+    def twice(mesh, material, thickness):
+        """Two area energies, and one of angles."""
+        ones = np.ones(len(mesh.triangles))
+        energies = (
+            *(AreaEnergy(mesh.points, mesh.triangles, part * ones) for part in (0.25, 0.5)),
+            AngleEnergy(mesh.points, mesh.triangles, 1e-6 * ones),
+        )
+        return st.Springs(1e8, np.ones(len(mesh.edges)), energies)
+
+    net = st.SpringNet.from_mesh(mesh, STEEL, twice)
+    assert [terms.kind for terms in net.energies] == ["area", "angle"]
+    assert np.allclose(net.energies[0].values["modulus"], 0.75e8, rtol=1e-15)
+    assert net.header["formula"] == "Two area energies, and one of angles" and net.header["definition"] == "twice"
+
+
+class TestHeader:
+    def test_errors_are_those_of_a_solve(self):
+        """With linear kinematics an error does not depend on the force."""
+        scene = scene_of("area")
+        header = st.SpringNet.from_scene(scene).header
+        assert set(header["expected_error"]) == {"traction", "bending", "shear"}
+        for load, error in header["expected_error"].items():
+            solved = scene_of("area", load=load, force="1 N", kinematics="linear").solve()
+            assert error == pytest.approx(solved.error, abs=1e-9), load
+
+    def test_errors_are_those_of_a_prediction(self):
+        mesh = scene_of("patch").mesh
+        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL)}
+        for name in ("patch", "area", "delingette"):
+            errors = st.SpringNet.from_mesh(mesh, STEEL, name, beam=BEAM).header["expected_error"]
+            for load, error in errors.items():
+                assert error == pytest.approx(choices[name].errors[load], abs=1e-9), (name, load)
+
+    def test_error_under_a_load_of_another_kind(self):
+        """Above zero where too soft, whatever the force's sign; a result's, where it has moved further up."""
+        scene = scene_of("lattice", load="pressure", force="100 N")
+        header = st.SpringNet.from_scene(scene).header
+        solved = scene_of("lattice", load="pressure", force="1 N", kinematics="linear").solve()
+        assert header["expected_error"]["pressure"] == pytest.approx(-solved.error, abs=1e-9)
+
+    def test_what_is_not_computed_says_why(self):
+        loose = st.SpringNet.from_mesh(scene_of("lattice").mesh, replace(STEEL, density=None), "lattice")
+        assert loose.masses is None and not loose.held.any() and not loose.forces.any()
+        assert loose.header["largest_stable_step"] == "not computed: material 'steel' has no density"
+        assert loose.header["expected_error"] == "not computed: the mesh is of no beam"
+        errors = st.SpringNet.from_scene(scene_of("baudet-corrected", "braced")).header["expected_error"]
+        assert isinstance(errors["traction"], float)
+        assert errors["bending"] == "not computed: definition 'baudet-corrected' is not for this load"
+
+    def test_a_mesh_that_is_too_large_is_not_solved(self):
+        mesh = st.make_mesh(BEAM, "right", "0.25 mm")
+        net = st.SpringNet.from_mesh(mesh, STEEL, "lattice", beam=BEAM)
+        assert net.header["expected_error"]["shear"].startswith("not computed: 32481 particles, and at most 20000")
+
+    @pytest.mark.parametrize("definition", ["lattice", "delingette"])
+    def test_stable_steps_are_those_of_the_motion(self, definition):
+        scene = scene_of(definition)
+        steps, motion = net_of(scene).header["largest_stable_step"], scene.motion()
+        assert steps == {name: motion.step_limit(name) for name in EXPLICIT} | dict.fromkeys(IMPLICIT, "unlimited")
+        # What a load holds makes no mode higher: free, the step is no longer than held.
+        free = st.SpringNet.from_mesh(scene.mesh, STEEL, definition, thickness=BEAM.thickness)
+        assert free.header["largest_stable_step"]["central-difference"] <= steps["central-difference"] * (1 + 1e-9)
+
+    def test_formula_and_source_are_those_of_the_definition(self):
+        for name, definition in st.DEFINITIONS.items():
+            if definition.needs or 3 not in definition.cells or name == "axis-exact":
+                continue
+            header = net_of(scene_of(name)).header
+            assert header["formula"] == definition.summary and len(header["source"]) > 100
+        assert "Delingette, IEEE TVCG 14(2):329, 2008" in net_of(scene_of("delingette")).header["source"]
+
+    def test_masses_are_those_of_the_sheet(self):
+        assert net_of(scene_of("lattice")).masses.sum() == pytest.approx(7850 * 0.1 * 0.02 * 2e-3, rel=1e-12)
+
+
+class TestScene:
+    @pytest.mark.parametrize("ending", ENDINGS)
+    def test_springs_of_a_scene_write_themselves(self, ending, tmp_path):
+        scene = scene_of("area")
+        scene.springs.write(tmp_path / f"net{ending}", mesh_name="structured 5 mm")
+        net = st.SpringNet.read(tmp_path / f"net{ending}")
+        assert (net.stiffness == scene.springs.reference * scene.springs.relative).all()
+        assert net.header["mesh"]["name"] == "structured 5 mm" and net.header["load"]["force"] == 20e3
+
+    def test_springs_that_were_changed_are_written_as_they_are(self, tmp_path):
+        scene = scene_of("lattice")
+        replace(scene.springs, reference=2 * scene.springs.reference).write(tmp_path / "net.json")
+        assert (st.SpringNet.read(tmp_path / "net.json").stiffness == 2 * net_of(scene).stiffness).all()
+
+
+class TestResult:
+    @pytest.mark.parametrize("kinematics", ["nonlinear", "linear"])
+    @pytest.mark.parametrize("definition", ["patch", "delingette"])
+    def test_a_deformed_network_has_its_fields(self, definition, kinematics, tmp_path):
+        result = scene_of(definition, kinematics=kinematics).solve()
+        assert result.write(tmp_path / "deformed.vtu") == [tmp_path / "deformed.vtu"]
+        grid = meshio.read(tmp_path / "deformed.vtu")
+        names = [block.type for block in grid.cells]
+        assert names == ["line", "triangle"]
+        moved, expected = result.displacements, result.reference().at(result.scene.mesh.points)
+        for name, field in (
+            ("displacement", moved),
+            ("reference_displacement", expected),
+            ("error", moved - expected),
+        ):
+            assert (grid.point_data[name][:, :2] == field).all() and not grid.point_data[name][:, 2].any()
+        assert (grid.cell_data["stiffness"][0] == result.stiffness).all()
+        assert (grid.cell_data["force"][0] == result.spring_forces).all()
+        assert np.isnan(grid.cell_data["force"][1]).all()
+        assert grid.field_data["displacement_of_the_load"] == [result.displacement]
+
+    def test_a_path_ends_at_the_result(self, tmp_path):
+        result = scene_of("patch", load="bending", force="100 N").solve()
+        written = result.write(tmp_path / "path.pvd", steps=5)
+        times, grids = series(tmp_path / "path.pvd")
+        assert written == [tmp_path / "path.pvd", *(tmp_path / f"path/path_{n:04}.vtu" for n in range(6))]
+        assert times == [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
+        sizes = [np.abs(grid.point_data["displacement"]).max() for grid in grids]
+        assert sizes[0] == 0 and sizes == sorted(sizes)
+        # Newton's method ends within 1e-10 of the load.
+        last = grids[-1].point_data["displacement"][:, :2]
+        assert np.abs(last - result.displacements).max() < 1e-9 * np.abs(result.displacements).max()
+
+    def test_a_shorter_path_takes_the_place_of_a_longer_one(self, tmp_path):
+        result = scene_of("patch").solve()
+        result.write(tmp_path / "path.pvd", steps=3)
+        (tmp_path / "path/notes.vtu").write_text("mine")
+        result.write(tmp_path / "path.pvd", steps=1)
+        found = sorted(path.name for path in (tmp_path / "path").iterdir())
+        assert found == ["notes.vtu", "path_0000.vtu", "path_0001.vtu"]
+
+    def test_what_has_no_equilibrium_is_not_written(self, tmp_path):
+        result = replace(scene_of("patch").solve(), displacement=np.nan, message="springs gone")
+        for name in ("net.vtu", "net.pvd"):
+            with pytest.raises(ValueError, match="no equilibrium to write: springs gone"):
+                result.write(tmp_path / name)
+        with pytest.raises(ValueError, match=r"'\.stl' is no format of a result"):
+            result.write(tmp_path / "net.stl")
+        assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kinematics", ["nonlinear", "linear"])
+@pytest.mark.parametrize(("definition", "mesh_type"), [("area", "free"), ("delingette", "free"), ("flechon", "braced")])
+def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinematics):
+    """Stiffness and force of each spring, which a study keeps with seven digits."""
+    scene = scene_of(definition, mesh_type, kinematics=kinematics)
+    task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
+    stored = solve(scene.sheet, task | {"force": scene.force, "kinematics": kinematics}, keep_fields=True)
+    result = scene.solve()
+    assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
+    assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
+    assert result.stiffness.any() == (definition != "delingette")  # whose law is all an energy
+
+
+def series(path):
+    """Times of a collection and the grids of its pieces."""
+    rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
+    return [float(row.get("timestep")) for row in rows], [meshio.read(path.parent / row.get("file")) for row in rows]
+
+
+class TestMotion:
+    @pytest.mark.parametrize("integrator", ["central-difference", "implicit-midpoint"])
+    def test_pieces_are_the_states_of_one_run(self, integrator, tmp_path):
+        scene = scene_of("lattice", force="100 N")
+        motion = scene.motion()
+        step = 0.5 * motion.step_limit("central-difference")
+        run = scene.write_motion(tmp_path / "swing.pvd", motion, integrator, step, 30, frames=3)
+        times, grids = series(tmp_path / "swing.pvd")
+        assert times == [0.0, 10 * step, 20 * step, 30 * step] and run.status == "moving"
+        for count, grid in zip((10, 20, 30), grids[1:]):
+            alone = motion.run(integrator, step, count)
+            # Steps are the same ones, in other groups: the implicit rule's factor may be of another time.
+            for name, field in (("displacement", alone.displacements), ("velocity", alone.velocities)):
+                assert np.abs(grid.point_data[name][:, :2] - field).max() < 1e-8 * np.abs(field).max()
+        forces = scene.springs.reference * scene.network.spring_forces(run.displacements)
+        assert (grids[-1].cell_data["force"][0] == forces).all()
+
+    def test_what_diverges_leaves_nothing(self, tmp_path):
+        scene = scene_of("lattice")
+        motion = scene.motion()
+        step = 2 * motion.step_limit("central-difference")
+        with pytest.raises(ValueError, match="above the stable one"):
+            scene.write_motion(tmp_path / "swing.pvd", motion, "central-difference", step, 10_000)
+        for options, said in (({"frames": 0}, "frames: 0"), ({"steps": 0}, "steps: 0"), ({"step": -1.0}, "a step of")):
+            given = {"step": 1e-7, "steps": 10} | options
+            with pytest.raises(ValueError, match=said):
+                scene.write_motion(tmp_path / "swing.pvd", motion, "central-difference", **given)
+        with pytest.raises(ValueError, match="no format of a motion"):
+            scene.write_motion(tmp_path / "swing.vtu", motion, "central-difference", 1e-7, 10)
+        assert not list(tmp_path.iterdir())
+
+
+class TestFiles:
+    @pytest.mark.parametrize("ending", ENDINGS)
+    def test_a_damaged_file_is_refused(self, ending, tmp_path):
+        path = tmp_path / f"net{ending}"
+        net_of(scene_of("area")).write(path)
+        content = path.read_bytes()
+        for damaged in (content[: len(content) // 2], b"", b"\x00" * 64):
+            path.write_bytes(damaged)
+            with pytest.raises(ValueError, match=r"is damaged, or no net of springtune") as error:
+                st.SpringNet.read(path)
+            assert len(str(error.value).splitlines()) == 1
+
+    def test_tables_of_two_nets_are_refused(self, tmp_path):
+        net_of(scene_of("lattice")).write(tmp_path / "net.csv")
+        net_of(scene_of("lattice", "free")).write(tmp_path / "other.csv")
+        (tmp_path / "other.particles.csv").replace(tmp_path / "net.particles.csv")
+        with pytest.raises(ValueError, match="is damaged, or no net"):
+            st.SpringNet.read(tmp_path / "net.csv")
+
+    def test_tables_of_a_net_of_before_are_gone(self, tmp_path):
+        net_of(scene_of("lattice")).write(tmp_path / "net.csv")
+        net_of(scene_of("lattice", "braced")).write(tmp_path / "net.csv")
+        found = sorted(path.name for path in tmp_path.iterdir())
+        assert found == ["net.csv", "net.particles.csv", "net.quads.csv"]
+
+    def test_a_missing_file_and_an_unknown_ending(self, tmp_path):
+        with pytest.raises(ValueError, match=r"net\.csv: there is no such file"):
+            st.SpringNet.read(tmp_path / "net.csv")
+        for do in (st.SpringNet.read, net_of(scene_of("lattice")).write, scene_of("lattice").springs.write):
+            with pytest.raises(ValueError, match=r"'\.stl' is no format of springs; give a name ending in \.csv"):
+                do(tmp_path / "net.stl")
+
+    def test_energies_of_ones_own_are_refused(self, tmp_path):
+        class Own(AreaEnergy):
+            pass
+
+        class Other:
+            points = corners = None
+
+        mesh = scene_of("lattice").mesh
+        springs = st.Springs(1e8, np.ones(len(mesh.edges)), (Other(),))
+        with pytest.raises(st.DefinitionError, match="energy Other cannot be written out"):
+            st.SpringNet.from_mesh(mesh, replace(STEEL, density=None), springs=springs)
+
+
+class TestCommand:
+    STEEL = ("--beam", "100x20", "--size", "5 mm", "--material", "steel")
+
+    def run(self, *arguments):
+        return CliRunner().invoke(main, ["springs", *map(str, arguments)])
+
+    @pytest.mark.parametrize("ending", ENDINGS)
+    def test_writes_what_the_library_has(self, ending, tmp_path):
+        path = tmp_path / f"net{ending}"
+        asked = ("--thickness", "2 mm", "--density", "7850 kg/m^3", "--load", "traction", "--force", "20 kN")
+        result = self.run(*self.STEEL, "--definition", "area", *asked, "--out", path)
+        assert result.exit_code == 0, result.stderr
+        net, wanted = st.SpringNet.read(path), st.SpringNet.from_scene(scene_of("area"), "structured 5 mm")
+        assert net.header == wanted.header | {"beam": wanted.header["beam"] | {"name": "100x20"}}
+        for name in ARRAYS:
+            assert (getattr(net, name) == getattr(wanted, name)).all()
+        assert "area terms of 205 cells of definition area" in result.stdout
+        assert "error of the displacement, solved on this mesh: traction" in result.stdout
+        assert "largest stable step of explicit integrators" in result.stdout
+
+    def test_a_mesh_file(self, tmp_path):
+        mesh = st.make_mesh(BEAM, "free", "5 mm")
+        grid = meshio.Mesh(
+            1e3 * np.column_stack([mesh.points, np.zeros(len(mesh.points))]), {"triangle": mesh.triangles}
+        )
+        grid.write(tmp_path / "own.vtu")
+        told = ("--beam", "100x20", "--mesh", tmp_path / "own.vtu", "--unit", "mm", "--material", "rubber")
+        result = self.run(*told, "--out", tmp_path / "net.json")
+        assert result.exit_code == 0, result.stderr
+        assert "largest stable step" not in result.stdout
+        net = st.SpringNet.read(tmp_path / "net.json")
+        assert net.header["mesh"]["name"] == "own.vtu" and net.header["material"]["young_modulus"] == 1e6
+
+    REFUSED = {
+        "unknown ending": (("--out", "net.stl"), "'.stl' is no format of springs; give a name ending in .csv"),
+        "no stiffness": (("--definition", "paper"), "--stiffness: definition 'paper' needs a uniform one; give"),
+        "stiffness for none": (("--stiffness", "3 N/m"), "--stiffness: '3 N/m' is not used"),
+        "triangles": (("--definition", "baudet"), "--definition 'baudet': needs rectangles"),
+        "unknown definition": (("--definition", "latice"), "--definition: 'latice' is unknown; did you mean 'lattice'"),
+        "unknown load": (("--load", "pull", "--force", "1 N"), "--load: 'pull' is unknown"),
+        "no force": (("--load", "traction"), "--force: missing"),
+        "no load": (("--force", "1 N"), "--force: '1 N' is of no load"),
+        "a length": (("--load", "traction", "--force", "3 mm"), "--force: '3 mm' is a length; give a force such as"),
+        "density": (("--density", "3"), "--density: '3' has no unit"),
+        "size": (("--size", "1e-9 mm"), "--size: '1e-9 mm'"),
+        "mesh": (("--mesh", "none.msh"), "--mesh: 'none.msh' is neither a mesh type nor a file"),
+        "not a folder": (("--out", "file/net.csv"), "--out: file/net.csv: "),
+        "a folder": (("--out", "folder.json"), "--out: folder.json: Is a directory"),
+        "a folder for tables": (("--out", "folder.csv"), "--out: folder.csv: Is a directory"),
+        "uniaxial": (
+            ("--mesh", "braced", "--definition", "baudet-corrected", "--load", "shear", "--force", "1 N"),
+            "--definition: 'baudet-corrected' is not for 'shear'",
+        ),
+    }
+
+    @pytest.mark.parametrize(("options", "said"), REFUSED.values(), ids=REFUSED)
+    def test_refuses_in_a_line_and_writes_nothing(self, options, said, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "file").write_text("no folder")
+        for name in ("folder.json", "folder.csv"):
+            (tmp_path / name).mkdir()
+        result = self.run(*self.STEEL, "--out", "net.csv", *options)
+        assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1, result.output
+        assert result.stderr.startswith(said) or said in result.stderr
+        assert sorted(os.listdir()) == ["file", "folder.csv", "folder.json"]
+        assert not os.listdir("folder.json") and not os.listdir("folder.csv")
