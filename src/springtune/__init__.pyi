@@ -29,6 +29,10 @@ from .mesh import mesh_type as mesh_type
 from .output.reading import field as field
 from .output.reading import open as open
 from .prediction import Choice as Choice
+from .prediction import MeshChoice as MeshChoice
+from .prediction import MeshSearch as MeshSearch
+from .prediction import SolvedMesh as SolvedMesh
+from .prediction import find_mesh as find_mesh
 from .prediction import predict as predict
 from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import springtune as st
 from springtune.kinds.scenes.solve import solve
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
-from springtune.prediction import CASES, extrapolate, predict, references
+from springtune.prediction import CASES, PREDICTED, extrapolate, predict, references
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
@@ -17,15 +18,17 @@ from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
-from springtune.springs import DEFINITIONS, DefinitionError, Springs
-from springtune.springs.lattice import uniform
+from springtune.springs import DEFINITIONS, DefinitionError
 
 
 def springs_of(choice, mesh, beam, material):
     """Springs that a row of a prediction stands for."""
-    if choice.definition != "uniform":
-        return DEFINITIONS[choice.definition].springs(mesh, material, beam.thickness)
-    return Springs(choice.inside, uniform(mesh))
+    return DEFINITIONS[choice.definition].springs(mesh, material, beam.thickness)
+
+
+def number_of(choice, part):
+    """Error under a load, or another number of a choice."""
+    return choice.errors[part] if part in choice.errors else getattr(choice, part)
 
 
 def solved(mesh, beam, springs, load):
@@ -71,7 +74,7 @@ def check(beam, material, mesh):
         try:
             springs, errors = springs_of(choice, mesh, beam, material), []
         except SingularError:  # of the patch test that scales them
-            assert "unstable" in choice.failures["patch test"] and np.isnan(choice.traction)
+            assert "unstable" in choice.failures["patch test"] and np.isnan(choice.errors["traction"])
             worst.append(np.inf)
             continue
         for load in CASES:
@@ -82,9 +85,9 @@ def check(beam, material, mesh):
             elif not isinstance(known[load], str):
                 errors.append(moved / known[load].displacement - 1)
                 # Far inside of .2 points or a tenth: the same equations, solved in another way.
-                assert getattr(choice, load) == pytest.approx(errors[-1], abs=1e-6, rel=1e-6)
+                assert choice.errors[load] == pytest.approx(errors[-1], abs=1e-6, rel=1e-6)
             else:
-                assert np.isnan(getattr(choice, load))
+                assert np.isnan(choice.errors[load])
         worst.append(np.inf if choice.failures else np.abs(errors).max())
         assert choice.worst == pytest.approx(worst[-1], abs=1e-6, rel=1e-6)
     assert worst[0] <= min(worst) * (1 + 1e-6)
@@ -142,7 +145,7 @@ class TestWhatClosedFormsGotWrong:
         beam, material, mesh, found = self.choices(mesh_type, nu)
         for load in CASES:
             error = self.through_the_stage(beam, material, mesh, definition, load)
-            assert getattr(found[definition], load) == pytest.approx(error, abs=1e-9, rel=1e-6)
+            assert found[definition].errors[load] == pytest.approx(error, abs=1e-9, rel=1e-6)
             if load in expected:
                 assert error == pytest.approx(expected[load], rel=0.02)
 
@@ -152,10 +155,9 @@ class TestWhatClosedFormsGotWrong:
         beam, material, mesh, found = self.choices(mesh_type, 0.3, height=5e-3)
         for choice in found.values():
             if not choice.failures:
-                assert choice.bending > -1
+                assert choice.errors["bending"] > -1
                 error = self.through_the_stage(beam, material, mesh, choice.definition, "bending")
-                if choice.definition != "uniform":
-                    assert choice.bending == pytest.approx(error, abs=1e-9, rel=1e-6)
+                assert choice.errors["bending"] == pytest.approx(error, abs=1e-9, rel=1e-6)
 
     @pytest.mark.parametrize(("nu", "measured"), [(0.0, -0.76), (0.5, 0.30)])
     def test_poissons_ratio_is_measured(self, nu, measured):
@@ -183,7 +185,8 @@ class TestWhatClosedFormsGotWrong:
         *_, found = self.choices("structured", -0.6)
         assert set(found["area"].failures) == {*CASES, "patch test"}
         assert all("unstable" in reason for reason in found["area"].failures.values())
-        assert all(np.isnan(getattr(found["area"], load)) for load in (*CASES, "young_modulus_error", "poisson_ratio"))
+        parts = (*CASES, "young_modulus_error", "poisson_ratio")
+        assert all(np.isnan(number_of(found["area"], part)) for part in parts)
         assert "unstable" in found["patch-area"].failures["patch test"]
         assert list(found)[-2:] == ["area", "patch-area"] and found["area"].worst == np.inf
 
@@ -193,8 +196,8 @@ class TestWhatClosedFormsGotWrong:
         mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
         choices = predict(beam, mesh, material, known)
         for choice in choices:
-            assert np.isnan(choice.bending) and not choice.failures
-            assert choice.worst == max(abs(choice.traction), abs(choice.shear))
+            assert np.isnan(choice.errors["bending"]) and not choice.failures
+            assert choice.worst == max(abs(choice.errors["traction"]), abs(choice.errors["shear"]))
         nothing = predict(beam, mesh, material, dict.fromkeys(CASES, "none"))
         assert all(choice.worst == np.inf for choice in nothing)
 
@@ -212,7 +215,7 @@ class TestWhatClosedFormsGotWrong:
 class TestRandomBeams:
     def test_every_number_is_solved_and_the_first_is_the_best(self):
         random = np.random.default_rng(17)
-        assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(40)) > 160
+        assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(15)) > 60
 
     @pytest.mark.slow
     def test_two_hundred_more(self):
@@ -235,8 +238,8 @@ class TestBands:
             assert {band.definition for band in bands} == set(found)
             for band in bands:
                 for part in (*CASES, "young_modulus_error", "poisson_ratio"):
-                    low, high = getattr(band, part)
-                    value = getattr(found[band.definition], part)
+                    low, high = number_of(band, part)
+                    value = number_of(found[band.definition], part)
                     assert low - 1e-9 <= value <= high + 1e-9, (band.definition, part)  # rounding
                     assert high - low < 0.5
 
@@ -249,3 +252,189 @@ class TestBands:
         for length, height, size in ((0.2, 0.04, 2e-3), (0.1, 0.1, 4e-3), (0.3, 0.02, 1e-3)):
             made = len(MESH_TYPES[mesh_type](length, height, size).points)
             assert MESH_TYPES[mesh_type].particles(length, height, size) == pytest.approx(made, rel=0.2)
+
+
+def random_case(random, most=2000):
+    """Beam of 1 mm to 1 m, aspect .3 to 12; material; mesh type; size: one cell across to so many particles."""
+    aspect = np.exp(random.uniform(np.log(0.3), np.log(12)))
+    material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), random.uniform(0, 0.5), name="any")
+    return aspect, material, *random_mesh(random, aspect, most)
+
+
+def random_mesh(random, aspect, most):
+    """Beam of an aspect ratio, mesh type and size."""
+    height = np.exp(random.uniform(np.log(1e-3), np.log(1)))
+    length = aspect * height
+    if length > 1:
+        length, height = 1.0, 1 / aspect
+    beam = Beam(length, height, np.exp(random.uniform(np.log(1e-4), np.log(1e-2))), "any")
+    mesh_type, particles = str(random.choice(list(MESH_TYPES))), np.exp(random.uniform(np.log(4), np.log(most)))
+    return beam, mesh_type, min(length, height, np.sqrt(length * height / particles))
+
+
+def compared(beam, mesh, material, choices, loads):
+    """Numbers that predictions and scenes agree on, within .2 points or a tenth and in truth far better."""
+    sheet, count = None, 0
+    for choice in choices:
+        if "springs" in choice.failures:
+            continue
+        for load in loads:
+            options = {"definition": choice.definition, "kinematics": "linear", "sheet": sheet}
+            scene = st.Scene(beam, mesh, material, load, 1.0, **options)
+            sheet, result, said = scene.sheet, scene.solve(), choice.errors[load]
+            if result.status is not Status.SOLVED:
+                assert np.isnan(said) and choice.failures
+                continue
+            assert said == pytest.approx(result.error, abs=2e-3, rel=0.1)
+            assert said == pytest.approx(result.error, abs=1e-9, rel=1e-9)
+            count += 1
+    return count
+
+
+class TestWhatScenesSay:
+    """A prediction states no number that a scene of the same definition contradicts."""
+
+    @pytest.mark.parametrize("mesh_type", MESH_TYPES)
+    def test_of_every_definition_and_load(self, mesh_type):
+        """The row `uniform` once had a stiffness that the definition of that name does not give: +3.8 %, not -6.4."""
+        beam, material = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        mesh = st.make_mesh(beam, mesh_type, "8 mm")
+        choices = predict(beam, mesh, material, loads=PREDICTED)
+        assert compared(beam, mesh, material, choices, PREDICTED) >= 3 * len(PREDICTED)
+
+    def test_of_two_hundred_beams(self):
+        """Of twenty shapes, as a reference scales with size, thickness and modulus."""
+        random, count = np.random.default_rng(14), 0
+        for number in range(20):
+            aspect, material, *_ = random_case(random)
+            load = PREDICTED[number % len(PREDICTED)]
+            one = references(Beam(aspect, 1.0, 1.0), Material(1.0, material.poisson_ratio), [load])[load]
+            for _ in range(10):
+                beam, mesh_type, size = random_mesh(random, aspect, 1000)
+                material = Material(np.exp(random.uniform(np.log(1e3), np.log(1e12))), material.poisson_ratio)
+                mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+                known = {load: one.scaled(1 / (material.young_modulus * beam.thickness), beam.height)}
+                choices = predict(beam, mesh, material, known, loads=[load])
+                count += compared(beam, mesh, material, [choices[random.integers(len(choices))]], [load])
+        assert count > 180  # some are unstable
+
+    @pytest.mark.slow
+    def test_of_two_hundred_fresh_beams(self):
+        seed = np.random.SeedSequence().entropy
+        print("seed", seed)  # shown where it fails
+        random, count = np.random.default_rng(seed), 0
+        for _ in range(200):
+            _, material, beam, mesh_type, size = random_case(random)
+            mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+            loads = [str(name) for name in random.choice(PREDICTED, 2, replace=False)]
+            count += compared(beam, mesh, material, predict(beam, mesh, material, loads=loads), loads)
+        assert count > 1600
+
+    def test_what_was_said_by_closed_forms(self):
+        """On squares with one diagonal: once +15.5 % in shear with `area`, and -23.1 with `patch`."""
+        beam, material = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+        mesh = st.make_mesh(beam, "right", "2 mm")
+        found = {choice.definition: choice.errors["shear"] for choice in predict(beam, mesh, material)}
+        assert found["area"] == pytest.approx(0.004, abs=5e-4)
+        assert found["patch"] == pytest.approx(-0.115, abs=1e-3)
+
+
+def held_by_bands(random, most):
+    """Numbers of a random mesh; those in bands from meshes of so many particles; those within .2 points or a tenth."""
+    while True:
+        aspect, material, *_ = random_case(random)
+        mesh_type, size = str(random.choice(list(MESH_TYPES))), np.sqrt(aspect / most / random.uniform(1.5, 6))
+        beam = Beam(aspect, 1.0, 1e-3, "any")
+        try:
+            bands, _ = extrapolate(mesh_type, size, beam, material, most=most, loads=PREDICTED)
+            break
+        except ValueError as error:  # a slender one
+            assert "less than 4 cells across" in str(error)
+    mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
+    found = {one.definition: one for one in predict(beam, mesh, material, loads=PREDICTED)}
+    outside = np.array(
+        [
+            (max(low - value, value - high, 0), abs(value))
+            for band in bands
+            if band.definition in found and not band.failures and not found[band.definition].failures
+            for load in PREDICTED
+            for (low, high), value in [(band.errors[load], found[band.definition].errors[load])]
+        ]
+    )
+    missed, error = outside.T
+    return len(missed), (missed < 1e-9).sum(), (missed <= np.maximum(2e-3, 0.1 * error)).sum()
+
+
+class TestRandomBands:
+    """Of 3,050 errors on 94 meshes 3,044 were in their bands, and three off by more than .2 points and a tenth."""
+
+    def test_hold(self):
+        random = np.random.default_rng(3)
+        numbers, held, near = np.sum([held_by_bands(random, 300) for _ in range(3)], axis=0)
+        assert numbers > 60 and held >= 0.98 * numbers and near >= 0.99 * numbers
+
+    @pytest.mark.slow
+    def test_hold_in_ninety_nine_of_a_hundred(self):
+        seed = np.random.SeedSequence().entropy
+        print("seed", seed)
+        random = np.random.default_rng(seed)
+        sizes = random.integers(300, 1000, 60)
+        numbers, held, near = np.sum([held_by_bands(random, int(most)) for most in sizes], axis=0)
+        print(f"{held} and {near} of {numbers}")
+        assert numbers > 1000 and held >= 0.98 * numbers and near >= 0.99 * numbers
+
+
+class TestLoads:
+    def test_a_load_and_its_opposite_are_one(self):
+        """In small strain."""
+        beam, material = Beam(0.1, 0.02), Material(1e9, 0.3)
+        mesh = MESH_TYPES["free"](0.1, 0.02, 5e-3)
+        choices = predict(beam, mesh, material, loads=["compression", "traction"])
+        assert [list(choice.errors) for choice in choices] == [["compression", "traction"]] * len(choices)
+        assert all(choice.errors["compression"] == -choice.errors["traction"] for choice in choices)
+
+    def test_the_worst_is_of_those_asked_for(self):
+        beam, material = Beam(0.1, 0.02), Material(1e9, 0.3)
+        mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        in_traction = predict(beam, mesh, material, loads=["traction"])
+        assert all(choice.worst == abs(choice.errors["traction"]) for choice in in_traction)
+        assert in_traction[0].worst < 0.01 < predict(beam, mesh, material)[0].worst
+
+    @pytest.mark.parametrize("loads", ["traction", [], ["pull"], ["follower-pressure"], None, 3, [["traction"]], [1]])
+    def test_others_are_refused(self, loads):
+        beam, material = Beam(0.1, 0.02), Material(1e9, 0.3)
+        with pytest.raises(ValueError, match="^loads: .*(traction|give)"):
+            predict(beam, MESH_TYPES["structured"](0.1, 0.02, 5e-3), material, loads=loads)
+
+    def test_references_of_other_loads_are_no_references(self):
+        beam, material = Beam(0.1, 0.02), Material(1e9, 0.3)
+        mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        with pytest.raises(ValueError, match="known: has no references of pressure; give"):
+            predict(beam, mesh, material, references(beam, material), loads=["pressure"])
+
+
+class TestBodies:
+    @pytest.mark.parametrize(
+        ("sides", "why"),
+        [
+            ((1e-12, 1e-12), "is 1e-09 mm long, which no beam is; give 1e-06 to 1e.10 mm, or correct its unit"),
+            ((1e9, 1e9), "mm long, which no beam is"),
+            ((1.0, 1e-10), "mm high, which no beam is"),
+            ((1.0, 0.1, 1e-12), "mm thick, which no beam is"),
+            ((1e3, 1e-3), "one side is 1e.06 times the other, and at most 10000 times has a reference; such shapes"),
+            ((1e-3, 1e3), "one side is 1e.06 times the other"),
+        ],
+    )
+    def test_that_are_none_are_refused_at_once(self, sides, why, monkeypatch):
+        beam, material = Beam(*sides, name="odd"), Material(1e9, 0.3)
+        nothing = dict.fromkeys(("solve_small_strain", "TriedMesh"))  # calling None would be a TypeError
+        monkeypatch.setattr("springtune.prediction.choices.solve_small_strain", nothing["solve_small_strain"])
+        monkeypatch.setattr("springtune.prediction.search.TriedMesh", nothing["TriedMesh"])
+        for call in (
+            lambda: predict(beam, MESH_TYPES["right"](0.1, 0.02, 5e-3), material),
+            lambda: references(beam, material),
+            lambda: extrapolate("right", 1e-3, beam, material),
+            lambda: st.find_mesh(beam, material, "1 %"),
+        ):
+            with pytest.raises(ValueError, match=f"^beam 'odd': .*{why}"):
+                call()

@@ -220,7 +220,7 @@ class TestHeader:
         for name in ("patch", "area", "delingette"):
             errors = st.SpringNet.from_mesh(mesh, STEEL, name, beam=BEAM).header["expected_error"]
             for load, error in errors.items():
-                assert error == pytest.approx(getattr(choices[name], load), abs=1e-9), (name, load)
+                assert error == pytest.approx(choices[name].errors[load], abs=1e-9), (name, load)
 
     def test_error_under_a_load_of_another_kind(self):
         """Above zero where too soft, whatever the force's sign; a result's, where it has moved further up."""

@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import jsonschema
@@ -16,10 +16,11 @@ from click.testing import CliRunner
 
 from springtune import prediction
 from springtune.cli import COMMANDS, main
-from springtune.cli.predict import prediction_text
+from springtune.cli.recommendation import prediction_json, prediction_text
 from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
+from springtune.prediction import find_mesh
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
@@ -241,6 +242,9 @@ def choices():
     return beam, material, known, prediction.predict(beam, mesh, material, known)
 
 
+ABOUT = {"particles": 105, "springs": 268}
+
+
 class TestPredict:
     STEEL = ("--beam", "100x20", "--material", "steel")
 
@@ -248,11 +252,9 @@ class TestPredict:
         result = run("predict", *self.STEEL, "--size", "5 mm")
         assert result.exit_code == 0
         rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
-        names = {"delingette", "area", "patch-area", "patch", "lattice", "van-gelder", "uniform"}
+        names = {"delingette", "area", "patch-area", "patch", "lattice", "van-gelder", "oriented"}
         assert list(rows)[0] == "definition" and set(rows) == {"definition", *names}
         assert "recommended: patch-area; with springs alone: patch" in result.stdout
-        # sqrt(3)/2 E t / (1 + sqrt(3)/2 a/H), a / H = 1/4
-        assert "1.495e+08 N/m" in rows["uniform"]
         assert "+0.00 %" in rows["patch"]
         # Traction, bending and shear as in tests/physics/test_predict.py, in order of the worst of them.
         assert rows["delingette"].split("each its own")[2].split()[:6] == ["-0.09", "%", "-7.77", "%", "-1.36", "%"]
@@ -271,17 +273,19 @@ class TestPredict:
         beam, material, known, _ = choices
         known = known | {"bending": "its error estimate is 1"}
         mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-        lines = prediction_text("", beam, material, prediction.predict(beam, mesh, material, known), known).splitlines()
+        found = prediction.predict(beam, mesh, material, known)
+        lines = prediction_text("", ABOUT, beam, material, found, known).splitlines()
         rows = [line for line in lines if line.startswith("  ")]
         assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
         assert "bending: no reference; its error estimate is 1" in lines
 
     def test_unstable_networks_are_marked(self, choices):
         beam, material, known, found = choices
-        numbers = dict.fromkeys(("traction", "bending", "shear", "young_modulus_error", "poisson_ratio"), np.nan)
+        numbers = dict.fromkeys(("young_modulus_error", "poisson_ratio"), np.nan)
+        numbers["errors"] = dict.fromkeys(prediction.CASES, np.nan)
         failed = numbers | {"extra": "", "failures": {"patch test": "unstable: the network is unstable at rest"}}
         found = [replace(one, **failed) if one.definition == "patch" else one for one in found]
-        text = prediction_text("", beam, material, sorted(found, key=lambda one: one.worst), known)
+        text = prediction_text("", ABOUT, beam, material, sorted(found, key=lambda one: one.worst), known)
         assert "with springs alone: van-gelder" in text
         rows = {line.split()[0]: line for line in text.splitlines() if line.startswith("  ")}
         assert rows["patch"].split()[-5:] == ["unstable"] * 5
@@ -321,8 +325,8 @@ class TestPredict:
             assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
             assert f"--size: '{size}' makes some " in result.stderr
             assert "of beam '100x20', more than can be meshed (1e+07); give at least 0.01" in result.stderr
-        slender = run("predict", "--beam", "1e9x1", "--material", "steel", "--mesh", mesh_type, "--size", "1 mm")
-        assert "of beam '1e9x1', more than can be meshed (1e+07); give a shorter beam" in slender.stderr
+        slender = run("predict", "--beam", "1e4x1", "--material", "steel", "--mesh", mesh_type, "--size", "1e-3 mm")
+        assert "of beam '1e4x1', more than can be meshed (1e+07); give at least 0.0" in slender.stderr
 
     def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
         write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
@@ -352,3 +356,178 @@ class TestPredict:
         assert result.exit_code == 1
         assert message in result.stderr
         assert len(result.stderr.splitlines()) == 1
+
+
+class TestPredictAMesh:
+    """`predict --error`, and what predictions are written as."""
+
+    STEEL = ("--beam", "100x20", "--material", "steel")
+    FIND = (*STEEL, "--error", "5 %", "--mesh", "right,braced")
+    NONE = (
+        "--beam",
+        "100x20",
+        "--material",
+        "rubber",
+        "--error",
+        "3 %",
+        "--mesh",
+        "right",
+        "--loads",
+        "traction,shear",
+    )
+
+    def test_an_error_is_answered_by_meshes(self):
+        result = run("predict", *self.FIND, "--density", "7850 kg/m^3")
+        assert result.exit_code == 0
+        lines = result.stdout.splitlines()
+        body = "100x20 mm; steel, E = 210 GPa, nu = 0.3, t = 1 mm"
+        assert lines[0] == f"{body}; an error of at most 5 % under traction, bending and shear"
+        search = find_mesh(Beam(0.1, 0.02), Material(210e9, 0.3), "5 %", mesh_types=["right", "braced"])
+        best, plain = search.best, search.best_springs
+        size = f"{best.mesh_type} {1e3 * best.size:g} mm with {best.choice.definition}, {best.particles} particles"
+        assert f"recommended: {size}" in lines
+        assert (
+            f"with springs alone: {plain.mesh_type} {1e3 * plain.size:g} mm with {plain.choice.definition}" in lines[3]
+        )
+        assert "right, with springs alone: none up to " in result.stdout and "% off at worst" in result.stdout
+        heads = next(line for line in lines if line.split()[:2] == ["mesh", "size"])
+        assert heads.split()[-7:] == ["traction", "bending", "shear", "static", "solve", "largest", "step"]
+        assert f"Solved: {len(search.tried)} meshes of " in result.stdout
+        assert "every finer mesh of its type" in result.stdout and "linear kinematics" in result.stdout
+
+    def test_none_is_said(self):
+        result = run("predict", *self.NONE, "--springs-alone")
+        assert result.exit_code == 0 and "\nwith springs alone: none\n" in result.stdout
+        assert "right, with springs alone: none up to" in result.stdout and "nearest is" in result.stdout
+        assert "recommended" not in result.stdout and "with any definition" not in result.stdout
+
+    def test_signs_are_told(self):
+        size = (*self.STEEL, "--size", "5 mm", "--mesh", "right")
+        text = run("predict", *size, "--loads", "compression,traction").stdout
+        assert "above zero where too soft, but under compression below: solved on this mesh," in text
+        assert "below zero where too soft: solved" in run("predict", *size, "--loads", "pressure").stdout
+
+    def test_json_of_a_prediction(self):
+        result = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "bending,pressure", "--json")
+        found = json.loads(result.stdout)
+        assert list(found) == [
+            "springtune", "beam", "material", "loads", "references", "mesh", "extrapolated_from", "recommended",
+            "recommended_springs_alone", "choices",
+        ]  # fmt: skip
+        beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
+        mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        choices = prediction.predict(beam, mesh, material, loads=["bending", "pressure"])
+        assert [one["definition"] for one in found["choices"]] == [one.definition for one in choices]
+        assert [one["errors"] for one in found["choices"]] == [one.errors for one in choices]
+        assert found["recommended"] == choices[0].definition
+        assert found["mesh"] == {
+            "type": "structured", "file": None, "size": 0.005, "particles": len(mesh.points), "springs": len(mesh.edges)
+        }  # fmt: skip
+        assert {*found["choices"][0]} == {field.name for field in fields(prediction.Choice)} | {"worst"}
+        own = [one for one in found["choices"] if one["definition"] == "delingette"]
+        assert own[0]["inside"] is None and found["extrapolated_from"] == []
+        assert set(found["references"]["bending"]) == {"displacement_per_newton", "error_estimate"}
+
+    def test_json_of_bands(self):
+        beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
+        known = prediction.references(beam, material)
+        choices, sizes = prediction.extrapolate("braced", 1e-3, beam, material, known, most=600)
+        found = json.loads(prediction_json(beam, material, {"type": "braced"}, choices, known, sizes))
+        low, high = found["choices"][0]["errors"]["bending"]
+        assert low < high and found["extrapolated_from"] == sizes
+
+    def test_json_of_a_search(self):
+        found = json.loads(run("predict", *self.FIND, "--json", "--density", "7850 kg/m^3").stdout)
+        assert list(found) == [
+            "springtune", "beam", "material", "loads", "references", "error", "most", "recommended", "by_type",
+            "recommended_springs_alone", "springs_by_type", "tried",
+        ]  # fmt: skip
+        best = found["recommended"]
+        assert list(best) == [
+            "mesh_type", "size", "cells", "particles", "springs", "confirmed", "finer_sizes", "seconds", "step_limit",
+            "choice",
+        ]  # fmt: skip
+        assert best in found["by_type"].values() and best["confirmed"] and best["step_limit"] > 0
+        assert found["springs_by_type"]["right"] is None and found["error"] == 0.05
+        assert {*found["tried"][0]} == {"mesh_type", "size", "cells", "particles", "springs", "errors"}
+
+    @pytest.mark.parametrize("ending", ["csv", "json", "vtu", "h5"])
+    def test_the_springs_of_what_is_recommended_are_written(self, tmp_path, ending):
+        target = tmp_path / f"net.{ending}"
+        result = run("predict", *self.FIND, "--springs-alone", "--write", target)
+        assert result.exit_code == 0 and target.is_file()
+        assert f"{target}: " in result.stdout and "springs of definition " in result.stdout
+
+    def test_what_is_written_is_what_is_said(self, tmp_path):
+        target = tmp_path / "net.json"
+        said = run("predict", *self.FIND, "--write", target, "--json")
+        best, written = json.loads(said.stdout)["recommended"], json.loads(target.read_text())
+        header = written["header"]
+        assert header["definition"] == best["choice"]["definition"]
+        assert header["mesh"]["particles"] == best["particles"]
+        assert header["expected_error"] == pytest.approx(best["choice"]["errors"], rel=1e-9)
+        assert "net.json" in said.stderr
+
+        target.unlink()
+        said = run("predict", *self.STEEL, "--size", "5 mm", "--write", target, "--springs-alone")
+        header = json.loads(target.read_text())["header"]
+        assert "recommended: patch; with springs alone: patch" in said.stdout and header["definition"] == "patch"
+
+    def test_nothing_is_written_where_nothing_is_recommended(self, tmp_path):
+        target = tmp_path / "net.json"
+        result = run("predict", *self.NONE, "--springs-alone", "--write", target)
+        assert result.exit_code == 1 and not target.exists()
+        assert result.stderr == "--write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            (("--error", "1"), "--error: '1' is no error above 0 and below 100 %; give one such as '1 %'"),
+            (("--error", "1e-9 %"), "--error: '1e-9 %' is below the error estimate of the reference; give at least "),
+            (("--error", "1 %", "--size", "5 mm"), "--size: '5 mm' is what --error finds; leave one of them out"),
+            (("--error", "1 %", "--mesh", "fre"), "--mesh: 'fre' is no mesh type; known: structured, free"),
+            (("--error", "1 %", "--mesh", "own.msh"), "--mesh: 'own.msh' is a file, and --error finds sizes of mesh"),
+            (("--size", "5 mm", "--loads", "pull"), "--loads: 'pull' cannot be predicted; known: traction"),
+            (("--size", "5 mm", "--loads", "follower-pressure"), "--loads: 'follower-pressure' cannot be predicted; "),
+            (("--size", "5 mm", "--loads", ","), "--loads: none; give some of traction, compression, bending, shear"),
+            (("--size", "5 mm", "--write", "net.txt"), "net.txt"),
+            (("--size", "5 mm", "--density", "7850"), "--density: '7850' has no unit; give a density such as"),
+        ],
+    )
+    def test_refusals_are_one_line(self, arguments, message, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "own.msh").write_text("")
+        result = run("predict", *self.STEEL, *arguments)
+        assert result.exit_code == 1 and message in result.stderr and len(result.stderr.splitlines()) == 1
+        assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
+
+    @pytest.mark.parametrize("asked", ["--size", "--error"])
+    @pytest.mark.parametrize("mesh_type", [None, "free"])
+    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked, mesh_type, monkeypatch):
+        """By one line each: no mesh, no reference."""
+
+        def work(*arguments, **options):
+            raise AssertionError("something is made or solved")
+
+        monkeypatch.setattr("springtune.prediction.choices.solve_small_strain", work)
+        monkeypatch.setattr("springtune.prediction.choices.TriedMesh", work)
+        monkeypatch.setattr("springtune.mesh.types.MeshType.__call__", work)
+        mesh = ("--mesh", mesh_type) if mesh_type else ()
+        absurd = [
+            *((beam, "5 mm") for beam in ("1e-9x1e-9", "1e12x1e12", "1e6x1", "1x1e6", "1e-9x1", "1e40x1e40")),
+            *(
+                (beam, "5 mm")
+                for beam in ("nanx1", "1xnan", "infx1", "-1x1", "0x0", "1e999x1", "x", "1x2x3", "1e-999x1")
+            ),
+            *(("100x20", size) for size in ("1e-9 mm", "1e30 mm", "nan mm", "inf mm", "-1 mm", "0 mm", "1e-320 mm")),
+            *(("100x20", size) for size in ("1e999 mm", "5", "mm", "", "5 N", "5 mm mm", "\N{INFINITY} mm", "1_0 mm")),
+        ]
+        for beam, size in absurd:
+            if asked == "--error" and beam == "100x20":
+                size = size.replace("mm", "%").replace("1e30 %", "100 %").replace("1_0 %", "1_000 %")
+                if size == "1e-9 %" or size == "1e-320 %":
+                    continue  # is compared with the reference's estimate
+            result = run("predict", "--beam", beam, asked, size, "--material", "steel", *mesh)
+            assert result.exit_code == 1, (beam, size)
+            assert result.stdout == "" and len(result.stderr.splitlines()) == 1, (beam, size)
+            assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr

@@ -1,6 +1,6 @@
-"""Recommend a definition for one mesh."""
+"""Recommend a definition for one mesh, or a mesh for one error."""
 
-from collections.abc import Callable, Sequence
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,6 @@ from .options import MATERIALS, asked_beam, asked_material, asked_mesh, asked_si
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
-    from ..prediction import Choice, Number, References
     from ..problem.geometry import Beam
     from ..problem.materials import Material
 
@@ -20,7 +19,10 @@ if TYPE_CHECKING:
 @click.command(
     epilog=examples(
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
-        'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
+        'springtune predict --beam 200x40 --error "1 %" --loads traction,bending --material steel',
+        'springtune predict --beam 200x40 --error "2 %" --material steel --mesh structured,free --springs-alone '
+        "--write net.csv",
+        'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4 --json',
         'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
     )
 )
@@ -29,10 +31,9 @@ if TYPE_CHECKING:
 @click.option(
     "--mesh",
     "mesh_type",
-    default="structured",
-    show_default=True,
     shell_complete=mesh_types,
-    help="A mesh type, or a mesh file.",
+    help="A mesh type, or a mesh file; with --error mesh types, such as structured,free.  "
+    "[default: structured; with --error all]",
 )
 @click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
 @click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
@@ -41,46 +42,158 @@ if TYPE_CHECKING:
 )
 @click.option("--young", help="Young's modulus, such as '210 GPa'.")
 @click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
+@click.option("--density", help="Density, such as '7850 kg/m^3': for the largest stable time steps.")
+@click.option("--error", help="Find the coarsest mesh that keeps this error, such as '1 %'.")
+@click.option(
+    "--loads",
+    help="Loads that count: some of traction, compression, bending, shear and pressure, such as traction,bending.  "
+    "[default: traction,bending,shear]",
+)
+@click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON, in SI units.")
+@click.option(
+    "--write",
+    "target",
+    type=click.Path(path_type=Path),
+    help="Write the springs of what is recommended: a .csv, .json, .vtu (ParaView) or .h5 file.",
+)
 def predict(
     beam: str,
     thickness: str,
-    mesh_type: str,
+    mesh_type: str | None,
     size: str | None,
     unit: str,
     material: str | None,
     young: str | None,
     poisson: str | None,
+    density: str | None,
+    error: str | None,
+    loads: str | None,
+    springs_alone: bool,
+    as_json: bool,
+    target: Path | None,
 ) -> None:
-    """Recommend a definition and its stiffness for one mesh, with its error under three loads.
+    """Recommend a definition and its stiffness for one mesh, with its error under some loads; or find the mesh.
 
     Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
-    strain; a mesh too large for that has bands from coarser ones.
+    strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
+    so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
     """
-    from ..mesh import MESH_TYPES
-    from ..prediction import SOLVED, extrapolate, references
-    from ..prediction import predict as choices
+    from ..handover.formats import check_ending
+    from ..prediction import CASES, check_beam
     from ..springs import DefinitionError
 
     try:
-        sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson)
-        made = is_made(mesh_type)
-        edge = asked_size(sheet, mesh_type, size) if made else None
-        sizes: list[float] = []
-        count = 0.0 if edge is None else MESH_TYPES[mesh_type].particles(sheet.length, sheet.height, edge)
-        if edge is not None and count > SOLVED:
-            about = f"about {count:.2g} particles"
-            known = references(sheet, solid)
-            found, sizes = extrapolate(mesh_type, edge, sheet, solid, known)
+        if target is not None:
+            check_ending(target)
+        sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
+        check_beam(sheet)
+        cases = CASES if loads is None else _asked_loads(loads)
+        if error is not None:
+            if size is not None:
+                raise ValueError(f"--size: '{size}' is what --error finds; leave one of them out")
+            _find(sheet, solid, error, cases, mesh_type, springs_alone, as_json, target)
         else:
-            mesh = _asked_mesh(sheet, mesh_type, edge, unit)
-            about = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
-            known = references(sheet, solid)
-            found = choices(sheet, mesh, solid, known)
-    except (click.ClickException, DefinitionError, ValueError) as error:
-        click.echo(str(getattr(error, "message", error)), err=True)
-        raise SystemExit(1) from None
+            _predict(sheet, solid, cases, mesh_type or "structured", size, unit, springs_alone, as_json, target)
+    except OSError as problem:
+        why = os.strerror(problem.errno) if problem.errno else problem
+        raise SystemExit(_refused(f"--write: {target}: {why}; give a file that can be written")) from None
+    except (click.ClickException, DefinitionError, ValueError) as problem:
+        raise SystemExit(_refused(str(getattr(problem, "message", problem)))) from None
+
+
+def _predict(
+    beam: "Beam",
+    material: "Material",
+    loads: tuple[str, ...],
+    mesh_type: str,
+    size: str | None,
+    unit: str,
+    springs_alone: bool,
+    as_json: bool,
+    target: Path | None,
+) -> None:
+    """Recommend a definition for a mesh."""
+    from ..mesh import MESH_TYPES
+    from ..prediction import SOLVED, extrapolate, predict, references
+    from .recommendation import prediction_json, prediction_text
+
+    made = is_made(mesh_type)
+    edge = asked_size(beam, mesh_type, size) if made else None
+    count = 0.0 if edge is None else MESH_TYPES[mesh_type].particles(beam.length, beam.height, edge)
+    sizes: list[float] = []
+    mesh = None
+    if edge is not None and count > SOLVED:
+        about: dict[str, object] = {"particles": float(f"{count:.2g}"), "springs": None}
+        known = references(beam, material, loads)
+        found, sizes = extrapolate(mesh_type, edge, beam, material, known, loads=loads)
+    else:
+        mesh = _asked_mesh(beam, mesh_type, edge, unit)
+        about = {"particles": len(mesh.points), "springs": len(mesh.edges)}
+        known = references(beam, material, loads)
+        found = predict(beam, mesh, material, known, loads=loads)
+    if springs_alone:
+        found = [choice for choice in found if not choice.energies]
     name = f"{mesh_type} {size}" if made else Path(mesh_type).name
-    click.echo(prediction_text(f"{sheet.label}, {name}: {about}", sheet, solid, found, known, mesh_type, sizes))
+    solved = [choice.definition for choice in found if choice.worst < float("inf")]
+    if as_json:
+        where = {"type": mesh_type if made else None, "file": None if made else mesh_type, "size": edge}
+        click.echo(prediction_json(beam, material, where | about, found, known, sizes))
+    else:
+        click.echo(prediction_text(name, about, beam, material, found, known, sizes))
+    if target is not None:
+        if not solved:
+            raise ValueError("--write: nothing is recommended for this mesh, so nothing is written; take another mesh")
+        mesh = _asked_mesh(beam, mesh_type, edge, unit) if mesh is None else mesh
+        _write(beam, mesh, material, solved[0], name, target, quiet=as_json)
+
+
+def _find(
+    beam: "Beam",
+    material: "Material",
+    error: str,
+    loads: tuple[str, ...],
+    types: str | None,
+    springs_alone: bool,
+    as_json: bool,
+    target: Path | None,
+) -> None:
+    """Find the mesh that keeps an error."""
+    from ..mesh import MESH_TYPES
+    from ..prediction import find_mesh
+    from .recommendation import search_json, search_text, size_text
+
+    names = None if types is None else [name.strip() for name in types.split(",")]
+    for name in names or ():
+        if name not in MESH_TYPES:
+            why = "is a file, and --error finds sizes of mesh types" if Path(name).is_file() else "is no mesh type"
+            raise ValueError(f"--mesh: '{name}' {why}; known: {', '.join(MESH_TYPES)}")
+    try:
+        search = find_mesh(beam, material, error, loads=loads, mesh_types=names)
+    except ValueError as problem:
+        raise ValueError(f"--{problem}" if str(problem).startswith(("error:", "loads:")) else str(problem)) from None
+    best = search.best_springs if springs_alone else search.best
+    click.echo((search_json if as_json else search_text)(beam, material, search, springs_alone))
+    if target is not None:
+        if best is None:
+            raise ValueError(f"--write: no mesh keeps {error}, so nothing is written; allow a larger error")
+        mesh = MESH_TYPES[best.mesh_type](beam.length, beam.height, best.size)
+        name = f"{best.mesh_type} {size_text(best.size)}"
+        _write(beam, mesh, material, best.choice.definition, name, target, quiet=as_json)
+
+
+def _refused(message: str) -> int:
+    click.echo(message, err=True)
+    return 1
+
+
+def _asked_loads(text: str) -> tuple[str, ...]:
+    from ..prediction.choices import check_loads
+
+    try:
+        return check_loads([name.strip() for name in text.split(",") if name.strip()])
+    except ValueError as error:
+        raise ValueError(f"--{error}") from None
 
 
 def _asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "Mesh":
@@ -95,93 +208,13 @@ def _asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> 
     return mesh
 
 
-def prediction_text(
-    title: str,
-    beam: "Beam",
-    material: "Material",
-    choices: "Sequence[Choice]",
-    known: "References",
-    mesh_type: str = "",
-    sizes: Sequence[float] = (),
-) -> str:
-    """Text of a prediction.
+def _write(
+    beam: "Beam", mesh: "Mesh", material: "Material", definition: str, name: str, target: Path, quiet: bool
+) -> None:
+    """Write the springs of a definition, and say so; not where what is printed is for a program."""
+    from ..handover.net import SpringNet
+    from .springs import written_text
 
-    Parameters
-    ----------
-    title : str
-    beam : Beam
-    material : Material
-    choices : list of Choice
-    known : dict
-        What `springtune.prediction.references` gave.
-    mesh_type : str, optional
-        Of the meshes of bands.
-    sizes : list of float, optional
-        Mesh sizes that bands are from [m]; none where the mesh itself was solved.
-
-    Returns
-    -------
-    str
-    """
-    from ..output.text import aligned
-    from ..prediction import CASES
-
-    young = material.young_modulus
-    modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
-    rows = [["definition", "springs inside", "on the outline", *CASES, "E", "nu", "besides springs"]]
-    notes = [f"{load}: no reference; {found}" for load, found in known.items() if isinstance(found, str)]
-    for choice in choices:
-        rows.append([choice.definition])
-        rows[-1] += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
-        rows[-1] += [_bounds(getattr(choice, load), _percent, _missing(choice, load)) for load in CASES]
-        missing = _missing(choice, "patch test")
-        rows[-1] += [_bounds(choice.young_modulus_error, _percent, missing)]
-        rows[-1] += [_bounds(choice.poisson_ratio, _three_decimals, missing), choice.extra]
-        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
-    solved = [choice for choice in choices if choice.worst < float("inf")]
-    names = [one.definition for one in solved[:1]], [one.definition for one in solved if not one.energies][:1]
-    first, plain = (name[0] if name else "none" for name in names)
-    estimates = [found.error_estimate for found in known.values() if not isinstance(found, str)]
-    how = "solved on this mesh"
-    if sizes:
-        low, high = 1e3 * min(sizes), 1e3 * max(sizes)
-        how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
-    lines = [
-        f"{title}; {material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm",
-        "",
-        f"recommended: {first}; with springs alone: {plain}",
-        "",
-        aligned(rows, left=2, right=(3, 4, 5, 6, 7)),
-        "",
-        f"Errors are of the displacement of the loaded side, above zero where too soft: {how},",
-        "with linear kinematics (small strain), against the converged reference of small strain (error estimate "
-        f"{100 * max(estimates, default=0):.1g} %).",
-        "The first row is the best one by its worst error. E, its error, and nu are of a patch test between rollers.",
-        *notes,
-    ]
-    return "\n".join(lines)
-
-
-def _missing(choice: "Choice", part: str) -> str:
-    """Word for a number that is not there."""
-    if "springs" in choice.failures:
-        return "refused"
-    reason = choice.failures.get(part) or choice.failures.get("patch test")
-    return "no reference" if reason is None else "unstable" if "unstable" in reason else "unsolved"
-
-
-def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
-    """A number, or the two of a band."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    texts = [missing if number != number else form(number) for number in numbers]
-    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
-
-
-def _three_decimals(value: float) -> str:
-    return f"{round(value, 3) + 0.0:.3f}"
-
-
-def _percent(value: float) -> str:
-    """An error with two decimals below 10 %, and three digits above."""
-    value = 100 * value
-    return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"
+    net = SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name)
+    written = net.write(target)
+    click.echo(written_text(net, written) if quiet else "\n" + written_text(net, written), err=quiet)

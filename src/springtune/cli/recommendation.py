@@ -1,0 +1,374 @@
+"""What `springtune predict` says: as text, and as JSON."""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+
+if TYPE_CHECKING:
+    from ..prediction import Choice, MeshChoice, MeshSearch, Number, References
+    from ..problem.geometry import Beam
+    from ..problem.materials import Material
+
+
+def prediction_text(
+    mesh_name: str,
+    about: dict[str, Any],
+    beam: "Beam",
+    material: "Material",
+    choices: "Sequence[Choice]",
+    known: "References",
+    sizes: Sequence[float] = (),
+) -> str:
+    """Text of a prediction.
+
+    Parameters
+    ----------
+    mesh_name : str
+        Such as ``"structured 2 mm"``.
+    about : dict
+        Its ``particles`` and ``springs``; no springs where it is too large to be made.
+    beam : Beam
+    material : Material
+    choices : list of Choice
+    known : dict
+        What `springtune.prediction.references` gave.
+    sizes : list of float, optional
+        Mesh sizes that bands are from [m]; none where the mesh itself was solved.
+
+    Returns
+    -------
+    str
+    """
+    from ..output.text import aligned
+
+    loads = list(known)
+    rows = [["definition", "springs inside", "on the outline", *loads, "E", "nu", "besides springs"]]
+    notes = [f"{load}: no reference; {found}" for load, found in known.items() if isinstance(found, str)]
+    for choice in choices:
+        rows.append([choice.definition])
+        rows[-1] += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
+        rows[-1] += [_bounds(choice.errors[load], _percent, _missing(choice, load)) for load in loads]
+        missing = _missing(choice, "patch test")
+        rows[-1] += [_bounds(choice.young_modulus_error, _percent, missing)]
+        rows[-1] += [_bounds(choice.poisson_ratio, _three_decimals, missing), choice.extra]
+        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
+    first, plain = (name or "none" for name in recommended(choices))
+    particles, springs = about["particles"], about["springs"]
+    counts = f"{particles} particles, {springs} springs" if springs else f"about {particles:.2g} particles"
+    how = "solved on this mesh"
+    if sizes:
+        low, high = 1e3 * min(sizes), 1e3 * max(sizes)
+        mesh_type = mesh_name.partition(" ")[0]
+        how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
+    lines = [
+        f"{beam.label}, {mesh_name}: {counts}; {_body_text(beam, material)}",
+        "",
+        f"recommended: {first}; with springs alone: {plain}",
+        "",
+        aligned(rows, left=2, right=range(3, 5 + len(loads))),
+        "",
+        f"Errors are of the displacement of the loaded side, {_soft(loads)}: {how},",
+        f"{KINEMATICS_TEXT} (error estimate {_estimate(known)}).",
+        "The first row is the best one by its worst error. E, its error, and nu are of a patch test between rollers.",
+        *notes,
+    ]
+    return "\n".join(lines)
+
+
+def search_text(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
+    """Text of a search for a mesh.
+
+    Parameters
+    ----------
+    beam : Beam
+    material : Material
+    search : MeshSearch
+    springs_alone : bool, optional
+        Whether springs with energies besides them are left out.
+
+    Returns
+    -------
+    str
+    """
+    from ..output.text import aligned
+
+    wanted = f"{100 * search.error:.6g} %"
+    answers = [("with springs alone", search.best_springs)]
+    tables = [("with springs alone", search.springs_by_type, True)]
+    if not springs_alone:
+        answers.insert(0, ("recommended", search.best))
+        tables.insert(0, ("with any definition", search.by_type, False))
+    lines = [
+        f"{beam.label}; {_body_text(beam, material)}; an error of at most {wanted} under {_listed(search.loads)}",
+        "",
+        *(f"{what}: {_answer(one)}" for what, one in answers),
+    ]
+    steps = material.density is not None
+    heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
+    heads += ["largest step"] if steps else []
+    right = (3, *range(5, 9 + len(search.loads) + steps))
+    notes = []
+    for what, found, alone in tables:
+        rows = [heads]
+        for name, one in sorted(found.items(), key=lambda item: _order(item[1])):
+            if one is None:
+                notes.append(f"{name}, {what}: {_nearest(search, name, alone)}")
+                continue
+            errors = [_bounds(one.choice.errors[load], _percent, "") for load in search.loads]
+            rows.append([name, size_text(one.size), one.choice.definition + ("" if one.confirmed else " *")])
+            rows[-1] += [f"{number:,}" for number in (one.cells, one.particles, one.springs)]
+            rows[-1] += [*errors, f"{1e3 * one.seconds:.2g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
+        if rows[1:]:
+            lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
+    unsure = any(one and not one.confirmed for _, found, _ in tables for one in found.values())
+    if unsure:
+        notes.insert(
+            0, f"* kept on all finer meshes tried, up to {search.most:,} particles, but these are too few to be sure"
+        )
+    counts = [one.particles for one in search.tried]
+    lines += [
+        "",
+        f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
+        f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
+        "tried on, up to one with twice as many cells across, and would if its errors changed once more by as much as",
+        "over the last doubling. Meshes are ranked by their particles.",
+        f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,",
+        f"{KINEMATICS_TEXT} (error estimate {_estimate(search.known)}).",
+        "Static solve: of one load with its network assembled and factorized, measured here once.",
+    ]
+    lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
+    return "\n".join([*lines, *notes])
+
+
+def prediction_json(
+    beam: "Beam",
+    material: "Material",
+    mesh: dict[str, Any],
+    choices: "Sequence[Choice]",
+    known: "References",
+    sizes: Sequence[float] = (),
+) -> str:
+    """A prediction as JSON; numbers that are not there are null, and those of a band are lists of two.
+
+    Parameters
+    ----------
+    beam : Beam
+    material : Material
+    mesh : dict
+        Its ``type``, ``file``, ``size``, ``particles`` and ``springs``.
+    choices, known, sizes
+        As of `prediction_text`.
+
+    Returns
+    -------
+    str
+    """
+    first, plain = recommended(choices)
+    return _json(
+        _head_json(beam, material, known)
+        | {
+            "mesh": mesh,
+            "extrapolated_from": list(sizes),
+            "recommended": first,
+            "recommended_springs_alone": plain,
+            "choices": [_choice_json(choice) for choice in choices],
+        }
+    )
+
+
+def search_json(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
+    """A search for a mesh as JSON; numbers that are not there are null.
+
+    Parameters
+    ----------
+    beam, material, search, springs_alone
+        As of `search_text`.
+
+    Returns
+    -------
+    str
+    """
+
+    def one_json(one: "MeshChoice | None") -> dict[str, Any] | None:
+        if one is None:
+            return None
+        own = {name: getattr(one, name) for name in ("mesh_type", "size", "cells", "particles", "springs", "confirmed")}
+        kept = {"finer_sizes": [finer.size for finer in one.finer]}
+        return own | kept | {"seconds": one.seconds, "step_limit": one.step_limit, "choice": _choice_json(one.choice)}
+
+    alone = {
+        "recommended_springs_alone": one_json(search.best_springs),
+        "springs_by_type": {name: one_json(one) for name, one in search.springs_by_type.items()},
+    }
+    of_any = {
+        "recommended": one_json(search.best),
+        "by_type": {name: one_json(one) for name, one in search.by_type.items()},
+    }
+    return _json(
+        _head_json(beam, material, search.known)
+        | {"error": search.error, "most": search.most}
+        | ({} if springs_alone else of_any)
+        | alone
+        | {"tried": [asdict(one) for one in search.tried]}
+    )
+
+
+def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
+    """The first definition without a failure, and the first one that has springs alone; None where there is none.
+
+    Parameters
+    ----------
+    choices : list of Choice
+
+    Returns
+    -------
+    first, plain : str or None
+    """
+    solved = [choice for choice in choices if choice.worst < math.inf]
+    plain = [choice for choice in solved if not choice.energies]
+    return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
+
+
+def size_text(size: float) -> str:
+    """Mesh size as the option takes it.
+
+    Parameters
+    ----------
+    size : float
+        [m]
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> size_text(0.00308)
+    '3.08 mm'
+    """
+    return f"{1e3 * size:.12g} mm"
+
+
+KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
+"""How errors are measured."""
+
+ABOVE = "above zero where too soft"
+"""What the sign of an error means, where displacements are positive."""
+
+
+def _soft(loads: Sequence[str]) -> str:
+    """What the signs of errors mean, (network - reference) / |reference|."""
+    from ..problem.loads import LOADS
+
+    against = [load for load in loads if LOADS[load].sign < 0]
+    along = [load for load in loads if load not in against]
+    if not against:
+        return ABOVE
+    return f"{ABOVE}, but under {_listed(against)} below" if along else "below zero where too soft"
+
+
+def _body_text(beam: "Beam", material: "Material") -> str:
+    young = material.young_modulus
+    modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
+    return f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
+
+
+def _estimate(known: "References") -> str:
+    estimates = [found.error_estimate for found in known.values() if not isinstance(found, str)]
+    return f"{100 * max(estimates, default=0):.1g} %"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+
+
+def _answer(one: "MeshChoice | None") -> str:
+    if one is None:
+        return "none"
+    sure = "" if one.confirmed else ", not confirmed by finer meshes"
+    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
+
+
+def _order(one: "MeshChoice | None") -> tuple[bool, int]:
+    return (not one.confirmed, one.particles) if one else (True, 0)
+
+
+def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
+    """Why there is none: what came nearest to it."""
+    from ..prediction.search import SPRINGS_ALONE
+
+    tried = [one for one in search.tried if one.mesh_type == mesh_type]
+    names = [(one, name) for one in tried for name in one.errors if name in SPRINGS_ALONE or not springs_alone]
+    near = [(one.worst(name), one, name) for one, name in names if one.worst(name) < math.inf]
+    if not near:
+        return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
+    worst, one, name = min(near, key=lambda found: found[0])
+    most = max(other.particles for other, _ in names)
+    where = f"{name} at {size_text(one.size)} ({one.particles:,} particles)"
+    if worst <= search.error:
+        return (
+            f"none up to {most:,} particles; {where} keeps it, {100 * worst:.3g} % off at worst, but finer ones do not"
+        )
+    return f"none up to {most:,} particles; nearest is {where}, {100 * worst:.3g} % off at worst"
+
+
+def _head_json(beam: "Beam", material: "Material", known: "References") -> dict[str, Any]:
+    references = {
+        load: {"message": found}
+        if isinstance(found, str)
+        else {"displacement_per_newton": float(found.displacement), "error_estimate": found.error_estimate}
+        for load, found in known.items()
+    }
+    return {
+        "springtune": __version__,
+        "beam": asdict(beam),
+        "material": asdict(material),
+        "loads": list(known),
+        "references": references,
+    }
+
+
+def _choice_json(choice: "Choice") -> dict[str, Any]:
+    return asdict(choice) | {"worst": choice.worst}
+
+
+def _json(content: dict[str, Any]) -> str:
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: plain(one) for name, one in value.items()}
+        if isinstance(value, list | tuple):
+            # A band whose bounds are not there is not there.
+            numbers = [plain(one) for one in value]
+            return None if isinstance(value, tuple) and None in numbers else numbers
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return json.dumps(plain(content), indent=2, ensure_ascii=False)
+
+
+def _missing(choice: "Choice", part: str) -> str:
+    """Word for a number that is not there."""
+    if "springs" in choice.failures:
+        return "refused"
+    reason = choice.failures.get(part) or choice.failures.get("patch test")
+    return "no reference" if reason is None else "unstable" if "unstable" in reason else "unsolved"
+
+
+def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
+    """A number, or the two of a band."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    texts = [missing if number != number else form(number) for number in numbers]
+    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
+
+
+def _three_decimals(value: float) -> str:
+    return f"{round(value, 3) + 0.0:.3f}"
+
+
+def _percent(value: float) -> str:
+    """An error with two decimals below 10 %, and three digits above."""
+    value = 100 * value
+    return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"

@@ -1,0 +1,138 @@
+"""Bands for meshes that are too large to be solved, from coarser ones of their type."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+
+from ..mesh import MESH_TYPES
+from ..problem.geometry import Beam
+from ..problem.materials import Material
+from .choices import CASES, Choice, Number, References, check_beam, check_loads, predict, references
+
+BANDS_FROM = 10_000
+"""Particles of the finest mesh that a band is from."""
+
+FEWEST_CELLS = 4
+"""Cells across a beam from which on errors are taken to change regularly with the mesh size."""
+
+COARSER, TRIED = 6, 30
+"""Meshes that a band is from, and sizes of which each of them is chosen."""
+
+MARGIN, LEAST_MARGIN, LEAST_OF_ERROR = 1.0, 5e-4, 0.05
+"""What is added to a band at either end: over its width, at least [1], and at least over the error itself."""
+
+
+def extrapolate(
+    mesh_type: str,
+    size: float,
+    beam: Beam,
+    material: Material,
+    known: References | None = None,
+    most: int = BANDS_FROM,
+    *,
+    loads: Iterable[str] = CASES,
+) -> tuple[list[Choice], list[float]]:
+    """Choices for a mesh that is too large to solve: bands from coarser meshes of its type.
+
+    What a network gets wrong depends on the shape of its cells, which are stretched to fit the beam, and changes about
+    in proportion to the mesh size or to a higher power of it. So a band holds what meshes give whose sizes cover an
+    octave, chosen for cells that are stretched a little more and a little less than those asked for, and what a
+    straight line through these gives; its width is added at either end, a twentieth of an error at least.
+
+    Parameters
+    ----------
+    mesh_type : str
+        Key of `springtune.mesh.MESH_TYPES`.
+    size : float
+        Length of an edge [m].
+    beam : Beam
+    material : Material
+    known : dict, optional
+        What `references` gave for the beam and the material.
+    most : int, optional
+        Largest number of particles to solve.
+    loads : iterable of str, optional
+        As of `predict`.
+
+    Returns
+    -------
+    choices : list of Choice
+        Their numbers are pairs of bounds; what fails on one of the meshes fails.
+    sizes : list of float
+        Mesh sizes that were solved [m].
+
+    Raises
+    ------
+    ValueError
+        If the beam is so slender that a mesh of so many particles has less than four cells across.
+    DefinitionError
+        If no definition can live on meshes of the type.
+    """
+    check_beam(beam)
+    finest = sqrt(beam.length * beam.height / most)
+    while MESH_TYPES[mesh_type].particles(beam.length, beam.height, finest) > most:
+        finest *= 1.02
+    if 2 * finest > min(beam.length, beam.height) / FEWEST_CELLS:
+        raise ValueError(
+            f"a mesh of {1e3 * size:.6g} mm is too large to be solved here, and coarser ones that are not have less "
+            f"than {FEWEST_CELLS} cells across beam '{beam.name}'; make it a scene of a study"
+        )
+    parts = np.geomspace(finest, 2 * finest, COARSER * TRIED).reshape(COARSER, TRIED)
+    sizes = [_like(mesh_type, beam, size, part, sign) for part, sign in zip(parts, COARSER // 2 * (1, -1))]
+    loads = check_loads(loads)
+    known = references(beam, material, loads) if known is None else known
+    solved = []
+    for one in sizes:
+        mesh = MESH_TYPES[mesh_type](beam.length, beam.height, one)
+        solved.append({choice.definition: choice for choice in predict(beam, mesh, material, known, loads=loads)})
+    # The same springs may go by one name on one mesh and by two on another.
+    names = [name for name in solved[0] if all(name in one for one in solved)]
+    choices = [_band([one[name] for one in solved], sizes, size) for name in names]
+    return sorted(choices, key=lambda choice: choice.worst), sizes
+
+
+def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int) -> float:
+    """Of some mesh sizes that whose cells are next to those of a size in their stretch, on one side of it if any is."""
+    stretch, box = MESH_TYPES[mesh_type].stretch, (beam.length, beam.height)
+    apart = sign * np.array([stretch(*box, one) / stretch(*box, size) - 1 for one in sizes])
+    return float(sizes[np.argmin(np.where(apart >= -1e-9, np.abs(apart), 1 + np.abs(apart)))])
+
+
+def _band(choices: list[Choice], sizes: list[float], size: float) -> Choice:
+    """Bands of a definition at a size, from choices on meshes of other sizes."""
+
+    def band(numbers: Iterable[Number], least: float = LEAST_MARGIN, own: float = 0.0) -> tuple[float, float]:
+        values = np.array([*numbers], dtype=float)
+        values = np.append(values, np.polyval(np.polyfit(sizes, values, 1), size))
+        low, high = values.min(), values.max()
+        margin = MARGIN * (high - low)
+        if margin > 1e-9:  # what is exact is so on every mesh
+            margin = max(margin, least, own * np.abs(values).max())
+        return float(low - margin), float(high + margin)
+
+    failures: dict[str, str] = {}
+    for choice in choices:
+        failures |= choice.failures
+    return replace(
+        choices[0],
+        inside=band((choice.inside for choice in choices), least=0.0),
+        outline=band((choice.outline for choice in choices), least=0.0),
+        errors={
+            load: band((choice.errors[load] for choice in choices), own=LEAST_OF_ERROR) for load in choices[0].errors
+        },
+        young_modulus_error=band(choice.young_modulus_error for choice in choices),
+        poisson_ratio=band(choice.poisson_ratio for choice in choices),
+        extra="" if failures else _band_in_words([choice.extra.split(" ") for choice in choices]),
+        failures=failures,
+    )
+
+
+def _band_in_words(texts: list[list[str]]) -> str:
+    """One text of several that differ in their numbers, given in words."""
+    merged = []
+    for words in zip(*texts):
+        ends = [words[0]] if len(set(words)) == 1 else [min(words, key=float), max(words, key=float)]
+        merged.append(" to ".join(ends))
+    return " ".join(merged)

@@ -1,0 +1,455 @@
+"""Which definition and stiffness to use on a mesh, and how far off it is: solved, with linear kinematics.
+
+Every definition worth a choice is solved on the mesh itself under some loads and compared with the converged reference
+of small strain; a patch test between rollers measures Young's modulus and Poisson's ratio of the network.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from math import inf, nan
+
+import numpy as np
+
+from ..linalg.factors import SingularError
+from ..mechanics.energies import AreaEnergy
+from ..mechanics.moduli import PatchTest
+from ..mesh import Mesh
+from ..problem.geometry import Beam
+from ..problem.loads import LOADS, LoadKind
+from ..problem.materials import Material
+from ..problem.quantities import nearest
+from ..problem.status import Status
+from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
+from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
+from ..scene.sheet import Sheet
+from ..springs import DefinitionError, Springs
+
+PREDICTED = tuple(name for name, load in LOADS.items() if not load.follower)
+"""Loads that can be predicted, keys of `springtune.problem.loads.LOADS`: all but those that turn with the side that
+they act on, which linear kinematics do not tell from the others."""
+
+CASES = ("traction", "bending", "shear")
+"""Loads that are predicted where none are named."""
+
+SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
+"""Sides [m] and aspect ratio beyond which a beam is taken for an error of units: atoms are next, the Earth is no
+larger, and more slender beams are beyond what the references of bending resolve."""
+
+ON_TRIANGLES = ("patch", "lattice", "van-gelder", "oriented", "delingette", "area", "patch-area")
+"""Definitions that are tried on triangles, springs alone first: of all that need no tuning, those that are the best one
+by their worst load on many beams; without any of them the choice is worse by points of percent."""
+
+ON_QUADS = ("patch", "baudet", "element-fit", "area")
+"""As `ON_TRIANGLES`, on meshes that have quadrilaterals. On rectangles a patch test changes nothing."""
+
+NEED_ENERGIES = ("delingette", "area", "patch-area")
+"""Those of them that need more than springs."""
+
+ALIKE = 1e-5
+"""Difference of stiffnesses, relative, below which they are one: they are shown with five digits."""
+
+SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
+"""Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
+
+
+Number = float | tuple[float, float]
+"""A number, or the two bounds of a band."""
+
+References = dict[str, ReferenceSolution | str]
+"""References of 1 N by load, or why there is none."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A definition on a mesh: its stiffness, and what it gets wrong there.
+
+    Numbers are those of the mesh. Where it is too large to solve they are bands, pairs of a lower and an upper bound.
+
+    Attributes
+    ----------
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    inside, outline : float
+        Stiffness of the sides of cells inside and on the outline [N/m]; NaN where they differ from one to the next.
+    extra : str
+        What there is besides these springs.
+    energies : bool
+        Whether a simulator needs more than springs for it.
+    errors : dict of str to float
+        Deformation error by load, linear kinematics against the reference of small strain, (network - reference) /
+        abs(reference) [1]: above zero where the network is too soft, but below under compression and pressure, whose
+        displacements are negative. NaN where there is none, because of the reference or for the reason in `failures`.
+    young_modulus_error : float
+        Young's modulus along x between rollers over the material's, less one [1].
+    poisson_ratio : float
+        Poisson's ratio there [1].
+    failures : dict of str to str
+        What has no number on this mesh, a load, the ``"patch test"`` or the ``"springs"`` themselves, and why: the
+        network is unstable or singular at rest, or too ill-conditioned, or the definition refuses the mesh.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+    >>> choices = st.predict(beam, st.make_mesh(beam, "structured", "5 mm"), steel)
+    >>> [choice.definition for choice in choices if not choice.energies]
+    ['patch', 'van-gelder', 'lattice', 'oriented']
+    >>> best = choices[0]
+    >>> print(f"{best.inside:.4g} N/m inside, {best.outline:.4g} N/m on the outline, {best.extra}")
+    1.742e+08 N/m inside, 8.71e+07 N/m on the outline, area energy, K_A = -1.078e+04 MPa; 0.93393 times area
+    >>> print(*(f"{load} {100 * error:+.1f} %," for load, error in best.errors.items()))
+    traction +0.4 %, bending -6.3 %, shear +1.6 %,
+    >>> print(f"{100 * best.worst:.1f} % at worst; E off by {100 * abs(best.young_modulus_error):.1f} %, "
+    ...       f"nu = {best.poisson_ratio:.3f}")
+    6.3 % at worst; E off by 0.0 %, nu = 0.345
+    """
+
+    definition: str
+    inside: Number
+    outline: Number
+    extra: str
+    energies: bool
+    errors: dict[str, Number]
+    young_modulus_error: Number
+    poisson_ratio: Number
+    failures: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def worst(self) -> float:
+        """Largest size of an error under the loads that have a reference [1]; infinite where the network fails."""
+        errors = np.abs([np.broadcast_to(error, 2) for error in self.errors.values()])
+        return inf if self.failures or np.isnan(errors).all() else float(np.nanmax(errors))
+
+
+def check_beam(beam: Beam) -> None:
+    """Refuse a beam that is none: larger than any, smaller than atoms, or more slender than its references resolve.
+
+    Parameters
+    ----------
+    beam : Beam
+
+    Raises
+    ------
+    ValueError
+    """
+    is_a(beam, Beam, "beam", A_BEAM)
+    sides = {"long": beam.length, "high": beam.height, "thick": beam.thickness}
+    for word, side in sides.items():
+        if not SHORTEST_SIDE <= side <= LONGEST_SIDE:
+            remedy = f"give {1e3 * SHORTEST_SIDE:g} to {1e3 * LONGEST_SIDE:g} mm, or correct its unit"
+            raise ValueError(f"beam {beam.name!r}: is {1e3 * side:.6g} mm {word}, which no beam is; {remedy}")
+    slenderness = max(beam.length, beam.height) / min(beam.length, beam.height)
+    if slenderness > MOST_SLENDER:
+        raise ValueError(
+            f"beam {beam.name!r}: one side is {slenderness:.3g} times the other, and at most {MOST_SLENDER:g} times "
+            "has a reference; such shapes are for beam theory"
+        )
+
+
+def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
+    """Loads, each once.
+
+    Parameters
+    ----------
+    loads : iterable of str
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    ValueError
+        If there are none, or one cannot be predicted.
+    """
+    if isinstance(loads, str) or not isinstance(loads, Iterable):
+        raise ValueError(f"loads: {loads!r} is no list of loads; give one such as {list(CASES)}")
+    names = tuple(loads)
+    for name in names:
+        if name not in PREDICTED:
+            raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), PREDICTED)}")
+    if not names:
+        raise ValueError(f"loads: none; give some of {', '.join(PREDICTED)}")
+    return tuple(dict.fromkeys(names))
+
+
+def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> References:
+    """References of loads.
+
+    Parameters
+    ----------
+    beam : Beam
+    material : Material
+    loads : iterable of str, optional
+        Of `PREDICTED`.
+
+    Returns
+    -------
+    dict of str to ReferenceSolution or str
+        For 1 N, by load; where there is none the reason.
+
+    Raises
+    ------
+    ValueError
+        If the beam is none, or a load cannot be predicted.
+    """
+    check_beam(beam)
+    found: dict[LoadKind, ReferenceSolution | str] = {}
+    names = check_loads(loads)
+    for kind in (LOADS[load].kind for load in names):
+        if kind not in found:
+            try:
+                found[kind] = solve_small_strain(beam, material, 1.0, kind=kind)
+            except ReferenceNotConvergedError as error:
+                found[kind] = str(error)
+    return {load: found[LOADS[load].kind] for load in names}
+
+
+def predict(
+    beam: Beam, mesh: Mesh, material: Material, known: References | None = None, *, loads: Iterable[str] = CASES
+) -> list[Choice]:
+    """Choices for a mesh, solved on it, the best one by its worst load first.
+
+    Parameters
+    ----------
+    beam : Beam
+    mesh : Mesh
+        That fills the beam.
+    material : Material
+    known : dict, optional
+        What `springtune.prediction.references` gave for the beam, the material and the loads.
+    loads : iterable of str, optional
+        Loads that count: of traction, compression, bending, shear and pressure.
+
+    Returns
+    -------
+    list of Choice
+        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last.
+
+    Raises
+    ------
+    ValueError
+        If an argument is none, the mesh does not fill the beam, or a load cannot be predicted.
+    DefinitionError
+        If none of them can live on the mesh.
+
+    Notes
+    -----
+    Each number is that of a scene of the same beam, mesh, material, load and definition, solved with linear kinematics.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> best = st.predict(beam, mesh, steel)[0]
+    >>> print(f"{best.definition}: {100 * best.worst:.1f} % at worst")
+    patch-area: 6.3 % at worst
+    >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.definition, kinematics="linear")
+    >>> print(f"{100 * best.errors['bending']:.4f} %, {100 * scene.solve().error:.4f} %")
+    -6.3087 %, -6.3087 %
+
+    A part that is pulled, and pressed upon:
+
+    >>> best = st.predict(beam, mesh, steel, loads=["traction", "pressure"])[0]
+    >>> print(best.definition, *(f"{load} {100 * error:+.2f} %" for load, error in best.errors.items()))
+    delingette traction -0.09 % pressure +0.05 %
+    """
+    check_beam(beam)
+    is_a(mesh, Mesh, "mesh", A_MESH)
+    is_a(material, Material, "material", A_MATERIAL)
+    check_filled(mesh, beam)
+    loads = check_loads(loads)
+    missing = [load for load in loads if known is not None and not (isinstance(known, dict) and load in known)]
+    if missing:
+        raise ValueError(
+            f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
+        )
+    known = references(beam, material, loads) if known is None else known
+    tried = TriedMesh(mesh, beam, material, {load: known[load] for load in loads})
+    choices = [tried.choice(name) for name in tried.names]
+    choices += [tried.failed(name) for name in tried.failures]
+    if not tried.names and all("springs" in found for found in tried.failures.values()):
+        raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
+    return sorted(choices, key=lambda choice: choice.worst)
+
+
+class TriedMesh:
+    """A mesh on which definitions are solved; networks that differ in their reference stiffness alone once.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    beam : Beam
+    material : Material
+    known : dict
+        References of the loads that count.
+
+    Attributes
+    ----------
+    names : list of str
+        Definitions that give springs here, those of the same springs once.
+    same : dict of str to str
+        By definition that gives springs the one of `names` whose springs they are.
+    failures : dict of str to dict of str to str
+        By definition that gives none: as `Choice.failures`.
+    """
+
+    def __init__(self, mesh: Mesh, beam: Beam, material: Material, known: References) -> None:
+        self.mesh, self.beam, self.material, self.known = mesh, beam, material, known
+        # Loads that hold the same follow each other.
+        self._sheet = Sheet(mesh, beam.thickness, networks=1)
+        self._test = PatchTest(mesh)
+        self._displacements: dict[tuple[LoadKind, tuple[bytes, ...]], float | str] = {}
+        self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
+        self._springs: dict[str, Springs] = {}
+        self.failures: dict[str, dict[str, str]] = {}
+        self.same: dict[str, str] = {}
+        first: dict[tuple[object, ...], str] = {}  # of each springs
+        for name in ON_QUADS if len(mesh.quads) else ON_TRIANGLES:
+            try:
+                springs = self._sheet.derive(name, material)[0]
+            except DefinitionError as error:
+                self.failures[name] = {"springs": str(error)}
+            except SingularError as error:
+                self.failures[name] = {"patch test": f"unstable: {error}"}
+            else:
+                # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
+                label = f"{springs.reference:.9g}", *_key(springs)
+                self.same[name] = first.setdefault(label, name)
+                if self.same[name] == name:
+                    self._springs[name] = springs
+        self.names = list(self._springs)
+
+    def springs(self, name: str) -> Springs:
+        """Springs of a definition.
+
+        Parameters
+        ----------
+        name : str
+            Of `names`.
+
+        Returns
+        -------
+        Springs
+        """
+        return self._springs[name]
+
+    def error(self, name: str, load: str) -> float | str:
+        """Error of a definition under a load [1]; NaN where that has no reference; why the network has none.
+
+        Parameters
+        ----------
+        name : str
+            Of `names`.
+        load : str
+
+        Returns
+        -------
+        float or str
+        """
+        springs, kind, known = self._springs[name], LOADS[load].kind, self.known[load]
+        key = kind, _key(springs)
+        if key not in self._displacements:
+            self._displacements[key] = self._displacement(springs, kind)
+        displacement = self._displacements[key]
+        if isinstance(displacement, str):
+            return displacement
+        if isinstance(known, str):
+            return nan
+        return float(LOADS[load].sign * (displacement / (springs.reference * known.displacement) - 1))
+
+    def choice(self, name: str) -> Choice:
+        """What a definition is worth.
+
+        Parameters
+        ----------
+        name : str
+            Of `names`.
+
+        Returns
+        -------
+        Choice
+        """
+        springs = self._springs[name]
+        found = {load: self.error(name, load) for load in self.known}
+        errors: dict[str, Number] = {load: nan if isinstance(error, str) else error for load, error in found.items()}
+        failures = {load: error for load, error in found.items() if isinstance(error, str)}
+        key = _key(springs)
+        if key not in self._moduli:
+            try:
+                self._moduli[key] = self._test.axial(springs)
+            except SingularError as error:
+                self._moduli[key] = f"unstable: {error}"
+        moduli = self._moduli[key]
+        if isinstance(moduli, str):
+            failures["patch test"] = moduli
+            moduli = nan, nan
+        young = moduli[0] * springs.reference / (self.material.young_modulus * self.beam.thickness)
+        return Choice(
+            name,
+            *self._parts(name, springs),
+            bool(springs.energies),
+            errors=errors,
+            young_modulus_error=float(young) - 1,
+            poisson_ratio=float(moduli[1]),
+            failures=failures,
+        )
+
+    def failed(self, name: str) -> Choice:
+        """Choice of a definition that gives no springs here.
+
+        Parameters
+        ----------
+        name : str
+            Of `failures`.
+
+        Returns
+        -------
+        Choice
+        """
+        errors: dict[str, Number] = dict.fromkeys(self.known, nan)
+        return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
+
+    def _displacement(self, springs: Springs, kind: LoadKind) -> float | str:
+        """Displacement of a load for unit force over reference stiffness [1], or why there is none."""
+        try:
+            found = self._sheet.solve(kind, springs, springs.reference, "linear")
+        except SingularError as error:
+            return f"unstable: {error}"
+        return found.displacement if found.status is Status.SOLVED else found.message
+
+    def _parts(self, name: str, springs: Springs) -> tuple[float, float, str]:
+        """Stiffness of sides inside and on the outline, and in words what else there is."""
+        outline, several = self.mesh.on_outline, self.mesh.cells_per_edge > 1
+        inside, at_outline, diagonals = (
+            self._common(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
+        )
+        extra = list(self._terms(springs))
+        if len(self.mesh.quads):
+            extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
+        plain = {"patch": "lattice", "patch-area": "area"}.get(name)
+        if plain and not len(self.mesh.quads):
+            scale = springs.reference / self._sheet.derive(plain, self.material)[0].reference
+            extra.append(f"{scale:.5f} times {plain}")
+        return inside, at_outline, "; ".join([*(() if springs.energies else ("none",)), *extra])
+
+    def _terms(self, springs: Springs) -> Iterator[str]:
+        """Energies in words."""
+        for energy in springs.energies:
+            if isinstance(energy, AreaEnergy):
+                modulus = self._common(springs.reference * energy.modulus) / self.beam.thickness
+                yield f"area energy, K_A = {1e-6 * modulus:.4g} MPa"
+            else:
+                yield "coupling of the sides of each triangle"
+
+    @staticmethod
+    def _common(values: np.ndarray) -> float:
+        """The one that all values are, NaN where they differ."""
+        alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
+        return float(np.median(values)) if alike else nan
+
+
+def _key(springs: Springs) -> tuple[bytes, ...]:
+    """What tells networks apart but for their reference stiffness."""
+    return springs.relative.tobytes(), *(energy.key for energy in springs.energies)

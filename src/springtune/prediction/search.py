@@ -1,0 +1,552 @@
+"""Which mesh keeps an error: the coarsest one of each type, found by solving.
+
+Errors do not fall evenly with the mesh size: the error of one load may pass through zero, and whole numbers of cells
+stretch a mesh now more, now less. So a mesh is not taken because it happens to keep the error. It is taken with a
+definition that keeps it there and on every finer mesh of its type that was tried, up to one with at least twice as many
+cells across the beam, two finer ones at least; and that would still keep it there if its error changed once more by as
+much as it did over the last doubling of the cells, so that it is not just passing by zero.
+"""
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count, takewhile
+
+import numpy as np
+from scipy.sparse.linalg import ArpackError
+
+from ..mechanics.dynamics import Motion, masses
+from ..mechanics.network import Network
+from ..mesh import MESH_TYPES, Mesh
+from ..problem.geometry import Beam
+from ..problem.loads import LOADS
+from ..problem.materials import Material
+from ..problem.quantities import nearest
+from ..scene.meshes import A_MATERIAL, check_filled, is_a
+from ..scene.sheet import Sheet
+from ..springs import Springs
+from ..units import parse
+from .bands import FEWEST_CELLS
+from .choices import (
+    CASES,
+    NEED_ENERGIES,
+    ON_QUADS,
+    ON_TRIANGLES,
+    SOLVED,
+    Choice,
+    References,
+    TriedMesh,
+    check_beam,
+    check_loads,
+    references,
+)
+
+ENOUGH_FINER, FEWEST_FINER = 2.0, 2
+"""Cells across the finest mesh that was tried over those of the one that is taken, and how many finer ones were, at
+least."""
+
+LEFT_TO_GO = 1.5
+"""What may be left of an error's way to its limit, over what is left of one in proportion to the mesh size."""
+
+
+EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
+"""Cells across up to which every number of them is tried; steps by which they double beyond that; and numbers that are
+tried between two of these, where the coarsest mesh is."""
+
+DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
+"""Definitions of which some live on each mesh."""
+
+SPRINGS_ALONE = tuple(name for name in DEFINITIONS_TRIED if name not in NEED_ENERGIES)
+"""Definitions that need nothing but springs."""
+
+SIZE_DIGITS = 4
+"""Digits of a mesh size [mm], so that the one that is printed makes the same mesh."""
+
+
+@dataclass(frozen=True)
+class SolvedMesh:
+    """A mesh that was tried.
+
+    Attributes
+    ----------
+    mesh_type : str
+        Key of `springtune.MESH_TYPES`.
+    size : float
+        Length of an edge [m].
+    cells : int
+        Cells across the beam's smaller side, about.
+    particles, springs : int
+    errors : dict of str to dict of str to float
+        By definition that was tried, the error under each load [1]; NaN where the network fails.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> coarsest = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).tried[0]
+    >>> coarsest.cells, coarsest.particles, f"{100 * coarsest.worst('patch'):.1f} %"
+    (1, 13, '63.3 %')
+    """
+
+    mesh_type: str
+    size: float
+    cells: int
+    particles: int
+    springs: int
+    errors: dict[str, dict[str, float]]
+
+    def worst(self, definition: str) -> float:
+        """Largest size of the errors of a definition [1]; infinite where it fails under a load, or was not tried.
+
+        Parameters
+        ----------
+        definition : str
+
+        Returns
+        -------
+        float
+        """
+        sizes = [abs(error) for error in self.errors.get(definition, {}).values()]
+        return math.inf if not sizes or any(size != size for size in sizes) else max(sizes)
+
+
+@dataclass(frozen=True)
+class MeshChoice:
+    """A mesh and a definition that keep an error, and what they cost.
+
+    Attributes
+    ----------
+    mesh_type : str
+        Key of `springtune.MESH_TYPES`.
+    size : float
+        Length of an edge [m].
+    cells : int
+        Cells across the beam's smaller side, about.
+    choice : Choice
+        The definition, its stiffness and its errors.
+    particles, springs : int
+    seconds : float
+        That one static solve takes with linear kinematics, springs at hand, the longest of the loads'; measured once.
+    step_limit : float
+        Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which is the least of
+        all supports; NaN where the material has no density, or the eigenvalue could not be found.
+    finer : tuple of SolvedMesh
+        Finer meshes that were tried, on each of which the definition keeps the error, too.
+    confirmed : bool
+        Whether these are enough: two at least, up to one with twice as many cells across, and the error would be kept
+        even if it changed once more by as much as over the last doubling.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> best = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).best
+    >>> best.size, best.cells, best.particles, best.confirmed
+    (0.009238, 5, 141, True)
+    >>> [finer.cells for finer in best.finer]
+    [6, 7, 8, 9, 10]
+    >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
+    >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
+    >>> print(f"{100 * best.choice.errors['bending']:.3f} %, {100 * scene.solve().error:.3f} %")
+    -3.675 %, -3.675 %
+    """
+
+    mesh_type: str
+    size: float
+    cells: int
+    choice: Choice
+    particles: int
+    springs: int
+    seconds: float
+    step_limit: float
+    finer: tuple[SolvedMesh, ...] = field(repr=False)
+    confirmed: bool
+
+    @property
+    def _rank(self) -> tuple[bool, int, int, float]:
+        return not self.confirmed, self.particles, self.springs, self.choice.worst
+
+
+@dataclass(frozen=True)
+class MeshSearch:
+    """Which meshes keep an error, as `find_mesh` found it.
+
+    Attributes
+    ----------
+    error : float
+        What is to be kept [1].
+    loads : tuple of str
+        Under which.
+    most : int
+        Particles of the largest mesh that may be tried.
+    known : dict
+        Reference of 1 N by load.
+    by_type : dict of str to MeshChoice or None
+        By mesh type the coarsest mesh, with whatever definition keeps the error; None where none does up to `most`
+        particles. Where too few finer ones are as small, one that is not `MeshChoice.confirmed`.
+    springs_by_type : dict of str to MeshChoice or None
+        As `by_type`, with springs alone.
+    tried : tuple of SolvedMesh
+        All that was solved, each type from coarse to fine.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    >>> search = st.find_mesh(beam, steel, "5 %", mesh_types=["structured", "right"])
+    >>> search.best.mesh_type, search.best.choice.definition
+    ('structured', 'lattice')
+    >>> {name: found and found.choice.definition for name, found in search.springs_by_type.items()}
+    {'structured': 'lattice', 'right': None}
+    """
+
+    error: float
+    loads: tuple[str, ...]
+    most: int
+    known: References = field(repr=False)
+    by_type: dict[str, MeshChoice | None]
+    springs_by_type: dict[str, MeshChoice | None]
+    tried: tuple[SolvedMesh, ...] = field(repr=False)
+
+    @property
+    def best(self) -> MeshChoice | None:
+        """The one of least particles of all types, confirmed ones first; None where none keeps the error."""
+        return self._least(self.by_type)
+
+    @property
+    def best_springs(self) -> MeshChoice | None:
+        """The one of least particles that has springs alone; None where none keeps the error."""
+        return self._least(self.springs_by_type)
+
+    @staticmethod
+    def _least(found: dict[str, MeshChoice | None]) -> MeshChoice | None:
+        there = [one for one in found.values() if one]
+        return min(there, key=lambda one: one._rank) if there else None
+
+
+def asked_error(value: float | str) -> float:
+    """Error that is to be kept [1].
+
+    Parameters
+    ----------
+    value : float or str
+        A fraction such as 0.01, or a text such as ``"1 %"``.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If it is none above 0 and below 1.
+
+    Examples
+    --------
+    >>> asked_error("1 %"), asked_error(0.01)
+    (0.01, 0.01)
+    """
+    number = math.nan
+    if isinstance(value, str):
+        text = value.strip()
+        try:
+            number = float(text.removesuffix("%")) / 100 if text.endswith("%") else math.nan
+        except ValueError:
+            pass
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value) if abs(value) < 1 else math.nan
+    if not 0 < number < 1:
+        raise ValueError(f"error: {value!r} is no error above 0 and below 100 %; give one such as '1 %'")
+    return number
+
+
+def find_mesh(
+    beam: Beam,
+    material: Material,
+    error: float | str,
+    *,
+    loads: Iterable[str] = CASES,
+    mesh_types: Sequence[str] | None = None,
+    most: int = SOLVED,
+) -> MeshSearch:
+    """Coarsest mesh of each type on which a definition keeps an error, found by solving.
+
+    Parameters
+    ----------
+    beam : Beam
+    material : Material
+    error : float or str
+        Largest size of an error to keep, a fraction or a text such as ``"1 %"``.
+    loads : iterable of str, optional
+        Loads under which it is to be kept: of traction, compression, bending, shear and pressure.
+    mesh_types : sequence of str, optional
+        Keys of `springtune.MESH_TYPES`; all without.
+    most : int, optional
+        Particles of the largest mesh that may be tried.
+
+    Returns
+    -------
+    MeshSearch
+
+    Raises
+    ------
+    ValueError
+        If an argument is none or unknown, a load has no reference, or the error is below what the reference's own error
+        estimate allows.
+
+    Notes
+    -----
+    Of each type meshes are solved from one cell across the beam's smaller side on, every number of cells up to 16 and
+    four for each doubling beyond, until a definition has kept the error on all meshes from one of them on up to another
+    that has at least twice as many cells across, and would keep it if it changed once more by as much as over the last
+    doubling. Beyond 16 cells meshes between that one and the next coarser one are
+    tried, too, from the finer end. A definition is given up where its error, by its change over the last doubling, will
+    be too large on the finest mesh as well. Meshes are ranked by their particles, and to the size of each error the
+    error estimate of its reference is added. Kinematics are linear.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
+    >>> search = st.find_mesh(beam, steel, "2 %", loads=["traction", "bending"], mesh_types=["structured"])
+    >>> best = search.best
+    >>> print(f"{best.mesh_type} {1e3 * best.size:g} mm, {best.choice.definition}: {best.particles} particles")
+    structured 5.774 mm, lattice: 328 particles
+    >>> print(f"at worst {100 * best.choice.worst:.1f} %, steps up to {1e9 * best.step_limit:.0f} ns")
+    at worst 2.0 %, steps up to 716 ns
+    >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=500).best is None
+    True
+    """
+    check_beam(beam)
+    is_a(material, Material, "material", A_MATERIAL)
+    wanted, loads = asked_error(error), check_loads(loads)
+    names = tuple(MESH_TYPES) if mesh_types is None else _mesh_types(mesh_types)
+    if not (isinstance(most, int) and most > 0):
+        raise ValueError(f"most: {most!r} is no number of particles; give one such as {SOLVED}")
+    known = references(beam, material, loads)
+    estimates = {}
+    for load, found in known.items():
+        if isinstance(found, str):
+            raise ValueError(f"loads: {load!r} has no reference, so no error can be kept: {found}")
+        estimates[load] = found.error_estimate
+    if wanted <= max(estimates.values()):
+        least = f"{200 * max(estimates.values()):.1g} %"
+        raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")
+    searches = [_TypeSearch(name, beam, material, known, estimates, wanted, most) for name in names]
+    for search in searches:
+        search.climb()
+    return MeshSearch(
+        wanted,
+        loads,
+        most,
+        known,
+        {search.name: search.found(springs_alone=False) for search in searches},
+        {search.name: search.found(springs_alone=True) for search in searches},
+        tuple(one for search in searches for one in search.solved()),
+    )
+
+
+def _mesh_types(names: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise ValueError(f"mesh types: {names!r} is no list of them; give one such as ['structured', 'free']")
+    chosen = tuple(names)
+    for name in chosen:
+        if not (isinstance(name, str) and name in MESH_TYPES):
+            raise ValueError(f"mesh types: {name!r} is unknown; {nearest(str(name), MESH_TYPES)}")
+    if not chosen:
+        raise ValueError(f"mesh types: none; give some of {', '.join(MESH_TYPES)}")
+    return tuple(dict.fromkeys(chosen))
+
+
+def _cells(rung: int) -> int:
+    """Cells across of the meshes that are tried first: 1, 2, 3, ..., 15, 16, 20, 23, 27, 32, 39, ..."""
+    return (
+        rung + 1 if rung < EVERY_UP_TO else math.ceil(EVERY_UP_TO * 2 ** ((rung + 1 - EVERY_UP_TO) / STEPS_A_DOUBLING))
+    )
+
+
+def _number(error: float | str) -> float:
+    return math.nan if isinstance(error, str) else error
+
+
+class _TypeSearch:
+    """Meshes of one type, by the number of cells across; each solved once."""
+
+    def __init__(
+        self,
+        name: str,
+        beam: Beam,
+        material: Material,
+        known: References,
+        estimates: dict[str, float],
+        error: float,
+        most: int,
+    ) -> None:
+        self.name, self.beam, self.material, self.known, self.error = name, beam, material, known, error
+        self._type, self._estimates, self._most = MESH_TYPES[name], estimates, most
+        self._tried: dict[int, SolvedMesh] = {}  # by cells across
+        self._found: dict[tuple[int, str], MeshChoice] = {}
+        self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
+
+    def climb(self) -> None:
+        """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
+        for rung in count():
+            # Where the first question is answered, the other one is of springs alone.
+            asked = DEFINITIONS_TRIED if self._start(springs_alone=False) is None else SPRINGS_ALONE
+            names = [name for name in asked if self._promising(name)]
+            answered = self._start(springs_alone=True) is not None
+            cells = _cells(rung)
+            if answered or not names or (cells not in self._tried and not self._try(cells, names)):
+                break
+        for alone in (False, True):
+            self._look_between(alone)
+
+    def size(self, cells: int) -> float:
+        """Mesh size [m] of so many cells across the beam's smaller side, rounded up."""
+        length, height = self.beam.length, self.beam.height
+        side = min(length, height)
+        exact = 1e3 * (height / self._type.row_height if height <= length else length) / cells
+        digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
+        # By its text, as the option of a command has it; what is a hair above a digit is that digit.
+        return min(side, parse(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm", "length"))
+
+    def _particles(self, cells: int) -> float:
+        return self._type.particles(self.beam.length, self.beam.height, self.size(cells))
+
+    def solved(self) -> list[SolvedMesh]:
+        """All that was tried, from coarse to fine."""
+        return [self._tried[cells] for cells in sorted(self._tried)]
+
+    def found(self, springs_alone: bool) -> MeshChoice | None:
+        """The coarsest mesh that is taken, and what it costs; None where there is none."""
+        sure = self._start(springs_alone)
+        start = sure or self._start(springs_alone, confirmed=False)
+        if start is None:
+            return None
+        cells, names = start
+        one = self._tried[cells]
+        name = min(names, key=one.worst)
+        if (cells, name) not in self._found:
+            mesh = self._type(self.beam.length, self.beam.height, one.size)
+            tried = TriedMesh(mesh, self.beam, self.material, self.known)
+            self._found[cells, name] = MeshChoice(
+                self.name,
+                one.size,
+                cells,
+                tried.choice(name),
+                one.particles,
+                one.springs,
+                *_cost(mesh, self.beam, self.material, tried.springs(name), list(self.known)),
+                tuple(self._tried[finer] for finer in self._on(name) if finer > cells),
+                sure is not None,
+            )
+        return self._found[cells, name]
+
+    def _try(self, cells: int, names: Sequence[str]) -> bool:
+        """Solve definitions on a mesh; whether it is not too large."""
+        if self._particles(cells) > self._most:
+            return False
+        size = self.size(cells)
+        mesh = self._type(self.beam.length, self.beam.height, size)
+        check_filled(mesh, self.beam)
+        particles = len(mesh.points)
+        if any((particles > one.particles) != (cells > other) for other, one in self._tried.items()):
+            return True  # no mesh of its own between its neighbours
+        tried = TriedMesh(mesh, self.beam, self.material, self.known)
+        errors = {
+            name: {load: _number(tried.error(same, load)) for load in self.known}
+            for name, same in tried.same.items()
+            if name in names
+        }
+        errors |= {name: dict.fromkeys(self.known, math.nan) for name in tried.failures if name in names}
+        self._tried[cells] = SolvedMesh(self.name, size, cells, particles, len(mesh.edges), errors)
+        return True
+
+    def _keeps(self, name: str, cells: int) -> bool:
+        """Whether a definition keeps the error on a mesh, even if the reference is off by its estimate."""
+        errors = self._tried[cells].errors[name]
+        return all(abs(error) + self._estimates[load] <= self.error for load, error in errors.items())  # not NaN
+
+    def _on(self, name: str) -> list[int]:
+        """Cells across the meshes that a definition was tried on, ascending."""
+        return [cells for cells in sorted(self._tried) if name in self._tried[cells].errors]
+
+    def _promising(self, name: str) -> bool:
+        """Whether a definition may keep the error on the finest mesh, as far as the last ones tell.
+
+        An error that changes in proportion to the mesh size changes from n cells to m by the 1 - n/m of what it changed
+        by from n/2 to n, and by less if in proportion to a higher power.
+        """
+        on = self._on(name)
+        doubling = self._doubling(name)
+        if doubling is None or ENOUGH_FINER * FEWEST_CELLS > on[-1]:
+            return bool(on) or not self._tried
+        left = LEFT_TO_GO * (1 - on[-1] / self._finest)
+        before, last = doubling
+        if any(before[load] != before[load] and last[load] != last[load] for load in last):
+            return False
+        return not any(abs(last[load]) - left * abs(last[load] - before[load]) > self.error for load in last)
+
+    def _steady(self, name: str) -> bool:
+        """Whether a definition would keep the error if it changed once more by as much as over the last doubling."""
+        doubling = self._doubling(name)
+        if doubling is None:
+            return False
+        before, last = doubling
+        return all(abs(2 * last[load] - before[load]) <= self.error for load in last)
+
+    def _doubling(self, name: str) -> tuple[dict[str, float], dict[str, float]] | None:
+        """Errors on a mesh of half as many cells across as the finest one that was tried, or fewer, and on that."""
+        on = self._on(name)
+        coarser = [cells for cells in on if ENOUGH_FINER * cells <= on[-1]]
+        if not coarser:
+            return None
+        return self._tried[coarser[-1]].errors[name], self._tried[on[-1]].errors[name]
+
+    def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
+        """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
+        starts: dict[int, list[str]] = {}
+        for name in SPRINGS_ALONE if springs_alone else DEFINITIONS_TRIED:
+            kept = list(takewhile(partial(self._keeps, name), reversed(self._on(name))))
+            # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
+            taken = [cells for cells in kept[FEWEST_FINER:] if ENOUGH_FINER * cells <= kept[0]] if confirmed else kept
+            if taken and (not confirmed or self._steady(name)):
+                starts.setdefault(taken[-1], []).append(name)
+        return min(starts.items()) if starts else None
+
+    def _look_between(self, springs_alone: bool) -> None:
+        """Try the meshes between the coarsest one that is taken and the next coarser one that was tried."""
+        start = self._start(springs_alone)
+        if start is None:
+            return
+        upper, names = start
+        lower = max((cells for cells in self._tried if cells < upper), default=upper)
+        steps = (round(lower * (upper / lower) ** (step / (TRIED_BETWEEN + 1))) for step in range(TRIED_BETWEEN, 0, -1))
+        for cells in dict.fromkeys(steps):
+            if cells in self._tried:
+                continue
+            self._try(cells, names)
+            if cells in self._tried:
+                names = [name for name in names if self._keeps(name, cells)]
+                if not names:
+                    return
+
+
+def _cost(mesh: Mesh, beam: Beam, material: Material, springs: Springs, loads: list[str]) -> tuple[float, float]:
+    """Seconds of the longest static solve of some loads, and the largest stable explicit step [s]."""
+    seconds = 0.0
+    for kind in {LOADS[load].kind: None for load in loads}:
+        sheet = Sheet(mesh, beam.thickness)
+        begin = time.perf_counter()
+        sheet.solve(kind, springs, springs.reference, "linear")
+        seconds = max(seconds, time.perf_counter() - begin)
+    if material.density is None:
+        return seconds, math.nan
+    inertia = masses(mesh, material.density, beam.thickness) / springs.reference
+    free = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
+    try:
+        return seconds, Motion(free, inertia).step_limit("central-difference")
+    except ArpackError:
+        return seconds, math.nan
