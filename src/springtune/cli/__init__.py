@@ -29,6 +29,7 @@ COMMANDS = {
     "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
+    "accept": Row(RESULTS, "accept", "accept", "Keep values and curves as right, or say what departs from them."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
     "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
     "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,9 +65,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 )
 @click.argument("before")
 @click.argument("after")
-@click.option(
-    "--relative", callback=tolerance, default="1e-6", show_default=True, help="Tolerance of the larger number."
-)
+@click.option("--relative", callback=tolerance, help="Tolerance of the larger number.  [default: 1e-6]")
 @click.option(
     "--absolute", callback=tolerance, help="Tolerance in SI units.  [default: 0; of numbers without unit, --relative]"
 )
@@ -80,7 +78,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 def diff(
     before: str,
     after: str,
-    relative: float,
+    relative: float | None,
     absolute: float | None,
     groups: tuple[str, ...],
     ignored: tuple[str, ...],
@@ -98,60 +96,103 @@ def diff(
 
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
-    from ..output import comparison, reading
+    from ..output import comparison, expected, reading
 
-    paths = [_found(before), _found(after)]
     try:
+        paths = [dataset_path(before), dataset_path(after)]
         with ExitStack() as stack:
-            one, other = (stack.enter_context(_opened(path)) for path in paths)
+            one, other = (stack.enter_context(opened(path)) for path in paths)
             stack.enter_context(reading.guarded(f"{paths[0]}, {paths[1]}"))
+            kept = expected.ACCEPTED in one.attrs
+            if expected.ACCEPTED in other.attrs:
+                raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
+            if kept and (relative is not None or absolute is not None):
+                raise ValueError(f"{paths[0]}: has its own tolerances; leave --relative and --absolute out, or edit it")
+            given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
             found = comparison.compare(
-                one, other, comparison.Tolerance(relative, absolute), groups, ignored, None if every else rows
-            )
+                one, other, None if kept else given, groups, ignored, None if every else rows,
+                own=expected.tolerances(one), part=kept,
+            )  # fmt: skip
             if as_json:
                 click.echo(json.dumps(as_dict(found, paths, config), indent=1))
             else:
-                click.echo("\n\n".join("\n".join(part) for part in _parts(found, paths, rows, every, config)))
+                sides = ("accepted", "now") if kept else ("before", "after")
+                click.echo(comparison_text(found, paths, sides, None if every else rows, config))
     except (OSError, ValueError) as error:
         raise Trouble(str(error)) from None
     if found.different:
         raise click.exceptions.Exit(DIFFERENT)
 
 
-def _found(given: str) -> Path:
-    try:
-        return dataset_path(given)
-    except ValueError as error:
-        raise Trouble(str(error)) from None
+@contextmanager
+def opened(path: Path) -> "Iterator[xr.DataTree]":
+    """Open a dataset, or expected values, in a context.
 
+    Parameters
+    ----------
+    path : Path
 
-def _opened(path: Path) -> "xr.DataTree":
-    from ..output import reading
+    Yields
+    ------
+    xarray.DataTree
 
+    Raises
+    ------
+    OSError
+    ValueError
+        If it is neither.
+    """
+    from ..output import expected, reading
+
+    if path.suffix == ".yaml":
+        yield expected.read(path)
+        return
     reading.check_opens(path)
-    return reading.open(path)
+    with reading.open(path) as tree:
+        yield tree
 
 
 # -- text --------------------------------------------------------------------------------------------------------------
 
 
-def _parts(found: "Comparison", paths: Sequence[Path], rows: int, every: bool, config: bool) -> Iterator[list[str]]:
-    """Paragraphs of what changed."""
-    most = None if every else rows
-    yield [f"before: {paths[0]}", f"after:  {paths[1]}", _summary(found)]
+def comparison_text(
+    found: "Comparison", paths: Sequence[Path], sides: Sequence[str], most: int | None = ROWS, config: bool = False
+) -> str:
+    """What changed, as text.
+
+    Parameters
+    ----------
+    found : Comparison
+    paths : sequence of Path
+        Of what was compared.
+    sides : sequence of str
+        What they are called.
+    most : int, optional
+        Rows of each table; None is all.
+    config : bool, optional
+        Whether to show the diff of the studies' files.
+
+    Returns
+    -------
+    str
+    """
+    width = max(map(len, sides)) + 1
+    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(sides, paths)]
+    parts = [[*head, _summary(found, sides)]]
     for group in found.groups:
-        yield from _of_group(group, most)
+        parts += _of_group(group, sides, most)
     changes = found.changes
     if changes:
-        yield _changes(found, changes, most)
+        parts.append(_changes(found, changes, sides, most))
     if found.attributes or found.config:
-        yield _told(found, config)
+        parts.append(_told(found, config))
+    return "\n\n".join("\n".join(part) for part in parts)
 
 
-def _summary(found: "Comparison") -> str:
+def _summary(found: "Comparison", sides: Sequence[str]) -> str:
     """One line on all."""
-    said = [f"group {path} only {side}" for side, own in zip(("before", "after"), found.alone) for path in own]
-    for side, number in (("before", 0), ("after", 1)):
+    said = [f"group {path} only {side}" for side, own in zip(sides, found.alone) for path in own]
+    for number, side in enumerate(sides):
         count = sum(group.cells[number].count for group in found.groups if group.name == "/")
         said += [f"{count} scenes only {side}"] if count else []
     statuses = sum(one.changed for group in found.groups for one in group.flags)
@@ -168,14 +209,14 @@ def _summary(found: "Comparison") -> str:
     return f"the same: {compared} values compared"
 
 
-def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
+def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> Iterator[list[str]]:
     """Paragraphs on labels, cells, variables and statuses of a group."""
     from ..output.alignment import cell_text
 
     what = "scenes" if group.name == "/" else f"cells of {group.name}"
     lines = []
-    for name, sides in group.labels.items():
-        for side, own in zip(("before", "after"), sides):
+    for name, both in group.labels.items():
+        for side, own in zip(sides, both):
             shown = own[:most]
             if own:
                 said = ", ".join(cell_text({name: label}, group.axes) for label in shown)
@@ -184,12 +225,12 @@ def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
                 )
     if lines:
         yield [f"labels of {group.name}", *lines]
-    for side, alone in zip(("before", "after"), group.cells):
+    for side, alone in zip(sides, group.cells):
         if alone.count:
             lines = [f"  {cell_text(_telling(group, labels), group.axes)}" for labels in alone.rows]
             more = [f"  and {alone.count - len(lines)} more; --all shows them"] if alone.count > len(lines) else []
             yield [f"{what} only {side}: {alone.count}", *lines, *more]
-    lines = [f"  {name} only {side}" for side, own in zip(("before", "after"), group.variables) for name in own]
+    lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
     lines += [f"  {name} {why}" for name, why in group.unlike.items()]
     if lines:
         yield [f"variables of {group.name}", *lines]
@@ -206,7 +247,7 @@ def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
             yield [f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}", aligned(rows, 0), *more]
 
 
-def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> list[str]:
+def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
     """What changed of which variables, and the largest changes."""
     from ..output.alignment import cell_text
 
@@ -218,7 +259,7 @@ def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> 
         if one.changed
     ]
     axes = {group.name: group for group in found.groups}
-    rows = [["  variable", "before", "after", "change", "at"]]
+    rows = [["  variable", *sides, "change", "at"]]
     for row in changes[:most]:
         group = axes[row.group]
         at = cell_text(_telling(group, row.labels) | row.point, group.axes)

@@ -81,7 +81,7 @@ def dataset_path(given: str) -> Path:
     Parameters
     ----------
     given : str
-        A dataset, the folder of a study's results, the study's YAML file, or its name.
+        A dataset, the folder of a study's results, the study's YAML file, or its name; or a file of expected values.
 
     Returns
     -------
@@ -95,6 +95,10 @@ def dataset_path(given: str) -> Path:
     """
     path = Path(given)
     if path.suffix in (".yaml", ".yml"):
+        from ..output.expected import is_expected
+
+        if is_expected(path):
+            return path
         path = RESULTS_FOLDER / path.stem
     for file in (path, path / DATASET, RESULTS_FOLDER / path / DATASET):
         if file.is_file():

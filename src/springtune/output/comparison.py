@@ -27,7 +27,10 @@ TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit")
 """Attributes of the root that are told as they are; software, inputs and config are taken apart."""
 
 UNTOLD = {"created", "history", "host", "git_diff", "config", "config_sha256", "software", "inputs", "source"}
-UNTOLD |= {"Conventions", "references"}
+UNTOLD |= {"Conventions", "references", "accepted", "tolerances"}
+
+OF_CELLS = "tolerance"
+"""Variable of relative tolerances by cell."""
 
 AT_ONCE = 2**26
 """Bytes of an array that are compared at once."""
@@ -49,12 +52,6 @@ class Tolerance:
 
     relative: float = RELATIVE
     absolute: float | None = None
-
-    def least(self, units: str) -> float:
-        """Absolute part for numbers of a unit."""
-        if self.absolute is not None:
-            return self.absolute
-        return self.relative if units in ("", "1") else 0.0
 
 
 @dataclass(frozen=True)
@@ -214,6 +211,8 @@ def compare(
     groups: Collection[str] = (),
     ignored: Collection[str] = (),
     most: int | None = None,
+    own: Mapping[str, Tolerance] | None = None,
+    part: bool = False,
     block: int = AT_ONCE,
 ) -> Comparison:
     """Compare two datasets by their labels.
@@ -232,6 +231,12 @@ def compare(
         Names of variables to leave out besides, or patterns such as ``reference_*``.
     most : int, optional
         Most rows that are kept of each variable, and of cells of one side; all without.
+    own : mapping of str to Tolerance, optional
+        Of variables that have one of their own, by `variable_name`; ``""`` is that of all others. A variable `OF_CELLS`
+        of a group of the first dataset is the relative tolerance of its cells, where it is not NaN.
+    part : bool, optional
+        Whether the first dataset is a part: groups and variables that it does not have are not compared, and of what it
+        has more dimensions than the other, that one has the same along them.
     block : int, optional
         Bytes of an array that are compared at once.
 
@@ -250,9 +255,9 @@ def compare(
     >>> found.different
     False
     >>> other = tree.copy(deep=True)
-    >>> other["displacement" if "displacement" in other else "field_error"][0, 0, 0, 0, 0, 0, 0] *= 1.001
-    >>> [(row.variable, row.labels["beam"], round(row.excess)) for row in compare(tree, other).changes]
-    [('field_error', '100x20', 1)]
+    >>> other["stiffness"][0, 0, 0, 0, 0, 0, 0] *= 2
+    >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(tree, other).changes]
+    [('stiffness', '100x20', 2.0)]
     """
     nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in (before, after)]
     if groups:
@@ -262,49 +267,65 @@ def compare(
             raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
         chosen = [{path: data for path, data in own.items() if path in wanted} for own in nodes]
     else:
-        chosen = nodes
+        chosen = [*nodes]
+    if part:
+        chosen[1] = {path: data for path, data in chosen[1].items() if path in chosen[0]}
     shared = [path for path in chosen[0] if path in chosen[1]]
     alone = (
         [path for path in chosen[0] if path not in chosen[1]],
         [path for path in chosen[1] if path not in chosen[0]],
     )
     roots = (nodes[0]["/"], nodes[1]["/"])
-    found = [
-        _Group(path, (nodes[0][path], nodes[1][path]), roots, tolerance or Tolerance(), ignored, most, block).compared()
-        for path in shared
-    ]
-    attributes, config = _attributes(before.attrs, after.attrs)
+    own = own or {}
+    how = _How(tolerance or own.get("", Tolerance()), own, (*MEASURED, *ignored), most, part, block)
+    found = [_Group(path, (nodes[0][path], nodes[1][path]), roots, how).compared() for path in shared]
+    kept = {name: text for name, text in after.attrs.items() if not part or name in before.attrs}
+    attributes, config = _attributes(before.attrs, kept)
     return Comparison(found, alone, attributes, config)
+
+
+def variable_name(group: str, variable: str) -> str:
+    """Name of a variable with its group's, which the root does not have.
+
+    Examples
+    --------
+    >>> variable_name("/", "force"), variable_name("/sensitivity", "displacement")
+    ('force', 'sensitivity/displacement')
+    """
+    return f"{group.strip('/')}/{variable}".lstrip("/")
+
+
+@dataclass(frozen=True)
+class _How:
+    """What is compared, and how."""
+
+    tolerance: Tolerance
+    own: Mapping[str, Tolerance]
+    ignored: Collection[str]
+    most: int | None
+    part: bool
+    block: int
 
 
 class _Group:
     """Comparison of a group that both datasets have."""
 
     def __init__(
-        self,
-        path: str,
-        pair: tuple[xr.Dataset, xr.Dataset],
-        roots: tuple[xr.Dataset, xr.Dataset],
-        tolerance: Tolerance,
-        ignored: Collection[str],
-        most: int | None,
-        block: int,
+        self, path: str, pair: tuple[xr.Dataset, xr.Dataset], roots: tuple[xr.Dataset, xr.Dataset], how: _How
     ) -> None:
-        self.path, self.pair, self.tolerance, self.most, self.block = path, pair, tolerance, most, block
-        self.ignored = (*MEASURED, *ignored)
-        sizes = [dict.fromkeys(map(str, data.sizes)) for data in pair]
-        with_labels = [name for own in sizes for name in own]
-        self.axes = {name: axis(name, pair) for name in dict.fromkeys(with_labels)}
-        self.cell_dimensions = _cell_dimensions(pair, roots)
+        self.path, self.pair, self.how = path, pair, how
+        self.axes = {name: axis(name, pair) for name in dict.fromkeys(str(one) for own in pair for one in own.sizes)}
+        self.cell_dimensions = cell_dimensions(pair, roots)
         self.asked = [_asked(data, root) for data, root in zip(pair, roots)]
 
     def compared(self) -> GroupChanges:
         found = GroupChanges(self.path, self.axes)
         names = [[str(name) for name in data.variables if name not in data.dims] for data in self.pair]
-        left_out = [name for own in names for name in own if any(fnmatchcase(name, one) for one in self.ignored)]
+        left_out = [name for own in names for name in own if any(fnmatchcase(name, one) for one in self.how.ignored)]
+        left_out += [OF_CELLS]
         found.variables = (
             [name for name in names[0] if name not in names[1] and name not in left_out],
-            [name for name in names[1] if name not in names[0] and name not in left_out],
+            [name for name in names[1] if name not in [*names[0], *left_out] and not self.how.part],
         )
         own = all("status" in data for data in self.pair) and self._comparable("status") is None
         if own:
@@ -322,14 +343,14 @@ class _Group:
 
     def _comparable(self, name: str) -> str | None:
         """Why a variable cannot be compared; None if it can."""
-        a, b = (data[name] for data in self.pair)
+        a, b = self._arrays(name)
         if set(a.dims) != set(b.dims):
             said = (f"({', '.join(map(str, one.dims))})" for one in (a, b))
             return "has other dimensions: {} before, {} after".format(*said)
         if (a.dtype.kind in "OUS") != (b.dtype.kind in "OUS"):
             return "is a text in one dataset and a number in the other"
-        units = [str(one.attrs.get("units", "1")) for one in (a, b)]
-        if units[0] != units[1]:
+        units = [str(one.attrs["units"]) for one in (a, b) if "units" in one.attrs]
+        if len(set(units)) > 1:
             return f"has other units: {units[0]} before, {units[1]} after"
         return None
 
@@ -349,7 +370,7 @@ class _Group:
         sides = []
         for side in (0, 1):
             places = np.argwhere(spread[side] & ~spread[1 - side])
-            rows = [self._labels(names, place) for place in places[: self.most]]
+            rows = [self._labels(names, place) for place in places[: self.how.most]]
             sides.append(Alone(len(places), rows))
         return (sides[0], sides[1]), int((spread[0] & spread[1]).sum())
 
@@ -360,23 +381,32 @@ class _Group:
             found[name] = label if isinstance(label, str) else label.item()
         return found
 
+    def _arrays(self, name: str) -> tuple[xr.DataArray, xr.DataArray]:
+        a, b = self.pair[0][name], self.pair[1][name]
+        if self.how.part and set(b.dims) < set(a.dims):
+            b = b.expand_dims(
+                {one: self.pair[1][one] for one in a.dims if one in self.pair[1].coords and one not in b.dims}
+            )
+        return a, b
+
     def _variable(self, name: str) -> VariableChanges:
-        a, b = (data[name] for data in self.pair)
+        a, b = self._arrays(name)
         names = sorted(map(str, a.dims), key=lambda one: one not in self.cell_dimensions)  # cells first, then points
         cells = sum(one in self.cell_dimensions for one in names)
         common = {one: self.axes[one].common() for one in names}
         if not all(len(places[0]) for places in common.values()):
             return VariableChanges(name, 0, 0, [])
-        kind = _Kind(a, b, self.tolerance)
+        kind = _Kind(a, b, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
         shape = [len(common[one][0]) for one in names]
         compared = changed = 0
         rows: list[Change] = []
-        for block in _blocks(shape, cells, a.dtype.itemsize, self.block):
+        for block in _blocks(shape, cells, a.dtype.itemsize, self.how.block):
             places = [common[one] if at != block[0] else tuple(p[block[1]] for p in common[one])
                       for at, one in enumerate(names)]  # fmt: skip
             values = [_values(array, names, [own[1 + side] for own in places]) for side, array in enumerate((a, b))]
             asked = [self._asked_of(side, names, [own[1 + side] for own in places]) for side in (0, 1)]
-            excess, there = kind.excess(values[0], values[1], asked[0], asked[1], cells)
+            further = self._further(names, [own[1] for own in places])
+            excess, there = kind.excess(values[0], values[1], asked[0], asked[1], cells, further)
             flat = excess.reshape(*excess.shape[:cells], -1)
             worst = flat.argmax(axis=-1)
             largest = np.take_along_axis(flat, worst[..., None], axis=-1)[..., 0]
@@ -384,7 +414,7 @@ class _Group:
             beyond = np.argwhere(largest > 1.0)
             changed += len(beyond)
             sizes = largest[tuple(beyond.T)] if cells else np.atleast_1d(largest[largest > 1.0])
-            order = np.argsort(-sizes, kind="stable")[: self.most]
+            order = np.argsort(-sizes, kind="stable")[: self.how.most]
             for at in beyond[order]:
                 point = np.unravel_index(int(worst[tuple(at)]), excess.shape[cells:]) if names[cells:] else ()
                 where = (*at, *point)
@@ -402,7 +432,16 @@ class _Group:
                     )  # fmt: skip
                 )
         rows.sort(key=lambda row: -row.excess)
-        return VariableChanges(name, compared, changed, rows[: self.most])
+        return VariableChanges(name, compared, changed, rows[: self.how.most])
+
+    def _further(self, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
+        """Relative tolerances of cells, of a shape that goes with a variable's; NaN where there are none."""
+        array = self.pair[0].get(OF_CELLS)
+        if array is None or not set(array.dims) <= set(names):
+            return np.full([1] * len(names), np.nan)
+        shared = [name for name in names if name in array.dims]
+        chosen = array.transpose(*shared).values[np.ix_(*(own for name, own in zip(names, places) if name in shared))]
+        return chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
 
     def _asked_of(self, side: int, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
         """Whether a study asks for each cell of a variable, of a shape that goes with it."""
@@ -419,7 +458,7 @@ class _Kind:
     """How values of a variable are compared: numbers, flags or texts."""
 
     def __init__(self, a: xr.DataArray, b: xr.DataArray, tolerance: Tolerance) -> None:
-        self.units = str(a.attrs.get("units", "1"))
+        self.units = str(a.attrs.get("units", b.attrs.get("units", "1")))
         self.tolerance = tolerance
         self.words = [_words(one) for one in (a, b)] if _flagged(a) and _flagged(b) else None
         self.text = a.dtype.kind in "OUS"
@@ -431,7 +470,7 @@ class _Kind:
         return str(value) if self.text else float(value)
 
     def excess(
-        self, a: np.ndarray, b: np.ndarray, asked_a: np.ndarray, asked_b: np.ndarray, cells: int
+        self, a: np.ndarray, b: np.ndarray, asked_a: np.ndarray, asked_b: np.ndarray, cells: int, further: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Difference over tolerance, shape of the values, and where there is anything to compare."""
         if self.words is not None:
@@ -451,7 +490,10 @@ class _Kind:
         points = tuple(range(cells, a.ndim))
         if points:
             size = np.where(both & np.isfinite(size), size, 0.0).max(axis=points, keepdims=True)
-        allowed = np.maximum(self.tolerance.relative * size, self.tolerance.least(self.units))
+        relative = np.where(np.isnan(further), self.tolerance.relative, further)
+        dimensionless = self.units in ("", "1")
+        least = relative if self.tolerance.absolute is None and dimensionless else self.tolerance.absolute or 0.0
+        allowed = np.maximum(relative * size, least)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.where(allowed > 0, difference / allowed, np.inf)
         ratio = np.where(np.isfinite(ratio), ratio, np.inf)
@@ -508,16 +550,28 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
     return ~status.isin([*silent, np.nan]).compute()
 
 
-def _cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
+def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
     """Dimensions of cells; along others lie the points of a curve or a field.
 
-    A cell is what a message tells of.
+    A cell is what a message, or a status where there is none, tells of, and what has a text for a label.
+
+    Parameters
+    ----------
+    pair : sequence of xarray.Dataset
+        A group of datasets.
+    roots : sequence of xarray.Dataset
+        Their roots.
+
+    Returns
+    -------
+    set of str
     """
     found: set[str] = set()
     for data, root in zip(pair, roots):
-        messages = [data[name] for name in data.data_vars if str(name).endswith("message")]
-        status = [root["status"]] if "status" in root else []
-        found |= {str(name) for array in (*messages, *status) for name in array.dims}
+        judged = [data[name] for name in data.data_vars if str(name).endswith("message")]
+        judged = judged or [data["status"] for _ in range("status" in data)]
+        judged += [root["status"] for _ in range("status" in root)]
+        found |= {str(name) for array in judged for name in array.dims}
         texts = (str(name) for name in data.dims if name in data.coords and data[name].dtype.kind in "OUS")
         found |= set(texts)
     return found
