@@ -338,7 +338,7 @@ class _Group:
                 found.unlike[name] = reason
                 continue
             changes = self._variable(name)
-            (found.flags if _flagged(self.pair[0][name]) else found.values).append(changes)
+            (found.flags if is_flagged(self.pair[0][name]) else found.values).append(changes)
         return found
 
     def _comparable(self, name: str) -> str | None:
@@ -460,7 +460,7 @@ class _Kind:
     def __init__(self, a: xr.DataArray, b: xr.DataArray, tolerance: Tolerance) -> None:
         self.units = str(a.attrs.get("units", b.attrs.get("units", "1")))
         self.tolerance = tolerance
-        self.words = [_words(one) for one in (a, b)] if _flagged(a) and _flagged(b) else None
+        self.words = [flag_words(one) for one in (a, b)] if is_flagged(a) and is_flagged(b) else None
         self.text = a.dtype.kind in "OUS"
 
     def said(self, side: int, value: np.generic) -> float | str:
@@ -530,13 +530,16 @@ class _Kind:
 
 
 NOT_REQUESTED = "not_requested"
+"""Flag of a cell that a study does not ask for."""
 
 
-def _flagged(array: xr.DataArray) -> bool:
+def is_flagged(array: xr.DataArray) -> bool:
+    """Whether a variable holds flags, as CF has them."""
     return "flag_meanings" in array.attrs and array.dtype.kind in "iuf"
 
 
-def _words(array: xr.DataArray) -> dict[int, str]:
+def flag_words(array: xr.DataArray) -> dict[int, str]:
+    """Meanings of flags by their values."""
     values = np.atleast_1d(array.attrs.get("flag_values", [])).tolist()
     return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
 
@@ -546,7 +549,9 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
     status = data.get("status", root.get("status"))
     if status is None:
         return None
-    silent = [value for value, word in _words(status).items() if word == NOT_REQUESTED] if _flagged(status) else [0]
+    silent = (
+        [value for value, word in flag_words(status).items() if word == NOT_REQUESTED] if is_flagged(status) else [0]
+    )
     return ~status.isin([*silent, np.nan]).compute()
 
 
