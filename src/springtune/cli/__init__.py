@@ -22,6 +22,7 @@ class Row(NamedTuple):
 STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
 
 COMMANDS = {
+    "new": Row(STUDIES, "new", "new", "Write a small study to begin with."),
     "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
@@ -66,6 +67,7 @@ class Commands(click.Group):
 @click.group(
     cls=Commands,
     epilog=examples(
+        "springtune new my-study",
         "springtune scenes config/paper.yaml",
         "springtune run config/paper.yaml",
         'springtune predict --beam 200x40 --size "2 mm" --material steel',
