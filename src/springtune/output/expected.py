@@ -20,7 +20,7 @@ from ..jobs.atomic import write_text
 from ..problem.status import Status
 from . import dataset, reading
 from .alignment import axis
-from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
+from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, flag_words, is_flagged, variable_name
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
@@ -358,7 +358,9 @@ def _group_lines(
         digits[name] = min(17, max(6, math.ceil(-math.log10(relative)) + FURTHER_DIGITS)) if relative > 0 else 17
     yield "values:"
     sizes = [data.sizes[name] for name in by]
-    words = dict(zip(*_flags(data["status"]))) if "status" in data else {}
+    words = dict(enumerate(dataset.STATUS))
+    if "status" in data and is_flagged(data["status"]):
+        words = flag_words(data["status"])
     for place in np.ndindex(*sizes):
         parts = []
         for name, values in texts.items():
@@ -373,10 +375,6 @@ def _group_lines(
         if parts:
             labels = ", ".join(_label(data, name, at) for name, at in zip(by, place))
             yield f"  {labels or 'all'}: {{{', '.join(parts)}}}"
-
-
-def _flags(status: xr.DataArray) -> tuple[list[int], list[str]]:
-    return np.atleast_1d(status.attrs["flag_values"]).tolist(), str(status.attrs["flag_meanings"]).split()
 
 
 def _unit(data: xr.Dataset, name: str) -> str:
