@@ -52,7 +52,7 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
     if late:
         raise click.UsageError(f"name the study first: springtune run {late[0]} {options[0]}")
-    second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in ALONE]
+    second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
     if named and second:
         raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
     checkout = _checkout()
@@ -78,7 +78,7 @@ def run(strict: bool, arguments: tuple[str, ...]) -> None:
     raise SystemExit(NOT_SOLVED if holes else code)
 
 
-ALONE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
+NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
 """What stands before an argument that is none of an option: nothing, or options that have none."""
 
 

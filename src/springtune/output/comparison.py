@@ -12,6 +12,8 @@ import numpy as np
 import xarray as xr
 
 from .alignment import Axis, axis
+from .flags import NOT_REQUESTED, flag_words, is_flagged
+from .swept import with_swept
 from .text import NUMBER, without_numbers
 
 RELATIVE = 1e-6
@@ -219,7 +221,8 @@ def compare(
 
     Cells are matched by label, whatever the order, numbers within `alignment.SAME_NUMBER`. NaN is the same as NaN. A
     cell that one of the studies does not ask for is told as such, and its values are not compared. Texts that differ in
-    numbers alone are compared by these. What `MEASURED` names is left out.
+    numbers alone are compared by these. What `MEASURED` names is left out. A parameter that one study sweeps and the
+    other states once is a dimension of both.
 
     Parameters
     ----------
@@ -259,7 +262,7 @@ def compare(
     >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(tree, other).changes]
     [('stiffness', '100x20', 2.0)]
     """
-    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in (before, after)]
+    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in with_swept([before, after])]
     if groups:
         wanted = {"/" + name.strip("/") for name in groups}
         for name in sorted(wanted - set(nodes[0]) - set(nodes[1])):
@@ -529,21 +532,6 @@ class _Kind:
         )
 
 
-NOT_REQUESTED = "not_requested"
-"""Flag of a cell that a study does not ask for."""
-
-
-def is_flagged(array: xr.DataArray) -> bool:
-    """Whether a variable holds flags, as CF has them."""
-    return "flag_meanings" in array.attrs and array.dtype.kind in "iuf"
-
-
-def flag_words(array: xr.DataArray) -> dict[int, str]:
-    """Meanings of flags by their values."""
-    values = np.atleast_1d(array.attrs.get("flag_values", [])).tolist()
-    return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
-
-
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
     """Whether the study asks for each cell of a group, by its status or that of the root; None where none says so."""
     status = data.get("status", root.get("status"))
@@ -619,7 +607,8 @@ def _attributes(
     ]
     for name in ("software", "inputs"):
         parts = [_json(attributes.get(name)) for attributes in (before, after)]
-        pairs += [(one, parts[0].get(one, ""), parts[1].get(one, "")) for one in sorted({*parts[0], *parts[1]})]
+        names = {*parts[0]} & {*parts[1]} if name == "inputs" else {*parts[0], *parts[1]}
+        pairs += [(one, parts[0].get(one, ""), parts[1].get(one, "")) for one in sorted(names)]
     further = sorted({str(name) for name in (*before, *after)} - UNTOLD - set(TOLD_ATTRIBUTES))
     pairs += [(name, before.get(name, ""), after.get(name, "")) for name in further]
     for name, old, new in pairs:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -20,7 +19,9 @@ from ..jobs.atomic import write_text
 from ..problem.status import Status
 from . import dataset, reading
 from .alignment import axis
-from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, flag_words, is_flagged, variable_name
+from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
+from .flags import flag_words, is_flagged
+from .text import NUMBER
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
@@ -38,8 +39,6 @@ ENDINGS = (".yaml", ".nc")
 
 FURTHER_DIGITS = 3
 """Digits that a number in YAML has beyond its tolerance."""
-
-NUMBER = re.compile(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?")
 
 EXAMPLE = "accept the results anew, or see docs/how-to/compare-studies.md"
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from .alignment import Axis, axis, cell_text, number_text
-from .comparison import MEASURED, NOT_REQUESTED, flag_words, is_flagged
+from .comparison import MEASURED
+from .flags import NOT_REQUESTED, flag_words, is_flagged, nothing
+from .swept import with_swept
 
 SAME_VALUE = 1e-9
 """Values that differ by less, of the larger one, are those of one scene."""
@@ -18,7 +19,7 @@ SAME_VALUE = 1e-9
 FOUND_ANYHOW = (*MEASURED, "*message", "iterations", "residual", "definition_evaluations")
 """Variables that tell how an answer was found: of a scene in several datasets, the first counts."""
 
-LARGEST = 2e9
+MOST_BYTES = 2e9
 """Bytes of the largest array that is made."""
 
 JOINED = ("title", "study", "springtune_version", "git_commit")
@@ -30,7 +31,8 @@ def merge(datasets: Sequence[xr.DataTree], relative: float = SAME_VALUE) -> xr.D
 
     Unlike with `xarray.merge`, flags stay flags and texts stay texts where a study has no cell, ``not_requested`` and
     ``""``; a cell that one study solved and another did not ask for is no conflict; numbers that differ in the last
-    digits, as mesh sizes and references of several runs do, are one.
+    digits, as mesh sizes and references of several runs do, are one; a parameter that one study sweeps, such as a
+    force, is a dimension of all.
 
     Parameters
     ----------
@@ -71,15 +73,17 @@ class _Merger:
     """What several datasets hold, on common axes."""
 
     def __init__(self, trees: Sequence[xr.DataTree], relative: float) -> None:
-        self.trees, self.relative = trees, relative
+        self.trees, self.relative = with_swept(trees), relative
         names = [str(tree.attrs.get("study", "")) or f"number {number}" for number, tree in enumerate(trees, 1)]
         twice = {name for name in names if names.count(name) > 1}
         self.names = [f"{name} (number {number})" if name in twice else name for number, name in enumerate(names, 1)]
-        nodes = [(number, node.path, node.to_dataset()) for number, tree in enumerate(trees) for node in tree.subtree]
+        nodes = [
+            (number, node.path, node.to_dataset()) for number, tree in enumerate(self.trees) for node in tree.subtree
+        ]
         self.held: dict[str, dict[int, xr.Dataset]] = {}
         for number, path, data in nodes:
             self.held.setdefault(path, {})[number] = data
-        of_roots = {str(name) for tree in trees for name in tree.to_dataset().coords if name in tree.sizes}
+        of_roots = {str(name) for tree in self.trees for name in tree.to_dataset().coords if name in tree.sizes}
         # Groups of a tree have the labels of its root.
         self.axes: dict[tuple[str, str], Axis] = {}
         self.places: dict[tuple[str, str, int], np.ndarray] = {}
@@ -144,8 +148,8 @@ class _Merger:
         dims = [str(one) for one in first.dims]
         shape = [len(self.axes[path, one].labels) for one in dims]
         self._check_size(path, name, dims, shape)
-        nothing, dtype = _nothing([*arrays.values()])
-        values = np.full(shape, nothing, dtype)
+        empty, dtype = nothing([*arrays.values()])
+        values = np.full(shape, empty, dtype)
         source = np.full(shape, -1, dtype="int8")
         for number, array in arrays.items():
             place = np.ix_(*(self.places[path, one, number] for one in dims))
@@ -209,7 +213,7 @@ class _Merger:
 
     def _check_size(self, path: str, name: str, dims: Sequence[str], shape: Sequence[int]) -> None:
         size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
-        if size > LARGEST:
+        if size > MOST_BYTES:
             sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
             raise ValueError(
                 f"{_full(path, name)}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed "
@@ -251,17 +255,6 @@ class _Merger:
 
 def _full(path: str, name: str) -> str:
     return name if path == "/" else f"{path[1:]}/{name}"
-
-
-def _nothing(arrays: Sequence[xr.DataArray]) -> tuple[object, np.dtype[Any]]:
-    """What a cell without a value holds, and the type of all cells."""
-    if arrays[0].dtype.kind in "OUS":
-        return "", np.dtype(object)
-    together = np.result_type(*(array.dtype for array in arrays))
-    if is_flagged(arrays[0]):
-        silent = [value for value, word in flag_words(arrays[0]).items() if word == NOT_REQUESTED]
-        return (silent or [-1])[0], np.dtype("int8") if together.kind == "f" else together
-    return np.nan, together if together.kind == "f" else np.dtype(float)
 
 
 def _missing(values: np.ndarray, array: xr.DataArray) -> np.ndarray:
