@@ -26,6 +26,7 @@ from .mesh import MESH_TYPES as MESH_TYPES
 from .mesh import Mesh as Mesh
 from .mesh import MeshError as MeshError
 from .mesh import mesh_type as mesh_type
+from .output.merging import merge as merge
 from .output.reading import field as field
 from .output.reading import open as open
 from .prediction import Choice as Choice

@@ -141,6 +141,7 @@ def repository(tmp_path_factory):
     mine = dataset()
     meanings = " ".join(map(str, st.Status))
     mine["status"].attrs |= {"flag_values": np.arange(len(st.Status), dtype="int8"), "flag_meanings": meanings}
+    mine.coords["mesh_size"].attrs["units"] = "m"
     mine["message"] = mine.status.astype(str).where(mine.status > 1, "")
     mine.attrs = {"springtune_version": st.__version__, "config": (REPOSITORY / "config/quick.yaml").read_text()}
     paper = mine.map_over_datasets(_of_the_paper)

@@ -22,6 +22,7 @@ class Row(NamedTuple):
 STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
 
 COMMANDS = {
+    "new": Row(STUDIES, "new", "new", "Write a small study to begin with."),
     "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
@@ -29,6 +30,8 @@ COMMANDS = {
     "springs": Row(STUDIES, "springs", "springs", "Write the springs of one mesh for another program."),
     "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),
+    "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
+    "accept": Row(RESULTS, "accept", "accept", "Keep values and curves as right, or say what departs from them."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
     "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
     "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),
@@ -65,6 +68,7 @@ class Commands(click.Group):
 @click.group(
     cls=Commands,
     epilog=examples(
+        "springtune new my-study",
         "springtune scenes config/paper.yaml",
         "springtune run config/paper.yaml",
         'springtune predict --beam 200x40 --size "2 mm" --material steel',

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
 
+DATASET = "dataset.nc"
+
 
 def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
     """Studies with the folders of their results.
@@ -71,3 +73,39 @@ def idle(folder: Path) -> None:
         is_held(folder)
     except LockedError as error:
         raise click.ClickException(f"{error}; nothing is removed") from None
+
+
+def dataset_path(given: str) -> Path:
+    """Dataset of what a command is given.
+
+    Parameters
+    ----------
+    given : str
+        A dataset, the folder of a study's results, the study's YAML file, or its name; or a file of expected values.
+
+    Returns
+    -------
+    Path
+        The file; it may be damaged.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    path = Path(given)
+    if path.suffix in (".yaml", ".yml"):
+        from ..output.expected import is_expected
+
+        if is_expected(path):
+            return path
+        path = RESULTS_FOLDER / path.stem
+    for file in (path, path / DATASET, RESULTS_FOLDER / path / DATASET):
+        if file.is_file():
+            return file
+    known = sorted(file.parent.name for file in RESULTS_FOLDER.glob(f"*/{DATASET}"))
+    there = f"here are {', '.join(known)}" if known else "none is in results/ here"
+    raise ValueError(
+        f"{given}: there is no such dataset; run the study, or give a dataset.nc, results/<study> or a study's name; "
+        f"{there}"
+    )

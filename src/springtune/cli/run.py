@@ -55,14 +55,19 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
     if late:
         raise click.UsageError(f"name the study first: springtune run {late[0]} {options[0]}")
+    second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
+    if named and second:
+        raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
     checkout = _checkout()
     path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
     shown = Path(arguments[0]) if named else path
     try:
         study = load_study(shown)
     except StudyError as error:
-        click.echo(str(error), err=True)
+        click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
+    if checkout != Path.cwd():
+        click.echo(f"results go to {checkout / 'results' / study.name}", err=True)
     path = path.relative_to(checkout) if path.is_relative_to(checkout) else path
     # A list of targets would take a path that follows it for one more of them, and so would --configfile.
     command = [*_snakemake(), *options, "--configfile", str(path)]
@@ -76,12 +81,37 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     raise SystemExit(NOT_SOLVED if holes else code)
 
 
+NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
+"""What stands before an argument that is none of an option: nothing, or options that have none."""
+
+
+def _is_study(argument: str) -> bool:
+    return argument.endswith((".yaml", ".yml")) and not argument.startswith("-")
+
+
+def _meant(path: Path) -> str:
+    """Which study was probably meant, where there is none at a path."""
+    near = Path("config") / f"{path.stem}.yaml"
+    return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""
+
+
+def checkout_here() -> bool:
+    """Whether this folder is a checkout."""
+    return all(Path(file).is_file() for file in WORKFLOW)
+
+
+def library_checkout() -> Path | None:
+    """The checkout that the library is part of; None if it is installed without one."""
+    folder = Path(__file__).parents[3]
+    return folder if all((folder / file).is_file() for file in WORKFLOW) else None
+
+
 def _checkout() -> Path:
     """Folder of the workflow: this one, or that of the library."""
-    for folder in (Path.cwd(), Path(__file__).parents[3]):
-        if all((folder / file).is_file() for file in WORKFLOW):
-            return folder
-    raise click.ClickException("there is no Snakefile of springtune here; change to the folder of its checkout")
+    folder = Path.cwd() if checkout_here() else library_checkout()
+    if folder is None:
+        raise click.ClickException("there is no Snakefile of springtune here; change to the folder of its checkout")
+    return folder
 
 
 def _snakemake() -> list[str]:

@@ -1,0 +1,389 @@
+"""What changed from one dataset to another."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..output.text import aligned
+from .examples import examples
+from .folders import dataset_path
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..output.comparison import Change, Comparison, GroupChanges
+
+ROWS = 20
+"""Rows of a table that are shown."""
+
+DIFFERENT, TROUBLE = 1, 2
+"""Exit codes, as those of diff."""
+
+
+class Trouble(click.ClickException):
+    """Nothing could be compared."""
+
+    exit_code = TROUBLE
+
+
+def tolerance(context: click.Context, parameter: click.Parameter, given: str | None) -> float | None:
+    """A tolerance of its text: a finite number, not below zero.
+
+    Parameters
+    ----------
+    context : click.Context
+    parameter : click.Parameter
+    given : str or None
+
+    Returns
+    -------
+    float or None
+        None where none is given.
+    """
+    if given is None:
+        return None
+    try:
+        number = float(given)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and number >= 0):
+        raise click.BadParameter(f"'{given}' is no tolerance; give a number such as 1e-6, or 0")
+    return number
+
+
+@click.command(
+    epilog=examples(
+        "springtune diff results/before results/mine",
+        "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
+        "springtune diff before.nc after.nc --json > changes.json",
+    )
+)
+@click.argument("before")
+@click.argument("after")
+@click.option("--relative", callback=tolerance, help="Tolerance of the larger number.  [default: 1e-6]")
+@click.option(
+    "--absolute", callback=tolerance, help="Tolerance in SI units.  [default: 0; of numbers without unit, --relative]"
+)
+@click.option("--group", "groups", multiple=True, help="Group to compare, such as sensitivity; all without.")
+@click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
+@click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
+@click.option("--all", "every", is_flag=True, help="All rows.")
+@click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def diff(
+    before: str,
+    after: str,
+    relative: float | None,
+    absolute: float | None,
+    groups: tuple[str, ...],
+    ignored: tuple[str, ...],
+    rows: int,
+    every: bool,
+    config: bool,
+    as_json: bool,
+) -> None:
+    """Say what changed from one dataset to another beyond a tolerance, scene by scene.
+
+    BEFORE and AFTER are results/<study>, its dataset.nc, or the name of a study. Scenes are matched by their labels, in
+    whatever order. Numbers are the same within --relative or --absolute, and NaN is NaN; along a curve or over a field
+    --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
+    not compared; versions and the studies' files are told and make no difference.
+
+    Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
+    """
+    from ..output import comparison, expected, reading
+
+    try:
+        paths = [dataset_path(before), dataset_path(after)]
+        with ExitStack() as stack:
+            one, other = (stack.enter_context(opened(path)) for path in paths)
+            stack.enter_context(reading.guarded(f"{paths[0]}, {paths[1]}"))
+            kept = expected.ACCEPTED in one.attrs
+            if expected.ACCEPTED in other.attrs:
+                raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
+            if kept and (relative is not None or absolute is not None):
+                raise ValueError(f"{paths[0]}: has its own tolerances; leave --relative and --absolute out, or edit it")
+            given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
+            found = comparison.compare(
+                one, other, None if kept else given, groups, ignored, None if every else rows,
+                own=expected.tolerances(one), part=kept,
+            )  # fmt: skip
+            if as_json:
+                click.echo(json.dumps(as_dict(found, paths, config), indent=1))
+            else:
+                sides = ("accepted", "now") if kept else ("before", "after")
+                click.echo(comparison_text(found, paths, sides, None if every else rows, config))
+    except (OSError, ValueError) as error:
+        raise Trouble(str(error)) from None
+    if found.different:
+        raise click.exceptions.Exit(DIFFERENT)
+
+
+@contextmanager
+def opened(path: Path) -> "Iterator[xr.DataTree]":
+    """Open a dataset, or expected values, in a context.
+
+    Parameters
+    ----------
+    path : Path
+
+    Yields
+    ------
+    xarray.DataTree
+
+    Raises
+    ------
+    OSError
+    ValueError
+        If it is neither.
+    """
+    from ..output import expected, reading
+
+    if path.suffix == ".yaml":
+        yield expected.read(path)
+        return
+    reading.check_opens(path)
+    with reading.open(path) as tree:
+        yield tree
+
+
+# -- text --------------------------------------------------------------------------------------------------------------
+
+
+def comparison_text(
+    found: "Comparison", paths: Sequence[Path], sides: Sequence[str], most: int | None = ROWS, config: bool = False
+) -> str:
+    """What changed, as text.
+
+    Parameters
+    ----------
+    found : Comparison
+    paths : sequence of Path
+        Of what was compared.
+    sides : sequence of str
+        What they are called.
+    most : int, optional
+        Rows of each table; None is all.
+    config : bool, optional
+        Whether to show the diff of the studies' files.
+
+    Returns
+    -------
+    str
+    """
+    width = max(map(len, sides)) + 1
+    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(sides, paths)]
+    parts = [[*head, _summary(found, sides)]]
+    for group in found.groups:
+        parts += _of_group(group, sides, most)
+    changes = found.changes
+    if changes:
+        parts.append(_changes(found, changes, sides, most))
+    if found.attributes or found.config:
+        parts.append(_told(found, config))
+    return "\n\n".join("\n".join(part) for part in parts)
+
+
+def _summary(found: "Comparison", sides: Sequence[str]) -> str:
+    """One line on all."""
+    said = [f"group {path} only {side}" for side, own in zip(sides, found.alone) for path in own]
+    for number, side in enumerate(sides):
+        count = sum(group.cells[number].count for group in found.groups if group.name == "/")
+        said += [f"{count} scenes only {side}"] if count else []
+    statuses = sum(one.changed for group in found.groups for one in group.flags)
+    values = sum(one.changed for group in found.groups for one in group.values)
+    unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in found.groups)
+    said += [f"{statuses} statuses changed"] if statuses else []
+    said += [f"{values} values changed"] if values else []
+    said += [f"{unlike} variables are not in both, or cannot be compared"] if unlike else []
+    compared = sum(one.compared for group in found.groups for one in (*group.flags, *group.values))
+    if said:
+        return f"different: {', '.join(said)}; {compared} values compared"
+    if found.different:
+        return f"different: labels; {compared} values compared"
+    return f"the same: {compared} values compared"
+
+
+def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> Iterator[list[str]]:
+    """Paragraphs on labels, cells, variables and statuses of a group."""
+    from ..output.alignment import cell_text
+
+    what = "scenes" if group.name == "/" else f"cells of {group.name}"
+    lines = []
+    for name, both in group.labels.items():
+        for side, own in zip(sides, both):
+            shown = own[:most]
+            if own:
+                said = ", ".join(cell_text({name: label}, group.axes) for label in shown)
+                lines.append(
+                    f"  {name} only {side}: {said}" + (f", and {len(own) - len(shown)} more" * (len(own) > len(shown)))
+                )
+    if lines:
+        yield [f"labels of {group.name}", *lines]
+    for side, alone in zip(sides, group.cells):
+        if alone.count:
+            lines = [f"  {cell_text(_telling(group, labels), group.axes)}" for labels in alone.rows]
+            more = [f"  and {alone.count - len(lines)} more; --all shows them"] if alone.count > len(lines) else []
+            yield [f"{what} only {side}: {alone.count}", *lines, *more]
+    lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
+    lines += [f"  {name} {why}" for name, why in group.unlike.items()]
+    if lines:
+        yield [f"variables of {group.name}", *lines]
+    for one in group.flags:
+        if one.changed:
+            rows = [
+                [
+                    f"  {cell_text(_telling(group, row.labels | row.point), group.axes) or 'all'}",
+                    f"{row.before or 'nothing'} -> {row.after or 'nothing'}",
+                ]
+                for row in one.rows
+            ]
+            more = [f"  and {one.changed - len(rows)} more; --all shows them"] if one.changed > len(rows) else []
+            yield [f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}", aligned(rows, 0), *more]
+
+
+def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
+    """What changed of which variables, and the largest changes."""
+    from ..output.alignment import cell_text
+
+    head = ["  variable", "cells", "changed", "largest change"]
+    counts = [
+        [f"  {_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
+        for group in found.groups
+        for one in group.values
+        if one.changed
+    ]
+    axes = {group.name: group for group in found.groups}
+    rows = [["  variable", *sides, "change", "at"]]
+    for row in changes[:most]:
+        group = axes[row.group]
+        at = cell_text(_telling(group, row.labels) | row.point, group.axes)
+        rows.append(
+            [f"  {_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
+        )
+    total = sum(one.changed for group in found.groups for one in group.values)
+    more = [f"  and {total - len(rows) + 1} more; --all shows them"] if total > len(rows) - 1 else []
+    return [
+        "values that changed", aligned([head, *counts], 0, (1, 2)), "",
+        "the largest changes, measured by the tolerance", aligned(rows, 0, (1, 2, 3)), *more,
+    ]  # fmt: skip
+
+
+def _largest(rows: "list[Change]") -> str:
+    """The largest change that is a number, if any is among the rows."""
+    return _difference(next((row for row in rows if math.isfinite(row.difference)), rows[0]))
+
+
+def _told(found: "Comparison", config: bool) -> list[str]:
+    """Attributes that differ, and what of the studies' files."""
+    lines = ["told, and no difference of results"]
+    rows = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
+    lines += [aligned(rows, 0)] if rows else []
+    if found.config:
+        less, more = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
+        lines.append(
+            f"  the studies' files: {less} lines less, {more} more" + ("" if config else "; --config shows them")
+        )
+        lines += found.config if config else []
+    return lines
+
+
+LONGEST_ATTRIBUTE = 60
+"""Most characters of an attribute that are shown."""
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split()) or "none"
+    return text if len(text) <= LONGEST_ATTRIBUTE else f"{text[: LONGEST_ATTRIBUTE - 3]}..."
+
+
+def _name(group: str, variable: str) -> str:
+    return variable if group == "/" else f"{group[1:]}/{variable}"
+
+
+def _telling(group: "GroupChanges", labels: "dict[str, str | float]") -> "dict[str, str | float]":
+    """Labels of dimensions that leave a choice."""
+    return {name: label for name, label in labels.items() if len(group.axes[name].labels) > 1}
+
+
+def _value(value: float | str) -> str:
+    if isinstance(value, str):
+        return _short(value) if value else "nothing"
+    return "nothing" if math.isnan(value) else f"{value:.9g}"
+
+
+def _difference(row: "Change") -> str:
+    """Difference with its unit, and how much of the number before it is."""
+    number = row.difference
+    if not math.isfinite(number):
+        return "gone" if row.after == "" or row.after != row.after else "new" if row.before != row.before else ""
+    units = "" if row.units in ("", "1") else f" {row.units}"
+    before = float(row.before)
+    share = f" ({100 * number / abs(before):+.2g} %)" if before and units else ""
+    return f"{number:+.3g}{units}{share}"
+
+
+# -- JSON --------------------------------------------------------------------------------------------------------------
+
+
+def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) -> dict[str, object]:
+    """A comparison as JSON has it.
+
+    Parameters
+    ----------
+    found : Comparison
+    paths : sequence of Path
+    config : bool, optional
+        Whether the diff of the studies' files is part of it.
+
+    Returns
+    -------
+    dict
+        Numbers that are none, or infinite, are None.
+    """
+    return {
+        "different": found.different,
+        "before": str(paths[0]),
+        "after": str(paths[1]),
+        "groups_only_before": found.alone[0],
+        "groups_only_after": found.alone[1],
+        "groups": {group.name: _group_dict(group) for group in found.groups},
+        "attributes": {name: {"before": old, "after": new} for name, (old, new) in found.attributes.items()},
+    } | ({"config": found.config} if config else {})
+
+
+def _group_dict(group: "GroupChanges") -> dict[str, object]:
+    sides = ("before", "after")
+    made: dict[str, object] = {
+        "labels": {
+            name: {f"only_{side}": own for side, own in zip(sides, both)} for name, both in group.labels.items()
+        },
+        "cells_in_both": group.both,
+    }
+    for side, alone, names in zip(sides, group.cells, group.variables):
+        made[f"cells_only_{side}"] = {"count": alone.count, "rows": alone.rows}
+        made[f"variables_only_{side}"] = names
+    made["not_comparable"] = group.unlike
+    for part, found in (("status", group.flags), ("values", group.values)):
+        made[part] = {
+            one.name: {"compared": one.compared, "changed": one.changed, "rows": [_row_dict(row) for row in one.rows]}
+            for one in found
+            if one.changed
+        }
+    return made
+
+
+def _row_dict(row: "Change") -> dict[str, object]:
+    def plain(value: float | str) -> float | str | None:
+        return value if isinstance(value, str) or math.isfinite(value) else None
+
+    found: dict[str, object] = {**row.labels, **row.point}
+    return {
+        "at": found, "before": plain(row.before), "after": plain(row.after), "difference": plain(row.difference),
+        "over_tolerance": plain(row.excess), "units": row.units,
+    }  # fmt: skip

@@ -1,0 +1,276 @@
+"""Datasets of several studies in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+import xarray as xr
+
+from .alignment import Axis, axis, cell_text, number_text
+from .comparison import MEASURED
+from .flags import NOT_REQUESTED, flag_words, is_flagged, nothing
+from .swept import with_swept
+
+SAME_VALUE = 1e-9
+"""Values that differ by less, of the larger one, are those of one scene."""
+
+FOUND_ANYHOW = (*MEASURED, "*message", "iterations", "residual", "definition_evaluations")
+"""Variables that tell how an answer was found: of a scene in several datasets, the first counts."""
+
+MOST_BYTES = 2e9
+"""Bytes of the largest array that is made."""
+
+JOINED = ("title", "study", "springtune_version", "git_commit")
+"""Attributes whose different texts are joined."""
+
+
+def merge(datasets: Sequence[xr.DataTree], relative: float = SAME_VALUE) -> xr.DataTree:
+    """Join the datasets of several studies: every label of each, cells that no study has asked for empty.
+
+    Unlike with `xarray.merge`, flags stay flags and texts stay texts where a study has no cell, ``not_requested`` and
+    ``""``; a cell that one study solved and another did not ask for is no conflict; numbers that differ in the last
+    digits, as mesh sizes and references of several runs do, are one; a parameter that one study sweeps, such as a
+    force, is a dimension of all.
+
+    Parameters
+    ----------
+    datasets : sequence of xarray.DataTree
+        As of `springtune.open`.
+    relative : float, optional
+        By how much values of a scene that several datasets have may differ, of the larger one; the first counts.
+
+    Returns
+    -------
+    xarray.DataTree
+        In memory. Its attribute ``study`` names all, and ``config`` has the files of all, one after the other.
+
+    Raises
+    ------
+    ValueError
+        If a label means two things, such as a beam of two lengths, if a scene has two values, or if a variable has
+        other dimensions or units; the message names label and both values.
+
+    Examples
+    --------
+    >>> import springtune as st, xarray as xr
+    >>> scenes, others = (xr.DataTree(tree.to_dataset().sel(beam=[name])) for name in ("100x20", "200x40"))
+    >>> both = st.merge([scenes, others])
+    >>> both.beam.values.tolist(), both.status.dtype.name, both.beam_length.values.tolist()
+    (['100x20', '200x40'], 'int8', [0.1, 0.2])
+    """
+    trees = list(datasets)
+    for tree in trees:
+        if not isinstance(tree, xr.DataTree):
+            raise ValueError(f"datasets: {type(tree).__name__} is no dataset; give what springtune.open returns")
+    if not trees:
+        raise ValueError("datasets: there are none; give what springtune.open returns, in a list")
+    return _Merger(trees, relative).merged()
+
+
+class _Merger:
+    """What several datasets hold, on common axes."""
+
+    def __init__(self, trees: Sequence[xr.DataTree], relative: float) -> None:
+        self.trees, self.relative = with_swept(trees), relative
+        names = [str(tree.attrs.get("study", "")) or f"number {number}" for number, tree in enumerate(trees, 1)]
+        twice = {name for name in names if names.count(name) > 1}
+        self.names = [f"{name} (number {number})" if name in twice else name for number, name in enumerate(names, 1)]
+        nodes = [
+            (number, node.path, node.to_dataset()) for number, tree in enumerate(self.trees) for node in tree.subtree
+        ]
+        self.held: dict[str, dict[int, xr.Dataset]] = {}
+        for number, path, data in nodes:
+            self.held.setdefault(path, {})[number] = data
+        of_roots = {str(name) for tree in self.trees for name in tree.to_dataset().coords if name in tree.sizes}
+        # Groups of a tree have the labels of its root.
+        self.axes: dict[tuple[str, str], Axis] = {}
+        self.places: dict[tuple[str, str, int], np.ndarray] = {}
+        for name in of_roots:
+            self._align(name, [(number, path, data) for number, path, data in nodes if name in data.sizes])
+        for path, held in self.held.items():
+            here = [(number, path, data) for number, data in held.items()]
+            for name in dict.fromkeys(str(one) for data in held.values() for one in data.sizes):
+                if name not in of_roots:
+                    self._align(name, [one for one in here if name in one[2].sizes])
+
+    def _align(self, name: str, nodes: Sequence[tuple[int, str, xr.Dataset]]) -> None:
+        found = axis(name, [data for _, _, data in nodes])
+        for (number, path, _), places in zip(nodes, found.places):
+            self.axes[path, name] = found
+            self.places[path, name, number] = places
+
+    def merged(self) -> xr.DataTree:
+        """All groups."""
+        tree = xr.DataTree.from_dict({path: self._group(path, held) for path, held in self.held.items()})
+        tree.attrs = self._attributes()
+        return tree
+
+    def _group(self, path: str, held: dict[int, xr.Dataset]) -> xr.Dataset:
+        first = next(iter(held.values()))
+        names = [str(name) for data in held.values() for name in data.variables if name not in data.dims]
+        # What a label means comes first: a beam of two lengths is told, not what follows from it.
+        ranks = {name: max(data[name].ndim for data in held.values() if name in data) for name in names}
+        made = {name: self._variable(path, name, held) for name in sorted(ranks, key=lambda name: ranks[name])}
+        used = dict.fromkeys(str(one) for data in held.values() for one in data.sizes)
+        coordinates = {}
+        for name in used:
+            if self.axes[path, name].labelled:
+                attributes = next(data[name].attrs for data in held.values() if name in data.coords)
+                coordinates[name] = xr.Variable(name, self._labels(path, name, held), attributes)
+        found = xr.Dataset({name: made[name] for name in ranks}, coordinates)
+        further = {str(name) for data in held.values() for name in data.coords if name not in data.dims}
+        found = found.set_coords(sorted(further))
+        if path != "/":
+            found.attrs = self._group_attributes(path, held, first)
+        return found
+
+    def _labels(self, path: str, name: str, held: dict[int, xr.Dataset]) -> np.ndarray:
+        labels = self.axes[path, name].labels
+        whole = all(data[name].dtype.kind in "iu" for data in held.values() if name in data.coords)
+        return labels.astype(int) if whole else labels
+
+    def _variable(self, path: str, name: str, held: dict[int, xr.Dataset]) -> xr.Variable:
+        arrays = {number: data[name] for number, data in held.items() if name in data}
+        first_number, first = next(iter(arrays.items()))
+        for number, array in arrays.items():
+            for what, one, other in (
+                ("the dimensions", ", ".join(sorted(map(str, first.dims))), ", ".join(sorted(map(str, array.dims)))),
+                ("the unit", str(first.attrs.get("units", "1")), str(array.attrs.get("units", "1"))),
+                ("the flags", str(first.attrs.get("flag_meanings", "")), str(array.attrs.get("flag_meanings", ""))),
+            ):
+                if one != other:
+                    raise ValueError(
+                        f"{_full(path, name)} has {what} ({one}) in {self.names[first_number]} and ({other}) in "
+                        f"{self.names[number]}; sweep the same parameters in both studies, and run them again"
+                    )
+        dims = [str(one) for one in first.dims]
+        shape = [len(self.axes[path, one].labels) for one in dims]
+        self._check_size(path, name, dims, shape)
+        empty, dtype = nothing([*arrays.values()])
+        values = np.full(shape, empty, dtype)
+        source = np.full(shape, -1, dtype="int8")
+        for number, array in arrays.items():
+            place = np.ix_(*(self.places[path, one, number] for one in dims))
+            own = array.transpose(*dims).values.astype(dtype)
+            there = ~_missing(own, array)
+            known = values[place]
+            both = there & (source[place] >= 0)
+            if both.any() and not any(fnmatchcase(name, one) for one in FOUND_ANYHOW):
+                apart = both & ~self._same(known, own, str(array.attrs.get("units", "1")))
+                if apart.any():
+                    at = tuple(int(one) for one in np.argwhere(apart)[0])
+                    former = int(source[place][at])
+                    labels = {one: self.axes[path, one].labels[place[n].ravel()[at[n]]] for n, one in enumerate(dims)}
+                    self._refuse(path, name, labels, (former, number), (known[at], own[at]), array)
+            new = there & ~both
+            values[place] = np.where(new, own, known)
+            source[place] = np.where(new, number, source[place])
+        if (
+            values.dtype.kind == "f"
+            and all(array.dtype.kind in "iu" for array in arrays.values())
+            and not np.isnan(values).any()
+        ):
+            values = values.astype(first.dtype)
+        return xr.Variable(dims, values, first.attrs)
+
+    def _same(self, a: np.ndarray, b: np.ndarray, units: str) -> np.ndarray:
+        if a.dtype.kind not in "f":
+            found: np.ndarray = a == b
+            return found
+        allowed = self.relative * np.maximum(np.abs(a), np.abs(b))
+        with np.errstate(invalid="ignore"):
+            near = np.abs(a - b) <= np.maximum(allowed, self.relative if units in ("", "1") else 0.0)
+        return near | (a == b)
+
+    def _refuse(
+        self,
+        path: str,
+        name: str,
+        labels: dict[str, object],
+        numbers: tuple[int, int],
+        values: tuple[object, object],
+        array: xr.DataArray,
+    ) -> None:
+        """Stop at a cell that has two values."""
+        units = str(array.attrs.get("units", "1"))
+        words = flag_words(array) if is_flagged(array) else {}
+        two = " and ".join(
+            f"{_value(value, units, words)} in {self.names[number]}" for number, value in zip(numbers, values)
+        )
+        plain = {one: label if isinstance(label, str) else float(label) for one, label in labels.items()}  # type: ignore[arg-type]
+        at = cell_text(plain, {one: self.axes[path, one] for one in plain})
+        if len(plain) == 1:
+            (one,) = plain
+            raise ValueError(
+                f"{one} '{at}' is two things: {_full(path, name)} is {two}; give one of them another label in its study"
+            )
+        raise ValueError(
+            f"{_full(path, name)}{f' of {at}' if at else ''} is {two}; give what differs another label in its study, "
+            f"leave the group out with tree.drop_nodes, or allow more than relative={self.relative:g}"
+        )
+
+    def _check_size(self, path: str, name: str, dims: Sequence[str], shape: Sequence[int]) -> None:
+        size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
+        if size > MOST_BYTES:
+            sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
+            raise ValueError(
+                f"{_full(path, name)}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed "
+                "of each dataset first"
+            )
+
+    def _group_attributes(self, path: str, held: dict[int, xr.Dataset], first: xr.Dataset) -> dict[str, object]:
+        found: dict[str, object] = {}
+        source: dict[str, int] = {}
+        for number, data in held.items():
+            for key, value in data.attrs.items():
+                name = str(key)
+                if name in found and not isinstance(value, str) and value != found[name]:
+                    raise ValueError(
+                        f"{path}: {name} is {found[name]} in {self.names[source[name]]} and {value} in "
+                        f"{self.names[number]}; leave the group out of one with tree.drop_nodes"
+                    )
+                if name in found and value != found[name]:
+                    value = f"{found[name]}; {value}"
+                found[name] = value
+                source.setdefault(name, number)
+        return found
+
+    def _attributes(self) -> dict[str, str]:
+        """Attributes of the root: those that are the same, and what is told of all."""
+        every = [{str(name): str(text) for name, text in tree.attrs.items()} for tree in self.trees]
+        found = {name: text for name, text in every[0].items() if all(own.get(name) == text for own in every)}
+        for name in JOINED:
+            texts = dict.fromkeys(own[name] for own in every if own.get(name))
+            if texts:
+                found[name] = (" + " if name == "study" else ", ").join(texts)
+        if "config" not in found:
+            parts = [f"# {name}\n{own['config']}" for name, own in zip(self.names, every) if "config" in own]
+            found |= {"config": "\n---\n".join(parts)} if parts else {}
+        histories = [own["history"] for own in every if "history" in own]
+        found["history"] = "\n".join(dict.fromkeys([*histories, f"merged from {', '.join(self.names)}"]))
+        return found
+
+
+def _full(path: str, name: str) -> str:
+    return name if path == "/" else f"{path[1:]}/{name}"
+
+
+def _missing(values: np.ndarray, array: xr.DataArray) -> np.ndarray:
+    if values.dtype == object:
+        found: np.ndarray = values == ""
+        return found
+    if is_flagged(array):
+        words = flag_words(array)
+        return ~np.isin(values, [value for value, word in words.items() if word != NOT_REQUESTED])
+    return np.isnan(values)
+
+
+def _value(value: object, units: str, words: dict[int, str]) -> str:
+    if isinstance(value, str):
+        return f"'{value}'"
+    if words:
+        return words.get(int(value), str(value))  # type: ignore[call-overload]
+    number = float(value)  # type: ignore[arg-type]
+    return number_text(number, units) if abs(number) < 1e6 else f"{number:.10g} {units}"

@@ -1,0 +1,81 @@
+"""Parameters that one study sweeps and another one states once: dimensions of both, so that scenes can be matched."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from .alignment import SAME_NUMBER
+from .flags import nothing
+
+STATED = {
+    "force": "force",
+    "thickness": "beam_thickness",
+    "young_modulus": "material_young_modulus",
+    "poisson_ratio": "material_poisson_ratio",
+}
+"""Variable that holds a parameter where it is not swept; of a force its size, since the load says the direction."""
+
+UNCHANGED = {"stiffness_scale": 1.0}
+"""What a parameter is where it is not swept, and nothing holds it."""
+
+
+def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
+    """Datasets that have a dimension for each parameter that any of them sweeps.
+
+    Parameters
+    ----------
+    trees : sequence of xarray.DataTree
+
+    Returns
+    -------
+    list of xarray.DataTree
+        The same where nothing is missing; else in memory, each cell at the label that its study states.
+    """
+    sweeping: dict[str, xr.DataTree] = {}
+    for tree in trees:
+        for name in (*STATED, *UNCHANGED):
+            if name in tree.dims:
+                sweeping.setdefault(name, tree)
+    made = [*trees]
+    for name, example in sweeping.items():
+        for number, tree in enumerate(made):
+            stated = _stated(tree, name)
+            if name not in tree.dims and stated is not None:
+                made[number] = _swept(tree, name, stated, example)
+    return made
+
+
+def _stated(tree: xr.DataTree, name: str) -> xr.DataArray | None:
+    """What a study states for a parameter, over what it depends on; None where it does not say."""
+    if name in UNCHANGED:
+        return xr.DataArray(UNCHANGED[name])
+    found = tree.to_dataset().get(STATED[name])
+    return None if found is None else abs(found)
+
+
+def _swept(tree: xr.DataTree, name: str, stated: xr.DataArray, example: xr.DataTree) -> xr.DataTree:
+    """A dataset with one more dimension, that of the example."""
+    known = np.unique(stated.values[np.isfinite(stated.values)])
+    if not len(known):
+        return tree
+    labels = known[np.concatenate([[True], np.diff(known) > SAME_NUMBER * known[1:]])]
+    axis = xr.DataArray(labels, dims=name, name=name, attrs=dict(example[name].attrs))
+    here = xr.concat([abs(stated - label) <= SAME_NUMBER * label for label in labels], name).assign_coords({name: axis})
+    groups = {}
+    for node in tree.subtree:
+        data = node.to_dataset()
+        like = example if node.path == "/" else example.children.get(node.path[1:])
+        found = data.drop_vars(name, errors="ignore")
+        for variable in found.data_vars:
+            if like is None or variable not in like.data_vars or name not in like[str(variable)].dims:
+                continue
+            array = found[variable]
+            empty, dtype = nothing([array])
+            mask = here.any([one for one in here.dims if one not in (*array.dims, name)])
+            spread = array.astype(dtype).where(mask, np.array(empty, dtype)).transpose(*array.dims, name)
+            found[variable] = spread.assign_attrs(array.attrs)
+        groups[node.path] = found
+    made = xr.DataTree.from_dict(groups)
+    made.attrs = tree.attrs
+    return made

@@ -1,0 +1,292 @@
+"""What changed from one dataset to another, and that nothing else is said to."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.cli import main
+from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.output import dataset
+from springtune.output.comparison import Tolerance, compare
+
+import synthetic
+
+AXES = {
+    "beam": ("200x40", "100x20"),
+    "mesh_type": ("structured", "free"),
+    "mesh_size": (2e-3, 5e-3),
+    "material": ("steel",),
+    "load": ("traction", "bending"),
+    "definition": ("lattice", "patch"),
+    "kinematics": ("linear",),
+    "stiffness_ratio": (0.5, 1.0, 1.5),
+}
+SCENE = {
+    "beam": "100x20", "mesh_type": "free", "mesh_size": 5e-3, "material": "steel", "load": "bending",
+    "definition": "patch", "kinematics": "linear",
+}  # fmt: skip
+CURVE = {name: label for name, label in SCENE.items() if name != "definition"}
+ATTRIBUTES = {"study": "small", "springtune_version": "0", "config": "title: small\nbeams: 1\n"}
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def made(**axes):
+    """A study of scenes and curves in memory: numbers of their own, all solved."""
+    axes = AXES | axes
+    root, curves = ROOT.empty(axes), SENSITIVITY.empty(axes)
+    for data in (root, curves):
+        for name, array in data.data_vars.items():
+            if array.dtype.kind == "f":
+                array.values[...] = 1e-3 * np.arange(1, array.size + 1).reshape(array.shape)
+            elif str(name).endswith("status"):
+                array.values[...] = st.Status.SOLVED
+    return xr.DataTree.from_dict({"/": root.assign_attrs(ATTRIBUTES), "/sensitivity": curves})
+
+
+def written(tree, path):
+    groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    groups["/"].attrs, attributes = {}, tree.attrs
+    dataset.write(path, groups, attributes)
+    return path
+
+
+def rows(found, name):
+    return [row for row in found.changes if row.variable == name]
+
+
+class TestSame:
+    def test_labels_in_another_order_are_the_same(self, tmp_path):
+        one = written(made(), tmp_path / "one.nc")
+        other = made().map_over_datasets(lambda data: data.isel({name: slice(None, None, -1) for name in data.dims}))
+        result = run("diff", one, written(other, tmp_path / "other.nc"))
+        assert result.exit_code == 0 and "the same: " in result.stdout, result.output
+
+    def test_every_kind_of_study_is_the_same_as_itself(self):
+        tree = synthetic.dataset()
+        found = compare(tree, tree.copy(deep=True))
+        assert not found.different and {group.name for group in found.groups} == {node.path for node in tree.subtree}
+
+    def test_last_digits_of_a_numeric_label_are_no_other_label(self):
+        other = made()
+        other["/"].coords["mesh_size"] = other.mesh_size * (1 + 4e-16)
+        assert not compare(made(), xr.DataTree.from_dict({"/": other.to_dataset()}), groups=["/"]).different
+
+    def test_seconds_and_what_solved_are_not_compared(self):
+        other = made()
+        other["solve_seconds"].values[...] *= 3
+        other["solver"].values[...] = "another"
+        other["sensitivity/curve_seconds"].values[...] *= 3
+        other.attrs |= {"created": "today", "host": "another"}
+        found = compare(made(), other)
+        assert not found.different and not found.attributes
+
+    def test_flags_are_compared_as_words(self):
+        other = made()
+        status = other["status"]
+        meanings = status.attrs["flag_meanings"].split()
+        status.values[...] = meanings[::-1].index("solved")
+        status.attrs["flag_meanings"] = " ".join(meanings[::-1])
+        assert not compare(made(), other, groups=["/"]).different
+
+    def test_empty_datasets_are_the_same(self):
+        empty = xr.DataTree(xr.Dataset())
+        assert not compare(empty, empty).different
+
+    @pytest.mark.parametrize("name", ["displacement", "deformation_error", "force"])
+    def test_the_tolerance_is_where_it_says(self, name):
+        """Of the larger number where it has a unit, and as it is where it has none."""
+        for factor, different in ((0.99, False), (1.01, True)):
+            other = made()
+            value = other[name].values[(0,) * other[name].ndim]
+            change = 1e-4 * factor * (1.0 if name == "deformation_error" else value / (1 - 1e-4 * factor))
+            other[name].values[(0,) * other[name].ndim] += change
+            for pair in ((made(), other), (other, made())):
+                assert compare(*pair, Tolerance(1e-4)).different == different
+            assert not compare(made(), other, Tolerance(0.0, 1.02 * change)).different
+            assert compare(made(), other, Tolerance(0.0, 0.98 * change)).different
+
+    def test_infinity_is_itself(self):
+        tree = made()
+        tree["displacement"].values[0, 0] = np.inf
+        assert not compare(tree, tree.copy(deep=True)).different
+        assert compare(tree, made()).different
+
+
+class TestChanges:
+    def test_a_scene_that_changed_is_named(self):
+        other = made()
+        other["displacement"].loc[SCENE] *= 1.5
+        (row,) = compare(made(), other).changes
+        assert row.variable == "displacement" and row.labels == SCENE and not row.point
+        assert row.after == pytest.approx(1.5 * row.before)
+        assert row.excess == pytest.approx(1e6 / 3)  # half of the smaller is a third of the larger
+
+    def test_the_largest_is_first_and_the_others_are_counted(self, tmp_path):
+        other = made()
+        other["displacement"].values[...] *= 1.001
+        other["displacement"].loc[SCENE] *= 2
+        paths = written(made(), tmp_path / "one.nc"), written(other, tmp_path / "other.nc")
+        result = run("diff", *paths, "--rows", 3)
+        assert result.exit_code == 1
+        lines = result.stdout.splitlines()
+        first = lines.index("the largest changes, measured by the tolerance") + 2
+        assert lines[first].endswith("100x20, free, 5 mm, bending, patch")  # labels that leave a choice
+        assert lines[first + 3] == "  and 29 more; --all shows them"
+        assert "and 29 more" not in run("diff", *paths, "--all").stdout
+        assert ["displacement", "32", "32"] in [line.split()[:3] for line in lines]
+
+    def test_what_fails_is_a_status_and_its_values_are_gone(self):
+        other = made()
+        other["status"].loc[SCENE] = st.Status.FAILED
+        other["displacement"].loc[SCENE] = np.nan
+        other["message"].loc[SCENE] = "springs gone"
+        found = compare(made(), other)
+        (status,) = [one for one in found.groups[0].flags if one.changed]
+        assert (status.rows[0].before, status.rows[0].after, status.rows[0].labels) == ("solved", "failed", SCENE)
+        assert {row.variable for row in found.changes} == {"displacement", "message"}
+        assert all(row.excess == np.inf for row in found.changes)
+
+    def test_a_scene_that_is_not_asked_for_is_told_once(self):
+        """Neither its values nor its status are changes."""
+        other = made()
+        for array in other["/"].data_vars.values():
+            if "definition" in array.dims:
+                array.loc[SCENE] = {"f": np.nan, "i": 0, "O": ""}[array.dtype.kind]
+        found = compare(made(), other)
+        (only, none), both = found.groups[0].cells, found.groups[0].both
+        assert (only.count, only.rows, none.count, both) == (1, [SCENE], 0, 31)
+        assert found.different and not found.changes and not any(one.changed for one in found.groups[0].flags)
+
+    def test_labels_of_one_side_are_told_and_the_rest_is_compared(self, tmp_path):
+        other = made(mesh_size=(1e-3, 5e-3))
+        other["displacement"].values[...] = 1.0
+        found = compare(made(), other, groups=["/"])
+        assert found.groups[0].labels == {"mesh_size": ([2e-3], [1e-3])}
+        assert [alone.count for alone in found.groups[0].cells] == [16, 16] and found.groups[0].both == 16
+        assert {row.labels["mesh_size"] for row in found.changes} == {5e-3}
+        result = run("diff", written(made(), tmp_path / "a.nc"), written(other, tmp_path / "b.nc"), "--group", "/")
+        assert "  mesh_size only after: 1 mm" in result.stdout.splitlines()
+
+    def test_a_curve_is_one_row_at_its_largest_change(self):
+        """Its smallest numbers are compared by its largest."""
+        other = made()
+        curve = other["sensitivity/displacement"].sel(CURVE)
+        other["sensitivity/displacement"].loc[CURVE | {"stiffness_ratio": 1.0}] += 2e-3
+        other["sensitivity/displacement"].loc[CURVE | {"stiffness_ratio": 1.5}] += 1e-3
+        (row,) = compare(made(), other).changes
+        assert (row.labels, row.point) == (CURVE, {"stiffness_ratio": 1.0})
+        assert row.excess == pytest.approx(2e-3 / (1e-6 * (float(curve.max()))))
+        slight = made()
+        slight["sensitivity/displacement"].loc[CURVE | {"stiffness_ratio": 0.5}] += 0.9e-6 * float(curve.max())
+        assert not compare(made(), slight).different
+
+    @pytest.mark.parametrize("block", [8, 64, 2**26])
+    def test_blocks_change_nothing(self, block):
+        other = made()
+        other["displacement"].values[1, :, 1] *= 2
+        other["sensitivity/displacement"].values[:, 1, 0, ..., 2] *= 3
+        found, whole = compare(made(), other, block=block), compare(made(), other)
+        assert found.changes == whole.changes and len(found.changes) == 8 + 4
+
+    def test_dimensions_that_are_new_are_compared_by_their_numbers(self):
+        """A force that is swept is a dimension like any other."""
+
+        def swept(*forces):
+            parts = [made()["/"].to_dataset().drop_vars("force").expand_dims(force=[force]) for force in forces]
+            parts = [part.assign(displacement=part.displacement * part.force) for part in parts]
+            return xr.DataTree(xr.concat(parts, "force"))
+
+        found = compare(swept(1e3, 2e3), swept(2e3 * (1 + 1e-12), 3e3))
+        assert found.groups[0].labels == {"force": ([1e3], [3e3])} and not found.changes
+        unlike = compare(made(), swept(1e3), groups=["/"]).groups[0].unlike
+        assert "has other dimensions: (beam" in unlike["displacement"] and "force" in unlike["displacement"]
+
+    def test_samples_are_compared_by_number(self):
+        def sampled(*values):
+            data = xr.Dataset({"index": ("sample", [*values])}, {"sample": range(len(values))})
+            return xr.DataTree(data.assign_coords(length=("sample", [10.0 * value for value in values])))
+
+        found = compare(sampled(1.0, 2.0), sampled(1.0, 4.0, 5.0))
+        assert found.groups[0].labels == {"sample": ([], [2])}
+        assert {row.variable for row in found.changes} == {"index", "length"}
+        assert all({**row.labels, **row.point} == {"sample": 1} for row in found.changes)
+
+    def test_texts_with_other_numbers_are_compared_by_these(self):
+        one, other, third = made(), made(), made()
+        for tree, text in ((one, "residual 2.5e-01"), (other, "residual 2.50000001e-01"), (third, "residual 3e-01")):
+            tree["message"].loc[SCENE] = text
+        assert not compare(one, other).different
+        assert [row.variable for row in compare(one, third).changes] == ["message"]
+
+    def test_units_that_differ_are_no_numbers_to_compare(self):
+        other = made()
+        other["displacement"].attrs["units"] = "mm"
+        assert compare(made(), other).groups[0].unlike == {"displacement": "has other units: m before, mm after"}
+
+    def test_groups_and_variables_of_one_side(self):
+        other = xr.DataTree.from_dict({"/": made().to_dataset().drop_vars("stiffness"), "/block": xr.Dataset()})
+        found = compare(made(), other)
+        assert found.alone == (["/sensitivity"], ["/block"]) and found.groups[0].variables == (["stiffness"], [])
+        assert not compare(made(), other, groups=["/"], ignored=["stiff*"]).different
+
+
+class TestCommand:
+    def test_attributes_and_the_config_are_told_and_make_no_difference(self, tmp_path):
+        other = made()
+        other.attrs |= {"springtune_version": "1", "config": "title: small\nbeams: 2\n"}
+        other.attrs |= {"software": json.dumps({"numpy": "3.0"})}
+        paths = written(made(), tmp_path / "one.nc"), written(other, tmp_path / "other.nc")
+        result = run("diff", *paths, "--config")
+        assert result.exit_code == 0
+        said = [" ".join(line.split()) for line in result.stdout.splitlines()]
+        assert {"springtune_version 0 -> 1", "numpy none -> 3.0", "-beams: 1", "+beams: 2"} <= set(said)
+
+    def test_json_has_what_the_text_says(self, tmp_path):
+        other = made()
+        other["displacement"].loc[SCENE] = np.nan
+        other["status"].loc[SCENE] = st.Status.NOT_CONVERGED
+        result = run("diff", written(made(), tmp_path / "a.nc"), written(other, tmp_path / "b.nc"), "--json")
+        assert result.exit_code == 1
+        found = json.loads(result.stdout)
+        assert found["different"] and found["groups"]["/"]["cells_in_both"] == 32
+        (row,) = found["groups"]["/"]["values"]["displacement"]["rows"]
+        assert row["at"] == SCENE and row["after"] is None and row["over_tolerance"] is None
+        (row,) = found["groups"]["/"]["status"]["status"]["rows"]
+        assert (row["before"], row["after"]) == ("solved", "not_converged")
+
+    def test_studies_are_named(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        for name in ("one", "other"):
+            written(made(), tmp_path / f"results/{name}/dataset.nc")
+        for pair in (("one", "other"), ("results/one", "config/other.yaml"), ("results/one/dataset.nc", "other")):
+            assert run("diff", *pair).exit_code == 0
+
+    @pytest.mark.parametrize(
+        ("arguments", "said"),
+        [
+            (("none", "small"), "none: there is no such dataset; run the study, or give a dataset.nc"),
+            (("small", "text.nc"), "text.nc: cannot be read"),
+            (("small", "plain.nc"), "plain.nc: is not a dataset of springtune; give the dataset.nc of a study"),
+            (("small", "small", "--group", "curves"), "--group curves: neither has it; known: /, /sensitivity"),
+            (("small", "small", "--relative", "one"), "'one' is no tolerance; give a number such as 1e-6"),
+            (("small", "small", "--absolute", "-1"), "'-1' is no tolerance"),
+            (("small", "small", "--relative", "nan"), "'nan' is no tolerance"),
+            (("small", "twice.nc"), "dimension 'beam' has the label 200x40 twice"),
+        ],
+    )
+    def test_trouble_is_2_and_one_line(self, arguments, said, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        written(made(), tmp_path / "results/small/dataset.nc")
+        written(made(beam=("200x40", "200x40")), tmp_path / "twice.nc")
+        (tmp_path / "text.nc").write_text("text")
+        xr.Dataset({"a": 1}).to_netcdf(tmp_path / "plain.nc")
+        result = run("diff", *arguments)
+        assert result.exit_code == 2 and not result.stdout and said in result.stderr, result.output
+        assert len([line for line in result.stderr.splitlines() if line.startswith("Error")]) == 1

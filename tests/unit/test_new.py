@@ -1,0 +1,157 @@
+"""A study to begin with, and what is said of studies that cannot be run."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.cli import main
+from springtune.cli.new import LOADS_BY_FORCE
+from springtune.kinds import load_study
+from springtune.mesh import MESH_TYPES
+from springtune.problem.loads import LOADS
+
+from campaigns import Campaign
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def refused(result, code, *said):
+    assert result.exit_code == code, result.output
+    assert len([line for line in result.stderr.splitlines() if line.startswith(("Error", "config", "study"))]) == 1
+    for one in said:
+        assert one in result.stderr
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A folder as a checkout's."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config").mkdir()
+    for name in ("Snakefile", "workflow"):
+        (tmp_path / name).symlink_to(REPOSITORY / name)
+    shutil.copy(REPOSITORY / "config/study.schema.json", tmp_path / "config")
+    return tmp_path
+
+
+class TestNew:
+    def test_it_is_written_beside_the_others_and_says_what_is_next(self, checkout):
+        result = run("new", "my-study")
+        assert result.exit_code == 0
+        assert result.stdout.splitlines() == [
+            "config/my-study.yaml: 2 scenes; change it as you like, and run it:",
+            "  springtune run config/my-study.yaml",
+        ]
+        study = load_study("config/my-study.yaml")
+        assert len(study.scenes) == 2 and study.title == "My study"
+        assert {scene.definition for scene in study.scenes} == {"lattice", "patch"}
+
+    def test_it_is_short_and_what_its_comments_name_exists(self, checkout):
+        run("new", "my-study")
+        lines = Path("config/my-study.yaml").read_text().splitlines()
+        assert len([line for line in lines if not line.startswith("#")]) <= 15 and max(map(len, lines)) <= 120
+        (types,) = (line.partition("# or ")[2].split(", ") for line in lines if "mesh_type:" in line)
+        assert {"free", "right"} <= set(types) <= set(MESH_TYPES)
+        assert set(LOADS_BY_FORCE) <= set(LOADS)
+        for load in LOADS_BY_FORCE:  # each may be put in the place of the one that is there
+            text = "\n".join(lines).replace("load: traction", f"load: {load}")
+            Path("config/other.yaml").write_text(text)
+            assert len(load_study("config/other.yaml").scenes) == 2
+        assert (Path("config") / re.search(r"\$schema=(\S+)", lines[0])[1]).is_file()
+
+    def test_it_runs_as_it_is(self, checkout):
+        run("new", "my-study")
+        campaign = Campaign("config/my-study.yaml")
+        campaign.plan.write()
+        for name in campaign.jobs:
+            campaign.do(name)
+        with st.open("results/my-study") as tree:
+            scenes = tree.to_dataset().squeeze(drop=True)
+            assert (scenes.status == st.Status.SOLVED).all()
+            assert float(abs(scenes.deformation_error).max()) < 0.1
+        for product in ("figures", "tables/index.html", "index.html"):
+            assert (campaign.folder / product).exists()
+
+    @pytest.mark.parametrize("given", ["elsewhere/mine", "elsewhere/mine.yaml", "elsewhere/mine.yml"])
+    def test_a_path_is_taken_as_it_is(self, checkout, given):
+        (checkout / "elsewhere").mkdir()
+        assert run("new", given).exit_code == 0
+        (path,) = (checkout / "elsewhere").iterdir()
+        assert path.suffix == (Path(given).suffix or ".yaml") and len(load_study(path).scenes) == 2
+        assert "$schema=../config/study.schema.json" in path.read_text()
+
+    def test_outside_of_a_checkout_it_is_written_here(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        assert run("new", "my-study").exit_code == 0
+        assert len(load_study(tmp_path / "my-study.yaml").scenes) == 2
+        schema = re.search(r"\$schema=(\S+)", (tmp_path / "my-study.yaml").read_text())[1]
+        assert (tmp_path / schema).resolve() == REPOSITORY / "config/study.schema.json"
+
+    def test_nothing_is_overwritten(self, checkout):
+        run("new", "my-study")
+        Path("config/my-study.yaml").write_text("mine")
+        for given in ("my-study", "config/my-study.yaml"):
+            refused(
+                run("new", given), 1, "config/my-study.yaml: is there already; give another name, or change that file"
+            )
+        assert Path("config/my-study.yaml").read_text() == "mine"
+        Path("config/gone.yaml").symlink_to("nowhere")
+        refused(run("new", "gone"), 1, "is there already")
+
+    @pytest.mark.parametrize(
+        ("given", "said"),
+        [
+            ("a b", "'a b' cannot name a study; use letters, digits"),
+            (".hidden", "cannot name a study"),
+            ("", "cannot name a study"),
+            ("..", "cannot name a study"),
+            ("x" * 61, "cannot name a study"),
+            ("none/mine", "none: there is no such folder; make it, or name another"),
+            ("config", None),
+        ],
+    )
+    def test_names_that_cannot_be_are_told(self, checkout, given, said):
+        before = {path for path in checkout.rglob("*.yaml")}
+        result = run("new", given)
+        if said is None:  # a name like any other
+            assert result.exit_code == 0 and Path("config/config.yaml").is_file()
+            return
+        refused(result, 1, said)
+        assert {path for path in checkout.rglob("*.yaml")} == before
+
+    def test_a_place_that_takes_no_file_is_told(self):
+        refused(run("new", "/proc/self/mine"), 1, "/proc/self/mine.yaml: cannot be written: ", "; name another place")
+
+
+class TestRun:
+    """What `springtune run` says before Snakemake starts; bad content is tests/workflow/test_bad_studies.py's."""
+
+    @pytest.fixture(autouse=True)
+    def studies(self, checkout):
+        run("new", "one")
+        run("new", "two")
+        (checkout / "config/folder.yaml").mkdir()
+
+    @pytest.mark.parametrize(
+        ("arguments", "code", "said"),
+        [
+            (["config/one.yaml", "config/two.yaml"], 2, "one study at a time: springtune run config/one.yaml, then"),
+            (["config/one.yaml", "-n", "config/two.yaml"], 2, "one study at a time"),
+            (["config/folder.yaml"], 1, "config/folder.yaml: cannot be read: Is a directory; give the path of a study"),
+            (["config/three.yaml"], 1, "config/three.yaml: cannot be read: No such file or directory"),
+            (["one"], 1, "; did you mean config/one.yaml?"),
+            (["one.yaml"], 1, "; did you mean config/one.yaml?"),
+            (["results/one"], 1, "; did you mean config/one.yaml?"),
+        ],
+    )
+    def test_a_study_that_is_none_is_told(self, arguments, code, said):
+        result = run("run", *arguments)
+        assert result.exit_code == code and said in result.stderr
+        assert "Traceback" not in result.stderr
