@@ -12,7 +12,7 @@ doubled along the axis whose coefficients promise the larger error until both ar
 that are no nodes decide: the largest difference there, times a factor, is part of the error estimate.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -21,7 +21,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from ..problem.loads import LoadKind
-from .small_strain import ReferenceNotConvergedError, solve_unit
+from .small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_unit
 
 TOLERANCE = 2e-5
 """Largest relative error estimate of an interpolant by default [1], a fifth of that of a reference."""
@@ -48,6 +48,8 @@ points that changes with the aspect ratio, so they jump by a per cent; what they
 
 ROUNDING = 1e-9
 """How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
+
+Solver = Callable[[float, float, LoadKind, float], ReferenceSolution]
 
 NAMES = ("displacement", "mean_displacement", "rotation", "strain")
 
@@ -110,6 +112,7 @@ class Interpolant:
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
         most: int | None = None,
+        solve: Solver = solve_unit,
     ) -> Self:
         """Solve as many unit problems as an interpolant over a box needs.
 
@@ -125,6 +128,8 @@ class Interpolant:
             Largest relative error estimate to accept [1].
         most : int, optional
             Most solves that are worth it.
+        solve : callable, optional
+            Of an aspect ratio, Poisson's ratio, the kind of load and a tolerance: the solution of a unit problem.
 
         Returns
         -------
@@ -150,7 +155,7 @@ class Interpolant:
             raise ValueError(f"a range of aspect ratios is 0 < first <= last, not {first:g} to {last:g}")
         if not -1 < least <= largest <= 0.5:
             raise ValueError(f"a range of Poisson's ratios is -1 < first <= last <= 0.5, not {least:g} to {largest:g}")
-        box = _Box(kind, (float(first), float(last)), (float(least), float(largest)), tolerance, most)
+        box = _Box(kind, (float(first), float(last)), (float(least), float(largest)), tolerance, most, solve)
         values, error_estimate = box.certified()
         return cls(kind, box.aspect_range, box.nu_range, values, error_estimate, len(box.solved))
 
@@ -183,7 +188,7 @@ class Interpolant:
                 f"{' to '.join(f'{end:.6g}' for end in self.nu_range)}; build one over what is asked, or solve it"
             )
         along, across = (
-            _weights(np.clip(place.ravel(), -1, 1), count) for place, count in zip(places, self.values.shape[1:])
+            lagrange_values(np.clip(place.ravel(), -1, 1), count) for place, count in zip(places, self.values.shape[1:])
         )
         found = np.einsum("pa,qan,pn->qp", along, self.values, across, optimize=True).reshape(4, *aspects.shape)
         strain = np.exp(found[3])
@@ -235,9 +240,10 @@ class _Box:
         nu_range: tuple[float, float],
         tolerance: float,
         most: int | None,
+        solve: Solver,
     ) -> None:
         self.kind, self.aspect_range, self.nu_range = kind, aspect_range, nu_range
-        self.tolerance, self.most = tolerance, most
+        self.tolerance, self.most, self.solver = tolerance, most, solve
         #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
         self.solved: dict[tuple[float, float], tuple[np.ndarray, float]] = {}
         self.counts = [3 if last > first else 1 for first, last in (aspect_range, nu_range)]
@@ -246,7 +252,7 @@ class _Box:
         """Values at the nodes and the error estimate."""
         checks = self._checks()
         while True:
-            places = [_nodes(count) for count in self.counts]
+            places = [chebyshev_points(count) for count in self.counts]
             answers, estimate = self._solve([(along, across) for along in places[0] for across in places[1]])
             values = _well_behaved(answers).reshape(4, *self.counts)
             promised = [_promised(np.moveaxis(values[:2], axis, 1)) for axis in (1, 2)]
@@ -282,7 +288,7 @@ class _Box:
                 aspect = float(np.exp(_between(along, np.log(self.aspect_range))))
                 nu = float(np.clip(_between(across, self.nu_range), *self.nu_range))
                 try:
-                    found = solve_unit(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
+                    found = self.solver(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
                 except ReferenceNotConvergedError as error:
                     raise self._failure(str(error)) from error
                 answers = np.array([getattr(found, name) for name in NAMES])
@@ -296,7 +302,7 @@ class _Box:
             return estimate
         solved, of_checks = self._solve(checks)
         places = np.array(checks).T
-        along, across = (_weights(place, count) for place, count in zip(places, values.shape[1:]))
+        along, across = (lagrange_values(place, count) for place, count in zip(places, values.shape[1:]))
         differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _well_behaved(solved)).max(axis=1)
         if not differences[2:].max() <= JUDGED_WITHIN:
             raise self._failure(f"rotation and strain differ by {differences[2:].max():.1e} from those of solves")
@@ -315,24 +321,47 @@ def _well_behaved(answers: np.ndarray) -> np.ndarray:
     return np.stack([np.log(displacement), np.log(mean), np.log1p(rotation / strain), np.log(strain)])
 
 
-def _nodes(count: int) -> np.ndarray:
-    """Chebyshev points from 1 to -1, both included; one is in the middle."""
+def chebyshev_points(count: int) -> np.ndarray:
+    """Chebyshev points from 1 to -1, both included; one is in the middle.
+
+    Parameters
+    ----------
+    count : int
+
+    Returns
+    -------
+    ndarray of float, shape (count,)
+        Those of twice as many intervals hold the same numbers.
+    """
     if count == 1:
         return np.zeros(1)
-    # By the sine, since the same points of twice as many intervals are then the same numbers.
+    # By the sine: its arguments are the same numbers there, too.
     return np.sin(np.pi / 2 * np.arange(count - 1, -count, -2) / (count - 1))
 
 
-def _weights(places: np.ndarray, count: int) -> np.ndarray:
-    """Values of the Lagrange polynomials of the nodes, shape (n_places, count), by the barycentric formula.
+def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
+    """Values of the Lagrange polynomials of Chebyshev points, by the barycentric formula.
 
+    Parameters
+    ----------
+    places : ndarray of float, shape (n,)
+        From -1 to 1.
+    count : int
+        Number of points.
+
+    Returns
+    -------
+    ndarray of float, shape (n, count)
+
+    Notes
+    -----
     Berrut and Trefethen, Barycentric Lagrange interpolation, SIAM Review 46:501 (2004), formula 4.2 with weights 5.4.
     """
     if count == 1:
         return np.ones((len(places), 1))
     weights = (-1.0) ** np.arange(count)
     weights[[0, -1]] /= 2
-    distances = places[:, None] - _nodes(count)
+    distances = places[:, None] - chebyshev_points(count)
     at_node, node = np.nonzero(distances == 0)
     distances[at_node] = 1.0
     found = weights / distances
@@ -357,7 +386,7 @@ def _promised(values: np.ndarray) -> float:
     count = values.shape[1]
     if count == 1:
         return 0.0
-    series = np.linalg.solve(chebyshev.chebvander(_nodes(count), count - 1), values)
+    series = np.linalg.solve(chebyshev.chebvander(chebyshev_points(count), count - 1), values)
     sizes = np.abs(series).max(axis=(0, 2))
     before, last = (sizes[1], sizes[2]) if count == 3 else (sizes[-4:-2].max(), sizes[-2:].max())
     return float(last * min(last / before, 1.0)) if before > 0 else float(last)

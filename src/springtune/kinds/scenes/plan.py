@@ -12,7 +12,11 @@ from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
 from . import stored_mesh
+from .interpolated import expected_solves, interpolants
 from .stored_scene import calibrated_key
+
+INTERPOLANT = "interpolant"
+"""What stands in the place of a kind at finite strain."""
 
 
 def particles(mesh):
@@ -69,15 +73,31 @@ def stem(mesh):
     return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm{own}"
 
 
+def reference_of(study, beam, material, load):
+    """Reference of a beam, material and load, as `springtune.kinds.scenes.stored_reference.read` takes it."""
+    solved = solved_reference(beam, material, load)
+    name = LOADS[load].kind.name
+    box, problems = interpolants(study).get(name, (None, {}))
+    if (beam, material, load) not in problems:
+        return solved
+    return solved | {"interpolant": interpolant_key(name, box), "problem": problems[beam, material, load]}
+
+
 @cache
-def reference_of(beam, material, load):
-    """Reference of a beam, material and load, as `springtune.kinds.scenes.stored_reference.read` takes it.
+def interpolant_key(kind, box):
+    """Key of an interpolant, which all unit problems in its box share."""
+    return hash_of("interpolant", kind, box, stage_key("kinds.scenes.reference", without=("reference.finite_strain",)))
+
+
+@cache
+def solved_reference(beam, material, load):
+    """Reference that is solved by itself.
 
     Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
     kind.
     """
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain",))
+    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant"))
     key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
@@ -100,13 +120,13 @@ def _finite_problem(reference):
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind.name, curve.force, curve.kinematics]
-    parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
+    parameters += [stiffnesses(study, curve), reference_of(study, curve.mesh.beam, curve.material, curve.load)]
     return hash_of(parameters, stage_key("kinds.scenes.sensitivity"))
 
 
 def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    reference = reference_of(scene.mesh.beam, scene.material, scene.load)
+    reference = reference_of(study, scene.mesh.beam, scene.material, scene.load)
     parameters = [mesh_key(scene.mesh), scene.mesh.beam.thickness, material_key(scene.material), reference]
     parameters += [LOADS[scene.load].kind.name, _follows(scene), scene.force, scene.definition, scene.kinematics]
     parameters += [_given_stiffness(study, scene), _thickness_ratio(study, scene)]
@@ -193,13 +213,19 @@ def _mesh_products(content):
 
 def _reference_members(study, costs):
     """References in groups: unit problems that share elements and differ in Poisson's ratio; each at finite strain."""
-    groups = defaultdict(dict)
+    groups, boxes = defaultdict(dict), {}
     for reference in study.references:
+        if "interpolant" in reference_of(study, reference.beam, reference.material, reference.load):
+            kind = LOADS[reference.load].kind.name
+            boxes[kind] = interpolants(study)[kind]
+            continue
         aspect_ratio, nu, kind = _unit_problem(reference.beam, reference.material, reference.load)
         groups[hash_of(aspect_ratio, kind)].setdefault(nu, (reference, None))
     members = {
         name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
     }
+    for kind, (box, _) in boxes.items():
+        members[interpolant_key(kind, box)] = expected_solves(box) * costs.of("reference"), [(kind, INTERPOLANT)]
     for reference in study.references:
         for kind in study.further_references:
             name = hash_of(kind, _finite_problem(reference))
@@ -209,11 +235,13 @@ def _reference_members(study, costs):
 
 def _references(study, folder, groups):
     """References and their kinds at finite strain, nothing of a unit problem."""
-    references = [one for group in groups for one in group]
+    members = [one for group in groups for one in group]
+    interpolated = [_interpolant(study, name) for name, kind in members if kind == INTERPOLANT]
+    references = [member for member in members if member[1] != INTERPOLANT]
     return {
         "folder": str(folder / "references"),
         "references": [
-            {"key": reference_of(*problem)["key"], "problem": _unit_problem(*problem)}
+            {"key": solved_reference(*problem)["key"], "problem": _unit_problem(*problem)}
             for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
         ],
         "finite": [
@@ -229,11 +257,19 @@ def _references(study, folder, groups):
             for one, kind in references
             if kind is not None
         ],
-    }
+    } | ({"interpolants": interpolated} if interpolated else {})
+
+
+def _interpolant(study, kind):
+    """Interpolant, and the unit problems that are asked of it by the keys of those that are solved by themselves."""
+    box, problems = interpolants(study)[kind]
+    keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+    return {"key": interpolant_key(kind, box), "kind": kind, "box": box, "problems": keys}
 
 
 def _reference_products(content):
-    return [Path(content["folder"]) / f"{one['key']}.h5" for one in (*content["references"], *content["finite"])]
+    tasks = *content["references"], *content["finite"], *content.get("interpolants", ())
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in tasks]
 
 
 def _curve(study, curve):
@@ -243,7 +279,7 @@ def _curve(study, curve):
         "force": curve.force,
         "kinematics": curve.kinematics,
         "stiffnesses": stiffnesses(study, curve),
-        "reference": reference_of(curve.mesh.beam, curve.material, curve.load),
+        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
     }
 
 
@@ -293,7 +329,7 @@ def _scene(study, scene):
         "force": scene.force,
         "definition": scene.definition,
         "kinematics": scene.kinematics,
-        "reference": reference_of(scene.mesh.beam, scene.material, scene.load),
+        "reference": reference_of(study, scene.mesh.beam, scene.material, scene.load),
     }
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
