@@ -6,6 +6,7 @@ from ...jobs import store
 from ...output.dataset import Filler
 from . import plan
 from .batches import crossings, refine, value_key
+from .names import SPACINGS
 from .variables import COORDINATES, refinement_group
 
 COPIED = (
@@ -52,7 +53,8 @@ def _read(one, path):
 
 def _put(one, places, batches, results, where, data):
     labels = {"refinement": one.name, "definition": one.definition}
-    data.put({"parameter": one.parameter, "tolerance": one.rule.tolerance}, refinement=one.name)
+    about = {"parameter": one.parameter, "tolerance": one.rule.tolerance, "spacing": SPACINGS[one.rule.logarithmic]}
+    data.put(about, refinement=one.name)
     data.put({"values": len(places), "halved": max(batches)}, **labels)
     for point, (place, batch) in enumerate(zip(places, batches)):
         value = one.rule.value(place)

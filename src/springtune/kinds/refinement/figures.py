@@ -4,7 +4,7 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from .names import PARAMETERS
+from .names import PARAMETERS, SPACINGS
 
 
 def refinement(tree):
@@ -65,6 +65,8 @@ def plot_refinement(data, ax=None, *, refinement=None):
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
     for panel, name in zip(flat, names):
         panel.set_title(name)
+        if panel.get_xscale() == "log":
+            style.plain(panel, "x")
     labels.settle(figure, axes, place)
     for panel, found in zip(flat, ends):
         if found:
@@ -83,6 +85,8 @@ def _panel(panel, data):
     panel.axhline(0, color="0.45", linewidth=0.8)
     unit = f" [{known.shown}]" if known.shown else ""
     panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
+    if str(data.spacing.item()) == SPACINGS[1]:
+        panel.set_xscale("log")
     ends, number = [], 0
     for definition in data.definition.values.tolist():
         cell = data.sel(definition=definition)

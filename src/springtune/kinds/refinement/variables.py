@@ -1,21 +1,20 @@
 """Variables of the group ``/refinement``."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ...output.dataset import Group
 from .names import PARAMETERS
 
-REFINED, VALUE, CROSSING = (
-    ("refinement",),
-    ("refinement", "definition", "point"),
-    ("refinement", "definition", "crossing"),
-)
+REFINED = ("refinement",)
+VALUE, CROSSING = (*REFINED, "definition", "point"), (*REFINED, "definition", "crossing")
 
 COORDINATES = (*(f"refined_{name}" for name in PARAMETERS), "batch", "parameter")
 """Auxiliary coordinates."""
 
 
-def refinement_group(parameters):
+def refinement_group(parameters: Collection[str]) -> Group:
     """The group of a study.
 
     Parameters
@@ -37,6 +36,7 @@ def refinement_group(parameters):
         "/refinement",
         {
             "parameter": (REFINED, "1", "what is varied", ""),
+            "spacing": (REFINED, "1", "whether values or their logarithms are evenly spaced", ""),
             "tolerance": (REFINED, "1", "size of the error that matters", np.nan),
             "values": (("refinement", "definition"), "1", "number of values", 0),
             "halved": (("refinement", "definition"), "1", "batches after the first one", 0),
