@@ -45,6 +45,9 @@ outputs: [refinement]
 """
 
 
+UNITS = {"mesh_size": "m", "force": "N", "thickness": "m", "young_modulus": "Pa", "poisson_ratio": "1"}
+
+
 @pytest.fixture
 def load(tmp_path):
     def load(*changes):
@@ -201,14 +204,17 @@ def test_every_parameter_is_that_of_the_scene(load, tmp_path, parameter, first, 
     import springtune as sp
 
     study = load(
-        ("    force: 10 kN\n    mesh_size: 5 mm\n", others), ("[lattice, uniform]", "patch"), ("stiffness_scale", parameter),
-        ("from: 0.5", f"from: {first}"), ("to: 2\n", f"to: {last}\n    points: 3\n"), ("most: 24", "most: 3"),
-    )  # fmt: skip
+        ("    force: 10 kN\n    mesh_size: 5 mm\n", others),
+        ("[lattice, uniform]", "patch"),
+        ("stiffness_scale", parameter),
+        ("from: 0.5", f"from: {first}"),
+        ("to: 2\n", f"to: {last}\n    points: 3\n"),
+        ("most: 24", "most: 3"),
+    )
     run(study, tmp_path)
     one = collected(study, tmp_path).isel(refinement=0).sel(definition="patch")
     value = float(one[f"refined_{parameter}"][2])
-    assert one[f"refined_{parameter}"].attrs["units"] == {"mesh_size": "m", "force": "N", "thickness": "m",
-                                                          "young_modulus": "Pa", "poisson_ratio": "1"}[parameter]  # fmt: skip
+    assert one[f"refined_{parameter}"].attrs["units"] == UNITS[parameter]
     given = {"thickness": 1e-3, "young_modulus": 210e9, "poisson_ratio": 0.3, "mesh_size": 5e-3, "force": 1e3}
     given |= {parameter: value}
     beam = sp.Beam(0.1, 0.02, given["thickness"])

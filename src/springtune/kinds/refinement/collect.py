@@ -9,7 +9,7 @@ from .batches import crossings, refine, value_key
 from .names import SPACINGS
 from .variables import COORDINATES, refinement_group
 
-COPIED = (
+OF_A_VALUE = (
     "status",
     "message",
     "displacement",
@@ -60,7 +60,7 @@ def _put(one, places, batches, results, where, data):
         value = one.rule.value(place)
         result = results[value]
         values = {f"refined_{one.parameter}": value, "batch": batch}
-        data.put(values | {name: result[name] for name in COPIED if name in result}, point=point, **labels)
+        data.put(values | {name: result[name] for name in OF_A_VALUE if name in result}, point=point, **labels)
     for number, crossing in enumerate(where):
         values = {"crossing_level": crossing.level, "crossing_change": crossing.change}
         values |= {f"crossing_{one.parameter}": crossing.value, f"crossing_{one.parameter}_width": crossing.width}

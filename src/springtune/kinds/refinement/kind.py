@@ -33,7 +33,7 @@ from .names import PARAMETERS, SPACINGS
 from .outputs import OUTPUTS
 from .plan import STAGES
 
-MOST_VALUES = 10_001
+MOST_REFINED = 10_001
 """Most values of a refinement."""
 
 MADE = ("mesh_size", "force")
@@ -59,7 +59,7 @@ End = Annotated[
     str,
     Scalar(str, {"type": ["string", "number"], "examples": ["1 mm"]}, "a value of the parameter, such as '1 mm'"),
 ]
-Count = Annotated[int, number("a whole number from 2 to 10001, such as 33", 2, MOST_VALUES, whole=True)]
+Count = Annotated[int, number("a whole number from 2 to 10001, such as 33", 2, MOST_REFINED, whole=True)]
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 ParameterName = Annotated[str, one_of("parameter", PARAMETERS)]
 Spacing = Annotated[str, one_of("spacing", SPACINGS)]

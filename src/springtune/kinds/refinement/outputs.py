@@ -7,7 +7,7 @@ from ..base import Output
 if TYPE_CHECKING:
     from ...study.model import Study
 
-TABLES = ("refinement.csv", "refinement_crossings.csv")
+REFINEMENT_TABLES = ("refinement.csv", "refinement_crossings.csv")
 """Tables of the values, and of where errors are zero or the tolerance."""
 
 
@@ -21,7 +21,7 @@ OUTPUTS = (
         "the figure of refinements, and tables of their values and of where errors are zero or the tolerance",
         figures=lambda study: {"refinement": {}},
         plot="kinds.refinement.figures:refinement",
-        tables=lambda study: TABLES,
+        tables=lambda study: REFINEMENT_TABLES,
         write="kinds.refinement.tables",
         lack=_lack,
     ),

@@ -9,7 +9,7 @@ from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, 
 from ...problem.loads import LOADS
 from ..base import Stage
 
-USUAL = 1e3
+USUAL_PARTICLES = 1e3
 """Particles of a mesh, where they are not known: of the costs."""
 
 
@@ -50,7 +50,7 @@ def _members(study, costs):
 def _seconds(one, costs):
     """Half of the values that a refinement may have, each on the mesh that is known."""
     size = one.mesh_size or one.rule.first
-    particles = one.beam.length * one.beam.height / (0.866 * size**2) if size else USUAL
+    particles = one.beam.length * one.beam.height / (0.866 * size**2) if size else USUAL_PARTICLES
     return 0.5 * (one.rule.points + one.rule.most) * costs.of("refinement", particles)
 
 

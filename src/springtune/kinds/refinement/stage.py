@@ -25,7 +25,7 @@ from ...scene.sheet import Sheet
 from ...springs import DefinitionError
 from .batches import Rule, refine, value_key
 
-BETWEEN = "/"
+SEPARATOR = "/"
 """Between the key of a file and that of a value, in the name of a task."""
 
 
@@ -59,7 +59,7 @@ def _errors(task, solver, known, keeper, spent, values):
     for value in values:
         name = value_key(value)
         if name not in known:
-            result = spent.attempt(f"{task['key']}{BETWEEN}{name}", partial(solver.solve, value), _hole)
+            result = spent.attempt(f"{task['key']}{SEPARATOR}{name}", partial(solver.solve, value), _hole)
             if result is None:  # the program is broken: the job ends with an error
                 found.append(np.nan)
                 continue
@@ -78,7 +78,7 @@ def lose(tasks, key, why, limits):
     key, why, limits : str
         Of the value; what became of it; the limits.
     """
-    name, _, value = key.partition(BETWEEN)
+    name, _, value = key.partition(SEPARATOR)
     store.add(Path(tasks["folder"]) / f"{name}.h5", {value: _hole(why) | {store.LIMITS: limits}})
 
 

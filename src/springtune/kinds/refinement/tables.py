@@ -8,7 +8,7 @@ from ...jobs.atomic import write_text
 from ...output.dataset import STATUS
 from ...output.tables import csv_text
 from .names import PARAMETERS
-from .outputs import TABLES
+from .outputs import REFINEMENT_TABLES
 
 COLUMNS = ("refinement", "definition", "parameter", "unit", "error", "value", "width", "change")
 """Columns of the table of crossings."""
@@ -31,9 +31,9 @@ def write(tree, folder):
         Names of the files written.
     """
     data = tree["refinement"].to_dataset()
-    for name, rows in zip(TABLES, (_values(data), _crossings(data))):
+    for name, rows in zip(REFINEMENT_TABLES, (_values(data), _crossings(data))):
         write_text(Path(folder) / name, csv_text(rows))
-    return list(TABLES)
+    return list(REFINEMENT_TABLES)
 
 
 def _cells(data):

@@ -7,8 +7,8 @@ import numpy as np
 from ...output.dataset import Group
 from .names import PARAMETERS
 
-REFINED = ("refinement",)
-VALUE, CROSSING = (*REFINED, "definition", "point"), (*REFINED, "definition", "crossing")
+OF_ONE = ("refinement",)
+VALUE, CROSSING = (*OF_ONE, "definition", "point"), (*OF_ONE, "definition", "crossing")
 
 COORDINATES = (*(f"refined_{name}" for name in PARAMETERS), "batch", "parameter")
 """Auxiliary coordinates."""
@@ -35,9 +35,9 @@ def refinement_group(parameters: Collection[str]) -> Group:
     return Group(
         "/refinement",
         {
-            "parameter": (REFINED, "1", "what is varied", ""),
-            "spacing": (REFINED, "1", "whether values or their logarithms are evenly spaced", ""),
-            "tolerance": (REFINED, "1", "size of the error that matters", np.nan),
+            "parameter": (OF_ONE, "1", "what is varied", ""),
+            "spacing": (OF_ONE, "1", "whether values or their logarithms are evenly spaced", ""),
+            "tolerance": (OF_ONE, "1", "size of the error that matters", np.nan),
             "values": (("refinement", "definition"), "1", "number of values", 0),
             "halved": (("refinement", "definition"), "1", "batches after the first one", 0),
             **values,
@@ -59,3 +59,7 @@ def refinement_group(parameters: Collection[str]) -> Group:
             "crossing": "number of a crossing, ascending",
         },
     )
+
+
+REFINEMENT = refinement_group(PARAMETERS)
+"""The group with all that a study may vary."""
