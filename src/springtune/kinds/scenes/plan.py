@@ -225,7 +225,7 @@ def _reference_members(study, costs):
         name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
     }
     for kind, (box, _) in boxes.items():
-        members[interpolant_key(kind, box)] = expected_solves(box) * costs.of("reference"), [(kind, INTERPOLANT)]
+        members[interpolant_key(kind, box)] = costs.of("interpolant", expected_solves(box)), [(kind, INTERPOLANT)]
     for reference in study.references:
         for kind in study.further_references:
             name = hash_of(kind, _finite_problem(reference))

@@ -84,7 +84,7 @@ def _interpolant(path, task, spent):
             return
         result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
         store.add(path, {task["key"]: result})
-        spent.add("reference", 0, result["seconds"], result.get("solves", 1))
+        spent.add("interpolant", result.get("solves", 0), result["seconds"])
     known = store.stored(path, spent.limits)
     if "solves" in store.read(path, [task["key"]])[task["key"]]:
         return
@@ -99,7 +99,7 @@ def _interpolant(path, task, spent):
                 continue
             scalars = {name: value for name, value in result.items() if name not in ("x", "y", "displacements")}
             keeper[key] = scalars | {"seconds": time.perf_counter() - begin}
-            spent.add("reference", 0, time.perf_counter() - begin)
+            spent.add("interpolant", 1, time.perf_counter() - begin, 0)
 
 
 def _built(task):
