@@ -25,6 +25,7 @@ _NAMES = {
     ),
     "kinds.laying.figures": ("plot_laying",),
     "kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
+    "kinds.refinement.figures": ("plot_refinement",),
     "kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
     "kinds.scenes.sweeps": ("plot_sweep",),
     "kinds.stability.figures": (
@@ -99,6 +100,7 @@ __all__ = [
     "plot_deformed",
     "plot_laying",
     "plot_moduli",
+    "plot_refinement",
     "plot_sensitivity",
     "plot_size",
     "plot_stability_buckling",

@@ -142,7 +142,8 @@ def test_another_version_of_a_package_computes_again_what_it_computes(distributi
         keys.stage_key,
         dependencies.distribution,
         plan.mesh_key,
-        plan.reference_of,
+        plan.solved_reference,
+        plan.interpolant_key,
     ]
     shutil.copytree(complete, tmp_path / "study")
     monkeypatch.chdir(tmp_path / "study")

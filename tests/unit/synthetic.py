@@ -129,6 +129,23 @@ def stability():
     return data.assign_coords(experiment=done)
 
 
+def refinement():
+    """Two refinements of two definitions; of one of them the last value is not there."""
+    labels = {"refinement": ["size", "thick"], "definition": DEFINITIONS, "point": range(4), "crossing": range(2)}
+    value, crossing = ("refinement", "definition", "point"), ("refinement", "definition", "crossing")
+    named = {"refined_mesh_size": value, "refined_thickness": value, "deformation_error": value}
+    named |= {f"crossing_{name}": crossing for name in ("mesh_size", "mesh_size_width", "thickness", "thickness_width")}
+    data = variables(labels, **named, crossing_change=crossing)
+    data["tolerance"] = "refinement", [0.01, 0.02]
+    data["parameter"] = "refinement", np.array(["mesh_size", "thickness"], dtype=object)
+    data["spacing"] = "refinement", np.array(["logarithmic", "linear"], dtype=object)
+    data["values"] = ("refinement", "definition"), np.array([[4, 3], [4, 4]])
+    data["crossing_level"] = xr.zeros_like(data.crossing_change)
+    data["status"] = xr.ones_like(data.deformation_error, dtype=np.int8)
+    data.deformation_error[0, 1, 3] = np.nan
+    return data
+
+
 def benchmark():
     labels = {
         "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
@@ -146,6 +163,6 @@ def benchmark():
 def dataset():
     """The tree of a study of all kinds: every label that the groups share is in each of them, and all is solved."""
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
-    groups |= {"stability": stability, "benchmark": benchmark}
+    groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})

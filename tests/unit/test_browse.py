@@ -105,10 +105,11 @@ class TestPage:
         from springtune.kinds.benchmark.variables import BENCHMARK
         from springtune.kinds.laying.variables import LAYING
         from springtune.kinds.moduli.variables import MODULI
+        from springtune.kinds.refinement.variables import REFINEMENT
         from springtune.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
         from springtune.kinds.stability.variables import STABILITY
 
-        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK)
+        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK, REFINEMENT)
         known = {group.name: group for group in groups}
         for view in views().values():
             variables = known[view.group].variables

@@ -322,7 +322,9 @@ def forget():
 def _keys():
     forget()
     found = {stage.module: keys.stage_key(stage.module) for stage in stages()}
-    found["unit"] = keys.stage_key("kinds.scenes.reference", without=("reference.finite_strain",))
+    found["unit"] = keys.stage_key(
+        "kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant")
+    )
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
     return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}
 

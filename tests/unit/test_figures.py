@@ -28,6 +28,7 @@ from springtune.kinds.benchmark.figures import (
 )
 from springtune.kinds.laying.figures import plot_laying
 from springtune.kinds.moduli.figures import definitions, plot_definitions_loads, plot_definitions_size, plot_moduli
+from springtune.kinds.refinement.figures import plot_refinement
 from springtune.kinds.scenes import figures
 from springtune.kinds.scenes.figures import NETWORK_LINE, plot_block, plot_deformed, plot_sensitivity, plot_size
 from springtune.kinds.stability.figures import (
@@ -76,6 +77,7 @@ EVERY_PLOT = {
     ),
     plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
     plot_laying: ({}, (4, 3)),
+    plot_refinement: ({}, 2),
     plot_benchmark: ({"scene": "bending"}, None),
     plot_benchmark_rates: ({}, (2, 2)),
     plot_benchmark_costs: ({"scene": "bending"}, 2),

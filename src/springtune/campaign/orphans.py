@@ -18,7 +18,10 @@ JOB_FILES = {"tasks": ".json", "done": ".json", "logs": ".log", "benchmarks": ".
 OUTPUT_FILES = {"figures": tuple(f".{ending}" for ending in FORMATS), "tables": (".csv", ".html", ".md")}
 """Folders of outputs, and how their files end."""
 
-STORED, STORES = ".h5", {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark"}
+STORED, STORES = (
+    ".h5",
+    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement"},
+)
 """Ending of what stages store, see `springtune.jobs.store`, and the folders where they do."""
 
 

@@ -199,7 +199,6 @@ def _part(study: "Study", scenes: "list[SceneSpec]") -> "Study":
         meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
         references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
         further_references=(),
-        outputs=(),
         printed=(),
         parts={name: part if name == "scenes" else () for name, part in study.parts.items()},
     )

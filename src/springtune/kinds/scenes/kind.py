@@ -18,6 +18,7 @@ KIND = Kind(
         "nonlinear": (1.5e-3, 1e-5),
         "curve": (1.5e-3, 1e-5),
         "reference": (3e-2, 0.0),
+        "interpolant": (0.0, 3e-2),
         "finite": (1.0, 0.0),
         # Definitions that search, on top of their scenes.
         "adjoint": (0.05, 2e-4),

@@ -9,12 +9,15 @@ from typing import Any
 from ...jobs.hashing import hash_of
 from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...problem.loads import LOADS
-from ...problem.parameters import shown_order
 from ...reference.similarity import unit_problem, unit_scales
-from ...study.model import swept_value
 from ..base import Stage
 from . import stored_mesh
+from .interpolated import expected_solves, interpolants
+from .shown import shown
 from .stored_scene import calibrated_key
+
+INTERPOLANT = "interpolant"
+"""What stands in the place of a kind at finite strain."""
 
 
 def particles(mesh):
@@ -71,15 +74,31 @@ def stem(mesh):
     return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm{own}"
 
 
+def reference_of(study, beam, material, load):
+    """Reference of a beam, material and load, as `springtune.kinds.scenes.stored_reference.read` takes it."""
+    solved = solved_reference(beam, material, load)
+    name = LOADS[load].kind.name
+    box, problems = interpolants(study).get(name, (None, {}))
+    if (beam, material, load) not in problems:
+        return solved
+    return solved | {"interpolant": interpolant_key(name, box), "problem": problems[beam, material, load]}
+
+
 @cache
-def reference_of(beam, material, load):
-    """Reference of a beam, material and load, as `springtune.kinds.scenes.stored_reference.read` takes it.
+def interpolant_key(kind, box):
+    """Key of an interpolant, which all unit problems in its box share."""
+    return hash_of("interpolant", kind, box, stage_key("kinds.scenes.reference", without=("reference.finite_strain",)))
+
+
+@cache
+def solved_reference(beam, material, load):
+    """Reference that is solved by itself.
 
     Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
     kind.
     """
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain",))
+    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant"))
     key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
@@ -102,54 +121,55 @@ def _finite_problem(reference):
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
     parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind.name, curve.force, curve.kinematics]
-    parameters += [stiffnesses(study, curve), reference_of(curve.mesh.beam, curve.material, curve.load)]
+    parameters += [stiffnesses(study, curve), reference_of(study, curve.mesh.beam, curve.material, curve.load)]
     return hash_of(parameters, stage_key("kinds.scenes.sensitivity"))
 
 
 def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    parameters = [scene.force, _given_stiffness(study, scene), _thickness_ratio(study, scene), scene.stiffness_scale]
-    return hash_of(_common_key(scene.mesh, scene.material, scene.load, scene.definition, scene.kinematics), parameters)
+    return hash_of(
+        _common(study, scene)["key"],
+        scene.force,
+        _given_stiffness(study, scene),
+        _thickness_ratio(study, scene),
+        scene.stiffness_scale,
+    )
 
 
-@cache
-def _common_key(mesh, material, load, definition, kinematics):
-    """What keys of scenes share that differ in their force or by a factor on the stiffness."""
-    parameters = [mesh_key(mesh), mesh.beam.thickness]
-    parameters.append(_common_task(mesh.beam, material, load, definition, kinematics))
-    return hash_of(parameters, stage_key("kinds.scenes.solve"), definition_key(definition))
+_shared: dict[str, Any] = {}
 
 
-_shown: dict[int, tuple[Any, Any]] = {}
+def _common(study, scene):
+    """What scenes share that differ in their force or by a factor on the stiffness: part of their tasks, and its key."""
+    if _shared.get("grids") is not study.grids or _shared["outputs"] != study.outputs:
+        _shared.clear()
+        _shared.update(grids=study.grids, outputs=study.outputs, parts={})
+    place = scene.mesh, scene.material, scene.load, scene.definition, scene.kinematics
+    if place not in _shared["parts"]:
+        load, mesh = LOADS[scene.load], scene.mesh
+        task = {
+            "material": material_key(scene.material),
+            "kind": load.kind.name,
+            # Linear kinematics know no other place of what a force follows than that at rest.
+            "follower": load.follower and scene.kinematics == "nonlinear",
+            "definition": scene.definition,
+            "kinematics": scene.kinematics,
+            "reference": reference_of(study, mesh.beam, scene.material, scene.load),
+        }
+        code = stage_key("kinds.scenes.solve"), definition_key(scene.definition)
+        key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
+        _shared["parts"][place] = {"task": task, "key": key}
+    return _shared["parts"][place]
+
+
+_shown: dict[str, Any] = {}
 
 
 def shown_scenes(study):
-    """Scenes whose whole fields are kept, whether or not they are drawn.
-
-    They are those on the coarsest mesh of each beam and mesh type; of what is swept each beam, material and load shows
-    one value, see `springtune.problem.parameters.shown_order`.
-    """
-    items, found = _shown.get(0, (None, None))
-    if items is not study.scenes:
-        _shown[0] = study.scenes, _find_shown(study)
-    return _shown[0][1]
-
-
-def _find_shown(study):
-    coarsest = {}
-    for mesh in study.meshes:
-        place = mesh.beam.name, mesh.mesh_type
-        coarsest[place] = max(coarsest.get(place, 0.0), mesh.mesh_size)
-    first, candidates = {}, []
-    for scene in study.scenes:
-        beam = scene.mesh.beam
-        body = beam.name, scene.material.name, scene.load
-        rank = [shown_order(name, swept_value(scene, beam, name)) for name in study.swept]
-        if rank > first.get(body, []):
-            first[body] = rank
-        if scene.mesh.mesh_size == coarsest[beam.name, scene.mesh.mesh_type]:
-            candidates.append((scene, body, rank))
-    return frozenset(scene for scene, body, rank in candidates if rank == first.get(body, []))
+    """Scenes whose whole fields are kept, whether or not they are drawn."""
+    if _shown.get("scenes") is not study.scenes:
+        _shown.update(scenes=study.scenes, found=shown(study.scenes, study.swept))
+    return _shown["found"]
 
 
 def solved_key(study, scene, calibration):
@@ -214,13 +234,19 @@ def _mesh_products(content):
 
 def _reference_members(study, costs):
     """References in groups: unit problems that share elements and differ in Poisson's ratio; each at finite strain."""
-    groups = defaultdict(dict)
+    groups, boxes = defaultdict(dict), {}
     for reference in study.references:
+        if "interpolant" in reference_of(study, reference.beam, reference.material, reference.load):
+            kind = LOADS[reference.load].kind.name
+            boxes[kind] = interpolants(study)[kind]
+            continue
         aspect_ratio, nu, kind = _unit_problem(reference.beam, reference.material, reference.load)
         groups[hash_of(aspect_ratio, kind)].setdefault(nu, (reference, None))
     members = {
         name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
     }
+    for kind, (box, _) in boxes.items():
+        members[interpolant_key(kind, box)] = costs.of("interpolant", expected_solves(box)), [(kind, INTERPOLANT)]
     for reference in study.references:
         for kind in study.further_references:
             name = hash_of(kind, _finite_problem(reference))
@@ -230,11 +256,13 @@ def _reference_members(study, costs):
 
 def _references(study, folder, groups):
     """References and their kinds at finite strain, nothing of a unit problem."""
-    references = [one for group in groups for one in group]
+    members = [one for group in groups for one in group]
+    interpolated = [_interpolant(study, name) for name, kind in members if kind == INTERPOLANT]
+    references = [member for member in members if member[1] != INTERPOLANT]
     return {
         "folder": str(folder / "references"),
         "references": [
-            {"key": reference_of(*problem)["key"], "problem": _unit_problem(*problem)}
+            {"key": solved_reference(*problem)["key"], "problem": _unit_problem(*problem)}
             for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
         ],
         "finite": [
@@ -250,11 +278,19 @@ def _references(study, folder, groups):
             for one, kind in references
             if kind is not None
         ],
-    }
+    } | ({"interpolants": interpolated} if interpolated else {})
+
+
+def _interpolant(study, kind):
+    """Interpolant, and the unit problems that are asked of it by the keys of those that are solved by themselves."""
+    box, problems = interpolants(study)[kind]
+    keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+    return {"key": interpolant_key(kind, box), "kind": kind, "box": box, "problems": keys}
 
 
 def _reference_products(content):
-    return [Path(content["folder"]) / f"{one['key']}.h5" for one in (*content["references"], *content["finite"])]
+    tasks = *content["references"], *content["finite"], *content.get("interpolants", ())
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in tasks]
 
 
 def _curve(study, curve):
@@ -264,7 +300,7 @@ def _curve(study, curve):
         "force": curve.force,
         "kinematics": curve.kinematics,
         "stiffnesses": stiffnesses(study, curve),
-        "reference": reference_of(curve.mesh.beam, curve.material, curve.load),
+        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
     }
 
 
@@ -285,12 +321,12 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
-    scenes, shown = by_mesh(study.scenes), shown_scenes(study)
+    scenes, kept = by_mesh(study.scenes), shown_scenes(study)
     families = [
         {
             "name": stem(mesh),
             "thickness": mesh.beam.thickness,
-            "scenes": [_scene(study, scene, shown) for scene in scenes[mesh]],
+            "scenes": [_scene(study, scene, kept) for scene in scenes[mesh]],
         }
         for meshes in members
         for mesh in meshes
@@ -304,33 +340,19 @@ def _solve(study, folder, members):
     }
 
 
-def _scene(study, scene, shown):
-    common = _common_task(scene.mesh.beam, scene.material, scene.load, scene.definition, scene.kinematics)
-    task = common | {"key": scene_key(study, scene), "force": scene.force}
+def _scene(study, scene, kept):
+    task = _common(study, scene)["task"] | {"key": scene_key(study, scene), "force": scene.force}
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
     if scene.stiffness_scale != 1:
         task["stiffness_scale"] = scene.stiffness_scale
-    if scene in shown:
+    if scene in kept:
         task["keep_fields"] = True
     if scene.definition == "calibrated":
         task["calibration"] = calibration_name(scene)
         task["thickness_ratio"] = _thickness_ratio(study, scene)
     return task
-
-
-@cache
-def _common_task(beam, material, load, definition, kinematics):
-    """What tasks of scenes share."""
-    return {
-        "material": material_key(material),
-        "kind": LOADS[load].kind.name,
-        "follower": LOADS[load].follower and kinematics == "nonlinear",  # linear kinematics know only the place at rest
-        "definition": definition,
-        "kinematics": kinematics,
-        "reference": reference_of(beam, material, load),
-    }
 
 
 def _family_products(content):

@@ -1,13 +1,20 @@
-"""Stage `reference`: one finite-element solution a unit problem, and one a scene at finite strain."""
+"""Stage `reference`: one finite-element solution a unit problem, and one a scene at finite strain.
+
+Where a study has many unit problems, an interpolant answers for all of a kind of load.
+"""
 
 import time
 from functools import partial
+from pathlib import Path
 
 from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
 from ...reference.small_strain import ReferenceNotConvergedError, solve_unit
+
+REFERENCE_TOLERANCE = 1e-4
+"""Largest error estimate of an interpolant that stands for references that are solved by themselves [1]: theirs."""
 
 
 def run(tasks, spent):
@@ -18,7 +25,9 @@ def run(tasks, spent):
     tasks : dict
         ``folder``, ``references``, each with ``key`` and ``problem``, what
         `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
-        with ``key, beam, material, force, load, plane, follower``, where ``load`` is the name of the kind.
+        with ``key, beam, material, force, load, plane, follower``, where ``load`` is the name of the kind. There may be
+        ``interpolants``, each with ``key``, ``kind``, by name, ``box`` (of aspect ratios and Poisson's ratios) and
+        ``problems``, the two ratios of each unit problem that is asked of it, by its own key.
     spent : Spent
         What tasks cost is added to it.
     """
@@ -31,6 +40,8 @@ def run(tasks, spent):
             result["seconds"] = time.perf_counter() - begin
             store.add(path, {task["key"]: result})
             spent.add(kind, 0, result["seconds"])
+    for task in tasks.get("interpolants", ()):
+        _interpolant(Path(tasks["folder"]) / f"{task['key']}.h5", task, spent)
 
 
 def lose(tasks, key, why, limits):
@@ -43,7 +54,10 @@ def lose(tasks, key, why, limits):
     key, why, limits : str
         Of the reference; what became of it; the limits.
     """
-    store.lose(tasks["folder"], key, _hole(why), limits)
+    interpolants = [task for task in tasks.get("interpolants", ()) if key in (task["key"], *task["problems"])]
+    # What an interpolant cannot do goes into its own file.
+    for name in [task["key"] for task in interpolants] or [key]:
+        store.add(Path(tasks["folder"]) / f"{name}.h5", {key: _hole(why) | {store.LIMITS: limits}})
 
 
 def _hole(why):
@@ -59,6 +73,46 @@ def _unit(task):
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
+
+
+def _interpolant(path, task, spent):
+    """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it."""
+    if task["key"] not in store.stored(path, spent.limits):
+        begin = time.perf_counter()
+        result = spent.attempt(task["key"], partial(_built, task), _hole)
+        if result is None:
+            return
+        result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
+        store.add(path, {task["key"]: result})
+        spent.add("interpolant", result.get("solves", 0), result["seconds"])
+    known = store.stored(path, spent.limits)
+    if "solves" in store.read(path, [task["key"]])[task["key"]]:
+        return
+    missing = [key for key in task["problems"] if key not in known]
+    # Those that share elements follow each other.
+    with store.Keeper(path) as keeper:
+        for key in sorted(missing, key=task["problems"].get):
+            begin = time.perf_counter()
+            problem = {"problem": (*task["problems"][key], task["kind"])}
+            result = spent.attempt(key, partial(_unit, problem), _hole)
+            if result is None:
+                continue
+            scalars = {name: value for name, value in result.items() if name not in ("x", "y", "displacements")}
+            keeper[key] = scalars | {"seconds": time.perf_counter() - begin}
+            spent.add("interpolant", 1, time.perf_counter() - begin, 0)
+
+
+def _built(task):
+    """An interpolant, within its own tolerance or within that of references; else why there is none."""
+    # Here, since few studies need it.
+    from ...reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError
+
+    for tolerance in (TOLERANCE, REFERENCE_TOLERANCE):
+        try:
+            return Interpolant.build(LOAD_KINDS[task["kind"]], *task["box"], tolerance).arrays() | {"message": ""}
+        except NotCertifiedError as error:
+            why = str(error)
+    return {"message": why}
 
 
 def _finite(task):

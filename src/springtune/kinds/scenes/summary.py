@@ -5,6 +5,7 @@ from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem
 from ...springs import DEFINITIONS
 from ...study.model import SceneSpec, Study
+from .interpolated import expected_solves, interpolants
 
 
 def summary(study: Study, further: list[list[object]]) -> str:
@@ -20,7 +21,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
     -------
     str
     """
-    units = {unit_problem(one.beam, one.material, LOADS[one.load].kind) for one in study.references}
+    solutions = _solutions(study)
     networks = _networks(study)
     requested = sum(len(grid.scenes) for grid in study.grids)
     users = len(study.scenes) + len(study.curves)
@@ -32,7 +33,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
         [
             "references",
             len(study.references),
-            f"from {_count(len(units), 'solution')}: small strain scales with force, E t and size",
+            f"from {solutions}: small strain scales with force, E t and size",
         ],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
         ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
@@ -42,6 +43,19 @@ def summary(study: Study, further: list[list[object]]) -> str:
         rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
     lines = [f"{study.name}: {study.title}", "", aligned(rows, left=0, right=(1,)), ""]
     return "\n".join([*lines, aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))])
+
+
+def _solutions(study: Study) -> str:
+    """How many finite-element solutions the references take, in words."""
+    problems, known = set(), interpolants(study)
+    for one in study.references:
+        kind = LOADS[one.load].kind
+        if (one.beam, one.material, one.load) not in known.get(kind.name, (None, {}))[1]:
+            problems.add(unit_problem(one.beam, one.material, kind))
+    if not known:
+        return _count(len(problems), "solution")
+    count = len(problems) + sum(expected_solves(box) for box, _ in known.values())
+    return f"about {count} solutions and interpolation between them"
 
 
 def _count(number: int, noun: str) -> str:

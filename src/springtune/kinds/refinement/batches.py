@@ -1,0 +1,184 @@
+"""Which values a refinement takes: in batches, where the error changes its sign or crosses a tolerance.
+
+Values have places from 0 to 1 between the two ends. The first batch is evenly spaced; every further one halves all
+intervals in which the error crosses zero or the tolerance, of either sign, and which are wider than the resolution. So
+the places are the same whatever number of values a study allows, and a larger number goes on where a smaller one ended.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Where a refinement looks, and how far it goes.
+
+    Attributes
+    ----------
+    first, last : float
+        Ends of the values.
+    points : int
+        Values of the first batch.
+    logarithmic : bool
+        Whether values are spaced by their logarithms.
+    tolerance : float
+        Size of the error that matters [1].
+    resolution : float
+        Widest interval that is not halved any more, over that between the ends [1].
+    most : int
+        Most values.
+
+    Examples
+    --------
+    >>> rule = Rule(1.0, 100.0, 3, True, 0.01, 0.1, 9)
+    >>> [round(rule.value(place), 6) for place in (0, 0.5, 1)]
+    [1.0, 10.0, 100.0]
+    """
+
+    first: float
+    last: float
+    points: int
+    logarithmic: bool
+    tolerance: float
+    resolution: float
+    most: int
+
+    def value(self, place: float) -> float:
+        """Value at a place from 0 to 1.
+
+        Parameters
+        ----------
+        place : float
+
+        Returns
+        -------
+        float
+            To twelve digits; the ends are exact.
+        """
+        if place in (0, 1):
+            return self.last if place else self.first
+        if self.logarithmic:
+            return float(f"{self.first * (self.last / self.first) ** place:.12g}")
+        return float(f"{self.first + place * (self.last - self.first):.12g}")
+
+    @property
+    def levels(self) -> tuple[float, float, float]:
+        """Errors whose crossings are looked for [1]."""
+        return 0.0, self.tolerance, -self.tolerance
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where the error is zero, or the tolerance.
+
+    Attributes
+    ----------
+    level : float
+        The error that is crossed [1].
+    value : float
+        By a straight line between the two values that enclose it.
+    width : float
+        Distance of these.
+    change : float
+        By how much the error changes between them, with its sign [1]: at a jump it stays as large as it is.
+    """
+
+    level: float
+    value: float
+    width: float
+    change: float
+
+
+def value_key(value: float) -> str:
+    """Key of a value's result in the file of its refinement.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    str
+    """
+    return f"{value:.12g}"
+
+
+def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple[list[float], list[int], list[float]]:
+    """Values, batch after batch.
+
+    Parameters
+    ----------
+    rule : Rule
+    solve : callable
+        Errors [1] at values, which are all of a batch; NaN where there is none.
+
+    Returns
+    -------
+    places : list of float
+        Ascending, from 0 to 1.
+    batches : list of int
+        Batch that each came in, from 0.
+    errors : list of float
+
+    Examples
+    --------
+    >>> rule = Rule(0.0, 1.0, 3, False, 10.0, 0.1, 100)
+    >>> places, batches, errors = refine(rule, lambda values: [value - 0.3 for value in values])
+    >>> places, batches
+    ([0.0, 0.25, 0.3125, 0.375, 0.5, 1.0], [0, 1, 3, 2, 0, 0])
+    """
+    known: dict[float, tuple[int, float]] = {}
+    wanted, batch = [step / (rule.points - 1) for step in range(rule.points)], 0
+    while wanted:
+        errors = solve([rule.value(place) for place in wanted])
+        known |= {place: (batch, float(error)) for place, error in zip(wanted, errors)}
+        wanted, batch = _halved(rule, known)[: rule.most - len(known)], batch + 1
+    places = sorted(known)
+    return places, [known[place][0] for place in places], [known[place][1] for place in places]
+
+
+def _halved(rule: Rule, known: dict[float, tuple[int, float]]) -> list[float]:
+    """Middles of the intervals to halve, of the widest first."""
+    places, found = sorted(known), []
+    for low, high in zip(places, places[1:]):
+        ends = known[low][1], known[high][1]
+        if high - low > rule.resolution and any(_crosses(*ends, level) for level in rule.levels):
+            found.append((low - high, (low + high) / 2))
+    return [middle for _, middle in sorted(found)]
+
+
+def _crosses(one: float, other: float, level: float) -> bool:
+    """Whether two errors are on different sides of a level; one that is not there is on none."""
+    return bool(np.isfinite([one, other]).all()) and (one >= level) != (other >= level)
+
+
+def crossings(rule: Rule, places: Sequence[float], errors: Sequence[float]) -> list[Crossing]:
+    """Where the error is zero, or the tolerance, by the last values.
+
+    Parameters
+    ----------
+    rule : Rule
+    places, errors : sequence of float
+        As `refine` gives them.
+
+    Returns
+    -------
+    list of Crossing
+        By their values, ascending.
+
+    Examples
+    --------
+    >>> rule = Rule(0.0, 2.0, 3, False, 0.5, 0.1, 3)
+    >>> [(one.level, one.value, one.width) for one in crossings(rule, [0, 0.5, 1], [-0.25, 0.25, 0.75])]
+    [(0.0, 0.5, 1.0), (0.5, 1.5, 1.0)]
+    """
+    found = []
+    for low, high, one, other in zip(places, places[1:], errors, errors[1:]):
+        for level in rule.levels:
+            if _crosses(one, other, level):
+                share = (level - one) / (other - one)
+                width = rule.value(high) - rule.value(low)
+                found.append(Crossing(level, rule.value(low + share * (high - low)), width, other - one))
+    return sorted(found, key=lambda crossing: crossing.value)

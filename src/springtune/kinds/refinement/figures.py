@@ -1,0 +1,104 @@
+"""The figure of refinements: errors over the parameter, with the values that were added, and where they matter."""
+
+import numpy as np
+
+from ...output import labels, style
+from ...output.selection import choose, group
+from .names import PARAMETERS, SPACINGS
+
+
+def refinement(tree):
+    """The figure of refinements.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    yield "refinement", plot_refinement, {}
+
+
+@style.styled
+def plot_refinement(data, ax=None, *, refinement=None):
+    """Deformation error over what is varied: a panel a refinement, a line a definition, a marker a value.
+
+    The tolerance is a grey band; ticks on the line of no error are where an error is zero.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/refinement``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as refinements; by default a new figure.
+    refinement : str, optional
+        One refinement in place of all.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_refinements,)
+        One a refinement.
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no refinements, or none of that name, or ``ax`` is not as many Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_refinement(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['size', 'thick']
+    """
+    data = group(data, "refinement")
+    if refinement is not None:
+        choose(data.status != 0, refinement=refinement)
+        data = data.sel(refinement=[refinement])
+    names = data.refinement.values.tolist()
+    figure, axes, flat, height = style.multiples(ax, len(names), min(2, len(names)), 2.2)
+    place = {"left": 0.6, "right": 0.1, "bottom": 0.42, "top": 0.3, "across": 0.14, "down": 0.75}
+    style.arrange(figure, axes, **place)
+    ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
+    for panel, name in zip(flat, names):
+        panel.set_title(name)
+        if panel.get_xscale() == "log":
+            style.plain(panel, "x")
+    labels.settle(figure, axes, place)
+    for panel, found in zip(flat, ends):
+        if found:
+            labels.name_lines(panel, found)
+        else:
+            labels.say(panel, "No value has an error: see status and message.")
+    return flat
+
+
+def _panel(panel, data):
+    """Draw one refinement; ends of its lines with their names and colours."""
+    parameter = str(data.parameter.item())
+    known = PARAMETERS[parameter]
+    tolerance = 100 * float(data.tolerance)
+    panel.axhspan(-tolerance, tolerance, color="0.92", zorder=0)
+    panel.axhline(0, color="0.45", linewidth=0.8)
+    unit = f" [{known.shown}]" if known.shown else ""
+    panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
+    if str(data.spacing.item()) == SPACINGS[1]:
+        panel.set_xscale("log")
+    ends, number = [], 0
+    for definition in data.definition.values.tolist():
+        cell = data.sel(definition=definition)
+        if not int(cell["values"]):
+            continue
+        x, y = known.times * cell[f"refined_{parameter}"].values, 100 * cell.deformation_error.values
+        there, look = np.isfinite(x) & np.isfinite(y), style.line(number)
+        number += 1
+        if not there.any():
+            continue
+        panel.plot(x[there], y[there], markersize=2.2, linewidth=0.9, label=definition, **look)
+        ends.append((x[there][-1], y[there][-1], definition, look["color"]))
+        zeros = known.times * cell[f"crossing_{parameter}"].values[cell.crossing_level.values == 0]
+        panel.plot(zeros, np.zeros(len(zeros)), "|", color=look["color"], markersize=9)
+    return ends

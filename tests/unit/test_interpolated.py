@@ -1,0 +1,154 @@
+"""Which references of a study come from interpolants, and what is made of them."""
+
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springtune.campaign.plan import plan
+from springtune.jobs import store
+from springtune.jobs.spent import Spent
+from springtune.kinds import kinds, load_study
+from springtune.kinds.scenes import stored_reference
+from springtune.kinds.scenes.interpolated import box_of, expected_solves, interpolants
+from springtune.kinds.scenes.plan import reference_of, solved_reference
+from springtune.kinds.scenes.summary import summary
+from springtune.reference.interpolant import TOLERANCE
+
+MANY, FEW = 32, 20
+
+
+def text(lengths, outputs="[size]", definition="lattice", more=""):
+    """A study of beams of one height."""
+    beams = "\n".join(f"  b{number}: {{length: {length:.6g} mm, height: 10 mm}}" for number, length in lengths.items())
+    names = ", ".join(f"b{number}" for number in lengths)
+    return f"""\
+title: Beams of many lengths
+beams:
+{beams}
+materials:
+  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  all: {{beam: [{names}], mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
+        definition: {definition}, kinematics: linear, sensitivity: false}}
+{more}outputs: {outputs}
+"""
+
+
+def lengths(count):
+    return {number: length for number, length in enumerate(np.linspace(20.5, 29.5, count))}
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(*parts, **options):
+        path = tmp_path / "study.yaml"
+        path.write_text(text(*parts, **options))
+        return load_study(path)
+
+    return load
+
+
+def references(study):
+    return [reference_of(study, one.beam, one.material, one.load) for one in study.references]
+
+
+def run(study, folder, *stages):
+    for job in plan(study, folder, 1).jobs.values():
+        if job.stage.name in stages:
+            spent = Spent()
+            import_module(f"springtune.{job.stage.module}").run(job.content, spent)
+            assert not spent.broken
+            for path in job.products:
+                assert Path(path).exists()
+
+
+def test_few_references_are_solved_by_themselves(load):
+    study = load(lengths(FEW))
+    assert interpolants(study) == {}
+    assert references(study) == [solved_reference(one.beam, one.material, one.load) for one in study.references]
+
+
+def test_many_references_come_from_an_interpolant(load):
+    study = load(lengths(MANY))
+    box, problems = interpolants(study)["axial"]
+    assert (len(problems), box) == (MANY, ((1.995262, 3.162278), (0.3, 0.3)))
+    assert MANY > expected_solves(box)
+    assert len({one["interpolant"] for one in references(study)}) == 1
+    assert f"from about {expected_solves(box)} solutions and interpolation" in summary(study, [])
+
+
+def test_values_added_inside_the_box_leave_the_interpolant_as_it_is(load):
+    before = references(load(lengths(MANY)))
+    more = load(lengths(MANY) | {100: 20.1, 101: 24.9, 102: 31.0})
+    assert references(more)[:MANY] == before
+    (box, _), (wider, _) = (interpolants(one)["axial"] for one in (more, load(lengths(MANY) | {100: 39.0, 101: 40.0})))
+    assert wider != box
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"outputs": "[size, deformed]"}, {"outputs": "[size, deformed, tables]"}, {"definition": "[lattice, annealed]"}],
+    ids=str,
+)
+def test_where_whole_fields_are_asked_for_references_are_solved_by_themselves(load, options):
+    assert interpolants(load(lengths(MANY), **options)) == {}
+
+
+def test_boxes_hold_what_they_are_made_of():
+    random = np.random.default_rng(4)
+    for _ in range(200):
+        aspects, nus = np.exp(random.uniform(-3, 5, 6)), random.uniform(-0.99, 0.5, 6)
+        (first, last), (least, largest) = box_of(set(zip(aspects, nus)))
+        assert 0 < first <= aspects.min() <= aspects.max() <= last <= 1.6 * aspects.max()
+        assert -1 < least <= nus.min() <= nus.max() <= largest <= 0.5
+        assert box_of({(first, least), (last, largest)}) == ((first, last), (least, largest))
+
+
+def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):
+    study = load(lengths(MANY))
+    run(study, tmp_path / "results", "reference", "mesh", "solve")
+    root = kinds()[0].module("collect").groups(study, tmp_path / "results")["/"]
+    # Two of them, in a study of their own.
+    few = load({number: lengths(MANY)[number] for number in (3, 17)})
+    run(few, tmp_path / "few", "reference", "mesh", "solve")
+    alone = kinds()[0].module("collect").groups(few, tmp_path / "few")["/"]
+    for name in ("reference_displacement", "deformation_error"):
+        there = root[name].sel(beam=alone.beam).squeeze()
+        sure = float(root.reference_error_estimate.max() + alone.reference_error_estimate.max())
+        np.testing.assert_allclose(there, alone[name].squeeze(), atol=sure, rtol=sure)
+    assert 0 < root.reference_error_estimate.max() <= TOLERANCE
+    assert "32 of 32 are interpolated" in root.reference_displacement.attrs["comment"]
+    assert root.field_error.isnull().all() and alone.field_error.notnull().all()
+    assert "comment" not in alone.reference_displacement.attrs
+    assert (root.reference_applies == 1).all() and root.reference_seconds.notnull().all()
+
+
+def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
+    study = load(lengths(MANY))
+    (content,) = [job.content for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
+    (task,) = content["interpolants"]
+    # What a build that is not certified stores.
+    path = tmp_path / "references" / f"{task['key']}.h5"
+    path.parent.mkdir(parents=True)
+    store.add(path, {task["key"]: {"message": "no interpolant", "seconds": 1.0, "asked": MANY}})
+    before = stored_reference.read(path.parent, references(study)[0])
+    assert before == {"message": "no interpolant", "seconds": 0.0}
+    run(study, tmp_path, "reference")
+    found = [stored_reference.read(path.parent, one) for one in references(study)]
+    assert all(one["error_estimate"] <= 1e-4 and "solves" not in one for one in found)
+    few = load({0: lengths(MANY)[0]})
+    run(few, tmp_path / "few", "reference")
+    alone = stored_reference.read(tmp_path / "few" / "references", references(few)[0])
+    assert {name: value for name, value in found[0].items() if name != "seconds"} == {
+        name: value for name, value in alone.items() if name != "seconds"
+    }
+
+
+def test_one_that_is_beyond_its_limits_is_a_hole(load, tmp_path):
+    study = load(lengths(MANY))
+    (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
+    (task,) = job.content["interpolants"]
+    import_module(f"springtune.{job.stage.module}").lose(job.content, task["key"], "too slow", "at most 1 s")
+    assert stored_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"

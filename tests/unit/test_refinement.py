@@ -1,0 +1,266 @@
+"""Refinements: which values they take, what they find, and what a stopped run leaves."""
+
+import math
+import shutil
+from importlib import import_module
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springtune.campaign.plan import plan
+from springtune.jobs import store
+from springtune.jobs.spent import Spent
+from springtune.kinds import load_study
+from springtune.kinds.refinement.batches import Rule, crossings, refine
+from springtune.kinds.refinement.collect import groups
+from springtune.kinds.refinement.tables import write
+from springtune.study import StudyError
+
+STUDY = """\
+title: Where errors matter
+beams:
+  100x20: {length: 100 mm, height: 20 mm}
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
+refine:
+  scale:
+    beam: 100x20
+    material: steel
+    load: traction
+    force: 10 kN
+    mesh_size: 5 mm
+    definition: [lattice, uniform]
+    kinematics: linear
+    parameter: stiffness_scale
+    from: 0.5
+    to: 2
+    tolerance: 2 %
+    most: 24
+grids:
+  one: {beam: 100x20, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
+        definition: lattice, sensitivity: false}
+outputs: [refinement]
+"""
+
+
+UNITS = {"mesh_size": "m", "force": "N", "thickness": "m", "young_modulus": "Pa", "poisson_ratio": "1"}
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(*changes):
+        text = STUDY
+        for before, after in changes:
+            assert before in text
+            text = text.replace(before, after, 1)
+        path = tmp_path / "study.yaml"
+        path.write_text(text)
+        return load_study(path)
+
+    return load
+
+
+def run(study, folder):
+    """Run the stage; the number of values that were solved."""
+    before = sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5"))
+    for job in plan(study, folder, 1).jobs.values():
+        if job.stage.name == "refinement":
+            spent = Spent()
+            import_module(f"springtune.{job.stage.module}").run(job.content, spent)
+            assert not spent.broken
+    return sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5")) - before
+
+
+def collected(study, folder):
+    return groups(study, folder)["/refinement"]
+
+
+# -- the rule ----------------------------------------------------------------------------------------------------------
+
+
+@given(
+    st.floats(0.02, 0.98), st.integers(2, 9), st.integers(12, 60), st.booleans(), st.sampled_from([0.1, 0.01, 0.001])
+)
+@settings(max_examples=50)
+def test_a_root_is_enclosed_as_narrowly_as_asked(root, points, most, logarithmic, resolution):
+    rule = Rule(1.0, 10.0, points, logarithmic, 10.0, resolution, most)
+    at = rule.value(root)
+    places, batches, errors = refine(rule, lambda values: [value - at for value in values])
+    assert places == sorted(set(places)) and len(places) <= most and set(batches) == set(range(max(batches) + 1))
+    (found,) = crossings(rule, places, errors)
+    assert found.level == 0 and abs(found.value - at) <= found.width
+    # One value a batch halves the interval that has the root.
+    halvings = min(most - points, max(0, math.ceil(math.log2(1 / (points - 1) / resolution))))
+    enclosing = np.diff(places)[np.searchsorted(places, root, side="left") - 1]
+    assert enclosing == pytest.approx(1 / (points - 1) / 2**halvings)
+
+
+def test_the_tolerance_is_found_on_either_side():
+    rule = Rule(0.0, 1.0, 5, False, 0.25, 1e-3, 200)
+    places, _, errors = refine(rule, lambda values: [math.cos(math.pi * value) for value in values])
+    found = crossings(rule, places, errors)
+    assert [one.level for one in found] == [0.25, 0.0, -0.25]
+    np.testing.assert_allclose([one.value for one in found], np.arccos([0.25, 0.0, -0.25]) / math.pi, atol=1e-3)
+
+
+def test_where_nothing_is_crossed_nothing_is_added():
+    rule = Rule(0.0, 1.0, 4, False, 0.1, 1e-3, 100)
+    for error in (0.5, -0.02, math.nan):
+        assert len(refine(rule, lambda values, error=error: [error] * len(values))[0]) == 4
+
+
+def test_a_jump_is_enclosed_and_told_from_a_root():
+    rule = Rule(0.0, 1.0, 3, False, 0.1, 1e-3, 100)
+    places, _, errors = refine(rule, lambda values: [0.3 if value < 0.4 else -0.3 for value in values])
+    assert [one.change for one in crossings(rule, places, errors)] == pytest.approx([-0.6] * 3)
+
+
+@given(st.integers(5, 40), st.integers(0, 40))
+def test_more_values_hold_those_before(most, more):
+    def errors(values):
+        return [math.sin(20 * value) for value in values]
+
+    few, many = (set(refine(Rule(0.0, 1.0, 5, False, 0.3, 1e-4, count), errors)[0]) for count in (most, most + more))
+    assert few <= many and len(many) <= most + more
+
+
+# -- a study -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_stiffness_without_an_error_is_that_of_linear_springs(load, tmp_path):
+    study = load()
+    run(study, tmp_path)
+    data = collected(study, tmp_path).sel(refinement="scale")
+    for definition in ("lattice", "uniform"):
+        one = data.sel(definition=definition)
+        count = int(one["values"])
+        scale, error = one.refined_stiffness_scale.values[:count], one.deformation_error.values[:count]
+        assert (np.diff(scale) > 0).all() and 5 < count <= 24 and np.isnan(one.refined_stiffness_scale[count:]).all()
+        # In linear kinematics the displacement goes with one over the stiffness.
+        best = scale[0] * (1 + error[0])
+        np.testing.assert_allclose((1 + error) * scale, best, rtol=1e-9)
+        levels = one.crossing_level.values[:3]
+        np.testing.assert_array_equal(levels, [0.02, 0.0, -0.02])
+        within = one.crossing_stiffness_scale_width.values[:3]
+        assert (np.abs(one.crossing_stiffness_scale.values[:3] - best / (1 + levels)) < within).all()
+        assert set(one.batch.values[:count]) == set(range(int(one.halved) + 1))
+    assert data.refined_stiffness_scale.dims == ("definition", "point") and "batch" in data.coords
+    names = write({"refinement": Node(collected(study, tmp_path))}, tmp_path)
+    rows = [(tmp_path / name).read_text().splitlines() for name in names]
+    assert len(rows[0]) == 1 + int(data["values"].sum()) and len(rows[1]) == 1 + 6
+
+
+class Node:
+    """Of a tree."""
+
+    def __init__(self, data):
+        self.data = data
+
+    def to_dataset(self):
+        return self.data
+
+
+def test_raising_most_computes_what_is_new_and_nothing_else(load, tmp_path):
+    assert run(load(("most: 24", "most: 10")), tmp_path) == 2 * 10
+    few = collected(load(("most: 24", "most: 10")), tmp_path)
+    more = load()
+    added = run(more, tmp_path)
+    data = collected(more, tmp_path)
+    assert added == int(data["values"].sum()) - 2 * 10
+    assert run(more, tmp_path) == 0
+    # The same as at once.
+    shutil.rmtree(tmp_path / "refinement")
+    run(more, tmp_path)
+    np.testing.assert_array_equal(collected(more, tmp_path).deformation_error, data.deformation_error)
+    assert set(few.refined_stiffness_scale.values[0, 0]) <= set(data.refined_stiffness_scale.values[0, 0])
+
+
+def test_a_value_beyond_its_limits_is_a_hole_and_the_others_are_not(load, tmp_path):
+    study = load()
+    (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "refinement"]
+    stage = import_module(f"springtune.{job.stage.module}")
+    for task in job.content["refinements"]:
+        stage.lose(job.content, f"{task['key']}/0.875", "too slow", "")  # as there are none here
+    run(study, tmp_path)
+    data = collected(study, tmp_path)
+    lost = data.refined_stiffness_scale == 0.875
+    assert set(data.message.values[lost.values]) == {"too slow"} and np.isnan(data.deformation_error.values[lost]).all()
+    assert (data.status.values[(data.batch >= 0).values & ~lost.values] == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("parameter", "first", "last", "others"),
+    [
+        ("mesh_size", "2 mm", "5 mm", "    force: 1 kN\n"),
+        ("force", "1 N", "1 kN", "    mesh_size: 5 mm\n"),
+        ("thickness", "1 mm", "5 mm", "    mesh_size: 5 mm\n    force: 1 kN\n"),
+        ("young_modulus", "1 GPa", "210 GPa", "    mesh_size: 5 mm\n    force: 1 kN\n"),
+        ("poisson_ratio", "0", "0.5", "    mesh_size: 5 mm\n    force: 1 kN\n"),
+    ],
+)
+def test_every_parameter_is_that_of_the_scene(load, tmp_path, parameter, first, last, others):
+    import springtune as sp
+
+    study = load(
+        ("    force: 10 kN\n    mesh_size: 5 mm\n", others),
+        ("[lattice, uniform]", "patch"),
+        ("stiffness_scale", parameter),
+        ("from: 0.5", f"from: {first}"),
+        ("to: 2\n", f"to: {last}\n    points: 3\n"),
+        ("most: 24", "most: 3"),
+    )
+    run(study, tmp_path)
+    one = collected(study, tmp_path).isel(refinement=0).sel(definition="patch")
+    value = float(one[f"refined_{parameter}"][2])
+    assert one[f"refined_{parameter}"].attrs["units"] == UNITS[parameter]
+    given = {"thickness": 1e-3, "young_modulus": 210e9, "poisson_ratio": 0.3, "mesh_size": 5e-3, "force": 1e3}
+    given |= {parameter: value}
+    beam = sp.Beam(0.1, 0.02, given["thickness"])
+    material = sp.Material(given["young_modulus"], given["poisson_ratio"])
+    mesh = sp.make_mesh(beam, "structured", given["mesh_size"])
+    result = sp.Scene(beam, mesh, material, "traction", given["force"], definition="patch", kinematics="linear").solve()
+    assert float(one.displacement[2]) == pytest.approx(result.displacement, rel=1e-9)
+    assert float(one.deformation_error[2]) == pytest.approx(result.error, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [
+        ("from: 0.5", "from: 0", r"study.yaml:16: refine.scale.from: '0' is out of range; give a value above 0"),
+        ("from: 0.5", "from: 3", "refine.scale.from: '3' is not below 'to', '2'; give a smaller 'from'"),
+        ("from: 0.5", "from: much", "refine.scale.from: 'much' is not a number; give one such as 0.3"),
+        ("    from: 0.5\n", "", "refine.scale.from: 'from' is missing"),
+        ("stiffness_scale", "stifness_scale", "refine.scale.parameter: unknown parameter 'stifness_scale'; did you"),
+        ("stiffness_scale", "force", "refine.scale.force: is the parameter that is varied; remove it"),
+        ("    mesh_size: 5 mm\n", "", "refine.scale: no mesh_size; give one such as mesh_size: 2 mm, or vary it"),
+        ("mesh_size: 5 mm", "mesh_size: 50 mm", "refine.scale.mesh_size: 50 mm is larger than"),
+        ("most: 24", "most: 4", "refine.scale.most: 4 is below 'points', 5; give at least as many"),
+        ("tolerance: 2 %", "tolerance: 200 %", "refine.scale.tolerance: '200 %' is out of range"),
+        ("tolerance: 2 %", "tolerance: 2 mm", "refine.scale.tolerance: '2 mm' is not a share; give one such as '1 %'"),
+        ("[lattice, uniform]", "[lattice, paper]", "refine.scale.definition: 'paper' needs a reference or a stated"),
+        ("beam: 100x20\n    material", "beam: 10x2\n    material", "refine.scale.beam: unknown beam '10x2'"),
+        ("    tolerance", "    tolerence", "refine.scale.tolerence: unknown key 'tolerence'; did you"),
+    ],
+)  # fmt: skip
+def test_refusals(load, before, after, expected):
+    with pytest.raises(StudyError) as error:
+        load((before, after))
+    assert expected in str(error.value)
+    assert all("study.yaml:" in line for line in str(error.value).splitlines())
+
+
+def test_a_logarithm_of_zero_is_refused(load):
+    with pytest.raises(StudyError, match="refine.scale.from: 0 has no logarithm; give a larger one, or spac"):
+        load(
+            ("stiffness_scale", "poisson_ratio"),
+            ("from: 0.5", "from: 0"),
+            ("to: 2", "to: 0.5\n    spacing: logarithmic"),
+        )
+
+
+def test_an_output_without_a_section_is_refused(load):
+    section = STUDY[STUDY.index("refine:") : STUDY.index("grids:")]
+    with pytest.raises(StudyError, match="'refinement' shows refinements and .* none; add a section 'refine'"):
+        load((section, ""))
