@@ -1,0 +1,377 @@
+r"""Answers of a unit problem at thousands of beams for tens of solves: a tensor Chebyshev interpolant.
+
+The unit problem (`springtune.reference.similarity`) depends on the aspect ratio a and Poisson's ratio nu alone. In
+:math:`(\log a, \nu)` its answers are analytic: corners stay where they are and their exponents change smoothly. Their
+logarithms are interpolated, since displacements are powers of the aspect ratio towards either end (a cantilever bends
+by its cube, a short one shears by its first power), which are straight lines in :math:`\log a`; no formula of beam
+theory is needed, so any kind of load will do. The coefficients of their Chebyshev series fall geometrically (Trefethen,
+Approximation Theory and Approximation Practice, 2013, theorem 8.2), and with them the error.
+
+Nodes are Chebyshev points with both ends of a range: twice as many intervals keep all that were solved before. They are
+doubled along the axis whose coefficients promise the larger error until both are small enough. Then solves at points
+that are no nodes decide: the largest difference there, times a factor, is part of the error estimate.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import ArrayLike
+
+from ..problem.loads import LoadKind
+from .small_strain import ReferenceNotConvergedError, solve_unit
+
+TOLERANCE = 2e-5
+"""Largest relative error estimate of an interpolant by default [1], a fifth of that of a reference."""
+
+NODE_SHARE = 0.5
+"""Share of the tolerance that the error estimates of nodes may take."""
+
+SAFETY = 3.0
+"""What the largest difference at the checks is multiplied with: the largest of all is hardly met by some tens."""
+
+CHECKS_INSIDE, CHECKS_ON_EDGE = 12, 3
+"""Number of points inside the box, and on each of its edges, at which an interpolant is compared with solves. The
+corners are nodes."""
+
+SEED = 20
+"""Of the places of these points."""
+
+MOST_NODES = 65
+"""Most nodes along an axis."""
+
+JUDGED_WITHIN = 0.05
+"""Largest difference of rotation and strain at the checks, relative to the larger one. They are read off a grid of
+points that changes with the aspect ratio, so they jump by a per cent; what they decide is no sharper."""
+
+ROUNDING = 1e-9
+"""How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
+
+NAMES = ("displacement", "mean_displacement", "rotation", "strain")
+
+
+class NotCertifiedError(RuntimeError):
+    """No interpolant over a box meets its tolerance; solve the unit problems one by one."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Answers of unit problems, as in `springtune.reference.small_strain.ReferenceSolution`, in its units.
+
+    Attributes
+    ----------
+    displacement, mean_displacement, rotation, strain : ndarray of float
+        In units of half the height and of the traction over Young's modulus.
+    error_estimate : float
+        Bound on the relative error of each displacement [1].
+    """
+
+    displacement: np.ndarray
+    mean_displacement: np.ndarray
+    rotation: np.ndarray
+    strain: np.ndarray
+    error_estimate: float
+
+
+@dataclass(frozen=True)
+class Interpolant:
+    """Answers of the unit problems of one kind of load over a box of aspect ratios and Poisson's ratios.
+
+    Attributes
+    ----------
+    kind : LoadKind
+    aspect_range, nu_range : tuple of float
+        First and last aspect ratio and Poisson's ratio of the box [1].
+    values : ndarray of float, shape (4, n_aspect, n_nu)
+        At the nodes, from the last of a range to its first: logarithms of the displacement, of the mean displacement
+        and of the strain, before it that of 1 plus the rotation over the strain, in the order of `NAMES`. The rotation
+        of a beam in tension is zero at nu = 0.
+    error_estimate : float
+        Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference at the checks, and
+        the largest error estimate of the solves.
+    solves : int
+        Number of unit problems that were solved, checks included.
+    """
+
+    kind: LoadKind
+    aspect_range: tuple[float, float]
+    nu_range: tuple[float, float]
+    values: np.ndarray
+    error_estimate: float
+    solves: int
+
+    @classmethod
+    def build(
+        cls,
+        kind: LoadKind,
+        aspect_range: tuple[float, float],
+        nu_range: tuple[float, float],
+        tolerance: float = TOLERANCE,
+        most: int | None = None,
+    ) -> Self:
+        """Solve as many unit problems as an interpolant over a box needs.
+
+        Parameters
+        ----------
+        kind : LoadKind
+            With supports that are symmetric, see `LoadKind.mirrored`.
+        aspect_range : tuple of float
+            First and last aspect ratio [1]; an interpolant of one that is first and last is a function of the other.
+        nu_range : tuple of float
+            First and last Poisson's ratio [1], -1 < nu <= 0.5.
+        tolerance : float, optional
+            Largest relative error estimate to accept [1].
+        most : int, optional
+            Most solves that are worth it.
+
+        Returns
+        -------
+        Interpolant
+
+        Raises
+        ------
+        ValueError
+            If a range is none, or not one of aspect ratios or Poisson's ratios.
+        NotCertifiedError
+            If a solve does not converge, or the error estimate stays above the tolerance.
+
+        Examples
+        --------
+        >>> from springtune.problem.loads import AXIAL
+        >>> found = Interpolant.build(AXIAL, (4, 6), (0.3, 0.35))
+        >>> answers = found.evaluate([4.5, 5], 0.3)
+        >>> (2 * np.array([4.5, 5]) - answers.displacement).round(3)  # what the clamp takes off the bar's
+        array([0.024, 0.024])
+        """
+        (first, last), (least, largest) = aspect_range, nu_range
+        if not 0 < first <= last < np.inf:
+            raise ValueError(f"a range of aspect ratios is 0 < first <= last, not {first:g} to {last:g}")
+        if not -1 < least <= largest <= 0.5:
+            raise ValueError(f"a range of Poisson's ratios is -1 < first <= last <= 0.5, not {least:g} to {largest:g}")
+        box = _Box(kind, (float(first), float(last)), (float(least), float(largest)), tolerance, most)
+        values, error_estimate = box.certified()
+        return cls(kind, box.aspect_range, box.nu_range, values, error_estimate, len(box.solved))
+
+    def evaluate(self, aspect_ratio: ArrayLike, nu: ArrayLike) -> Answers:
+        """Answers of unit problems.
+
+        Parameters
+        ----------
+        aspect_ratio, nu : float or ndarray of float
+            Aspect ratios and Poisson's ratios [1], broadcast against each other.
+
+        Returns
+        -------
+        Answers
+            Arrays of their shape.
+
+        Raises
+        ------
+        ValueError
+            If one of them is outside the box.
+        """
+        aspects, nus = np.broadcast_arrays(np.asarray(aspect_ratio, float), np.asarray(nu, float))
+        places = _place(np.log(aspects), np.log(self.aspect_range)), _place(nus, self.nu_range)
+        outside = ~np.all([np.abs(place) <= 1 + ROUNDING for place in places], axis=0)
+        if outside.any():
+            aspect, ratio = aspects[outside].flat[0], nus[outside].flat[0]
+            raise ValueError(
+                f"aspect ratio {aspect:.6g} with nu = {ratio:.6g} is outside the interpolant of '{self.kind}', which "
+                f"knows {' to '.join(f'{end:.6g}' for end in self.aspect_range)} with nu = "
+                f"{' to '.join(f'{end:.6g}' for end in self.nu_range)}; build one over what is asked, or solve it"
+            )
+        along, across = (
+            _weights(np.clip(place.ravel(), -1, 1), count) for place, count in zip(places, self.values.shape[1:])
+        )
+        found = np.einsum("pa,qan,pn->qp", along, self.values, across, optimize=True).reshape(4, *aspects.shape)
+        strain = np.exp(found[3])
+        return Answers(np.exp(found[0]), np.exp(found[1]), np.expm1(found[2]) * strain, strain, self.error_estimate)
+
+    def arrays(self) -> dict[str, Any]:
+        """Numbers and arrays that `from_arrays` takes, such as a file holds.
+
+        Returns
+        -------
+        dict
+            The attributes; `kind` by its name.
+        """
+        return {
+            "kind": self.kind.name,
+            "aspect_range": np.array(self.aspect_range),
+            "nu_range": np.array(self.nu_range),
+            "values": self.values,
+            "error_estimate": self.error_estimate,
+            "solves": self.solves,
+        }
+
+    @classmethod
+    def from_arrays(cls, kind: LoadKind, arrays: Mapping[str, Any]) -> Self:
+        """Interpolant of what `arrays` gave.
+
+        Parameters
+        ----------
+        kind : LoadKind
+        arrays : mapping
+            Of `arrays`; its kind is not looked at.
+
+        Returns
+        -------
+        Interpolant
+        """
+        (first, last), (least, largest) = (np.asarray(arrays[name]).tolist() for name in ("aspect_range", "nu_range"))
+        error_estimate, solves = float(arrays["error_estimate"]), int(arrays["solves"])
+        return cls(kind, (first, last), (least, largest), np.asarray(arrays["values"]), error_estimate, solves)
+
+
+class _Box:
+    """What is solved for an interpolant over a box, and what is known from it."""
+
+    def __init__(
+        self,
+        kind: LoadKind,
+        aspect_range: tuple[float, float],
+        nu_range: tuple[float, float],
+        tolerance: float,
+        most: int | None,
+    ) -> None:
+        self.kind, self.aspect_range, self.nu_range = kind, aspect_range, nu_range
+        self.tolerance, self.most = tolerance, most
+        #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
+        self.solved: dict[tuple[float, float], tuple[np.ndarray, float]] = {}
+        self.counts = [3 if last > first else 1 for first, last in (aspect_range, nu_range)]
+
+    def certified(self) -> tuple[np.ndarray, float]:
+        """Values at the nodes and the error estimate."""
+        checks = self._checks()
+        while True:
+            places = [_nodes(count) for count in self.counts]
+            answers, estimate = self._solve([(along, across) for along in places[0] for across in places[1]])
+            values = _well_behaved(answers).reshape(4, *self.counts)
+            promised = [_promised(np.moveaxis(values[:2], axis, 1)) for axis in (1, 2)]
+            goal = (1 - NODE_SHARE) * self.tolerance / SAFETY
+            if max(promised) <= goal:
+                error_estimate = self._compared(values, checks, estimate)
+                if error_estimate <= self.tolerance:
+                    return values, error_estimate
+            wide = [count > 1 for count in self.counts]
+            axis = max(range(2), key=lambda axis: (wide[axis], promised[axis]))
+            self.counts[axis] = 2 * self.counts[axis] - 1
+            if not wide[axis] or self.counts[axis] > MOST_NODES:
+                found = max(promised) if max(promised) > goal else error_estimate
+                raise self._failure(f"error estimate {found:.1e} with {len(answers)} nodes")
+
+    def _checks(self) -> list[tuple[float, float]]:
+        """Points inside the box and on its edges; of a box without a width along an axis, in the middle of it."""
+        random = np.random.default_rng(SEED)
+        inside, edges = random.uniform(-1, 1, (CHECKS_INSIDE, 2)), random.uniform(-1, 1, (4, CHECKS_ON_EDGE))
+        points = [(along, across) for along, across in inside]
+        points += [(end, at) for end, edge in zip((-1.0, 1.0), edges[:2]) for at in edge]
+        points += [(at, end) for end, edge in zip((-1.0, 1.0), edges[2:]) for at in edge]
+        along, across = (float(count > 1) for count in self.counts)
+        return list(dict.fromkeys((float(one[0]) * along, float(one[1]) * across) for one in points))
+
+    def _solve(self, places: list[tuple[float, float]]) -> tuple[np.ndarray, float]:
+        """Answers, shape (n_places, 4), and the largest error estimate of them; what was solved is known."""
+        # Elements are shared by those of one aspect ratio, which follow each other.
+        for along, across in places:
+            if (along, across) not in self.solved:
+                if self.most is not None and len(self.solved) >= self.most:
+                    raise self._failure(f"more than {self.most} solves are needed")
+                aspect = float(np.exp(_between(along, np.log(self.aspect_range))))
+                nu = float(np.clip(_between(across, self.nu_range), *self.nu_range))
+                try:
+                    found = solve_unit(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
+                except ReferenceNotConvergedError as error:
+                    raise self._failure(str(error)) from error
+                answers = np.array([getattr(found, name) for name in NAMES])
+                self.solved[along, across] = answers, found.error_estimate
+        found_here = [self.solved[place] for place in places]
+        return np.array([answers for answers, _ in found_here]), max(estimate for _, estimate in found_here)
+
+    def _compared(self, values: np.ndarray, checks: list[tuple[float, float]], estimate: float) -> float:
+        """Error estimate by solves at the checks, given that of the nodes."""
+        if values[0].size == 1:
+            return estimate
+        solved, of_checks = self._solve(checks)
+        places = np.array(checks).T
+        along, across = (_weights(place, count) for place, count in zip(places, values.shape[1:]))
+        differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _well_behaved(solved)).max(axis=1)
+        if not differences[2:].max() <= JUDGED_WITHIN:
+            raise self._failure(f"rotation and strain differ by {differences[2:].max():.1e} from those of solves")
+        # Differences of logarithms are relative ones.
+        return float(SAFETY * differences[:2].max() + max(estimate, of_checks))
+
+    def _failure(self, why: str) -> NotCertifiedError:
+        box = [" to ".join(f"{end:.6g}" for end in ends) for ends in (self.aspect_range, self.nu_range)]
+        over = f"over aspect ratios {box[0]} and nu = {box[1]}"
+        return NotCertifiedError(f"no interpolant of '{self.kind}' {over} within {self.tolerance:.1e}: {why}")
+
+
+def _well_behaved(answers: np.ndarray) -> np.ndarray:
+    """What is interpolated, shape (4, n), of answers in the order of `NAMES`, shape (n, 4)."""
+    displacement, mean, rotation, strain = answers.T
+    return np.stack([np.log(displacement), np.log(mean), np.log1p(rotation / strain), np.log(strain)])
+
+
+def _nodes(count: int) -> np.ndarray:
+    """Chebyshev points from 1 to -1, both included; one is in the middle."""
+    if count == 1:
+        return np.zeros(1)
+    # By the sine, since the same points of twice as many intervals are then the same numbers.
+    return np.sin(np.pi / 2 * np.arange(count - 1, -count, -2) / (count - 1))
+
+
+def _weights(places: np.ndarray, count: int) -> np.ndarray:
+    """Values of the Lagrange polynomials of the nodes, shape (n_places, count), by the barycentric formula.
+
+    Berrut and Trefethen, Barycentric Lagrange interpolation, SIAM Review 46:501 (2004), formula 4.2 with weights 5.4.
+    """
+    if count == 1:
+        return np.ones((len(places), 1))
+    weights = (-1.0) ** np.arange(count)
+    weights[[0, -1]] /= 2
+    distances = places[:, None] - _nodes(count)
+    at_node, node = np.nonzero(distances == 0)
+    distances[at_node] = 1.0
+    found = weights / distances
+    found[at_node] = 0.0
+    found[at_node, node] = 1.0
+    return found / found.sum(axis=1, keepdims=True)
+
+
+def _promised(values: np.ndarray) -> float:
+    """Error of an interpolant that the decay of its Chebyshev coefficients along an axis lets expect.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (n_functions, n, n_across)
+        At the nodes; the axis is the second one.
+
+    Notes
+    -----
+    Coefficients are taken in pairs, since those of even functions are zero in turn. If the last pair is to the one
+    before as the next one to it, that is about what is left out.
+    """
+    count = values.shape[1]
+    if count == 1:
+        return 0.0
+    series = np.linalg.solve(chebyshev.chebvander(_nodes(count), count - 1), values)
+    sizes = np.abs(series).max(axis=(0, 2))
+    before, last = (sizes[1], sizes[2]) if count == 3 else (sizes[-4:-2].max(), sizes[-2:].max())
+    return float(last * min(last / before, 1.0)) if before > 0 else float(last)
+
+
+def _place(values: np.ndarray, ends: ArrayLike) -> np.ndarray:
+    """Place between two ends, -1 to 1; where these are one, 0 for it and else infinite."""
+    first, last = np.asarray(ends, float)
+    if last > first:
+        return (2 * values - first - last) / (last - first)
+    return np.where(np.abs(values - first) <= ROUNDING * max(1.0, abs(first)), 0.0, np.inf)
+
+
+def _between(place: float, ends: ArrayLike) -> float:
+    """Inverse of `_place`."""
+    first, last = np.asarray(ends, float)
+    return float((first + last) / 2 + place * (last - first) / 2)
