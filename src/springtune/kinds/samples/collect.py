@@ -108,8 +108,9 @@ class _Scenes:
         aspects = self.drawn["length"] / self.drawn["height"]
         for load, i in self.loads.items():
             kind = LOADS[load].kind
-            interpolant, _ = read_reference(folder, plan.reference_key(self.sample, kind), kind)
+            interpolant, why = read_reference(folder, plan.reference_key(self.sample, kind), kind)
             if interpolant is None:
+                self.of["reference_message"][i] = why
                 continue
             answers = interpolant.evaluate(aspects, self.drawn["poisson_ratio"])
             length, scale = unit_scales(body, body, kind)
@@ -229,7 +230,10 @@ def _indices(sample, data, axes):
                 if lacking and sample.failures != DROP:
                     continue
                 kept = rows[:, there]
-                indices = sobol_indices(kept[0], kept[1], kept[2:])
+                # What varies by less than references are known to is no error of the networks.
+                known = data.reference_error_estimate.values[:, i]
+                least = float(np.nanmax(known, initial=0.0)) if quantity == "deformation_error" else 0.0
+                indices = sobol_indices(kept[0], kept[1], kept[2:], least)
                 found["base_samples"].values[q, i, j] = indices.rows
                 for order in ("first", "total"):
                     band = getattr(indices, f"{order}_band")

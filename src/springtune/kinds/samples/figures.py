@@ -31,8 +31,12 @@ COLUMNS = 4
 SMALL_MODULUS = 1e9
 """Young's modulus up to which the unit is MPa [Pa]."""
 
-DECADES = 12.0
-"""Largest over smallest value from which on an axis is logarithmic."""
+
+def _is_logarithmic(values):
+    """Whether parts of a distribution that are equally probable are more evenly spaced on a logarithmic axis."""
+    spacings = [np.diff(of(values)) for of in ((np.log, np.asarray) if (values > 0).all() else (np.asarray,))]
+    spreads = [spacing.std() / spacing.mean() for spacing in spacings]
+    return spreads[0] < 0.5 * spreads[-1]
 
 
 def _unit(name, values):
@@ -114,11 +118,13 @@ def plot_sobol(data, ax=None, *, load=None):
                   top=0.48, across=0.18, down=0.42 if rows > 1 else 0.0,
                   title=f"{_of(samples, load)}: Sobol indices")  # fmt: skip
     order = found["definition"].values.tolist()
+    limits = _limits(found, shown, load)
     for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
         one = found.sel(quantity=quantity, load=load, definition=definition)
         colour = "0.35" if quantity == "best_stiffness" else style.line(order.index(definition))["color"]
         panel.set_title(AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}"))
         _bars(panel, one, colour)
+        panel.set_xlim(limits)
         panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
         if not np.isfinite(one.first_order.values).any():
             why = "does not vary" if int(one.base_samples) else "withheld, since scenes have no value"
@@ -131,6 +137,15 @@ def plot_sobol(data, ax=None, *, load=None):
     return flat
 
 
+def _limits(found, shown, load):
+    """Ends of the axis of all panels: from zero to one, farther where bands are, within reason."""
+    cells = [found.sel(quantity=quantity, load=load, definition=name) for quantity, name in shown]
+    low = min([0.0, *(float(np.nanmin([one.first_order_low, np.zeros(one.first_order.shape)])) for one in cells)])
+    ones = np.ones(cells[0].first_order.shape) if cells else 1.0
+    high = max([1.0, *(float(np.nanmax([one.total_order_high, one.first_order_high, ones])) for one in cells)])
+    return max(low, -0.3) - 0.02, min(high, 1.5) + 0.02
+
+
 def _bars(panel, indices, colour):
     """Bars of the indices of one quantity: total order pale and wide, first order full and narrow, with bands."""
     for order, wide, alpha, shift in (("total_order", 0.76, 0.3, 0.2), ("first_order", 0.36, 1.0, -0.2)):
@@ -138,9 +153,7 @@ def _bars(panel, indices, colour):
         places = np.arange(len(values))
         panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
         panel.hlines(places + shift, low, high, color="k", linewidth=0.8)
-    highest = max(np.nanmax([indices.total_order_high, indices.first_order_high, np.ones(len(places))]), 1.0)
-    panel.set(xlim=(min(-0.02, float(np.nanmin([*indices.first_order_low, 0.0]))), 1.02 * highest),
-              ylim=(len(places) - 0.45, -0.55))  # fmt: skip
+    panel.set_ylim(len(places) - 0.45, -0.55)
     panel.tick_params(axis="y", length=0)
     panel.grid(False, axis="y")
 
@@ -197,7 +210,7 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     if figure is not None and ax is None:
         figure.set_size_inches(style.size(figure)[0], height + 0.45)
     text, factor, unit = AXES[quantity]
-    style.arrange(figure, axes, left=0.55, right=0.12, bottom=0.68, top=0.3, across=0.14, down=0.5,
+    style.arrange(figure, axes, left=0.55, right=0.14, bottom=0.72, top=0.3, across=0.2, down=0.5,
                   title=f"{_of(samples, load)}: mean {text} over one parameter, {QUANTITY_NOTE}")  # fmt: skip
     drawn = False
     for number, (panel, name) in enumerate(zip(flat, names)):
@@ -211,9 +224,11 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
             panel.plot(x, mean, label=label, **line | {"marker": ""})
             panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=line["color"], alpha=0.15, linewidth=0)
             drawn |= bool(np.isfinite(mean).any())
-        if np.nanmin(x) > 0 and np.nanmax(x) > DECADES * np.nanmin(x):
+        if _is_logarithmic(values):
             panel.set_xscale("log")
             style.plain(panel, "x")
+        else:
+            panel.locator_params(axis="x", nbins=4)
         panel.set_xlabel(_axis(SHOWN[name][0], of))
         if number % columns == 0:
             panel.set_ylabel(_axis(text, unit))

@@ -37,7 +37,7 @@ class Indices:
     rows: int
 
 
-def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray) -> Indices:
+def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: float = 0.0) -> Indices:
     r"""Sobol indices from values at the rows of Saltelli's design.
 
     Parameters
@@ -46,6 +46,8 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray) -> Indi
         Values at the rows A and B.
     at_ab : ndarray of float, shape (n_parameters, n)
         Values at A with each parameter of B in turn.
+    least : float, optional
+        Standard deviation up to which values count as one, in their unit.
 
     Returns
     -------
@@ -75,7 +77,7 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray) -> Indi
     none = np.full(count, np.nan)
     both = np.concatenate([at_a, at_b])
     largest = np.abs(both).max(initial=0.0)
-    if rows < 2 or not largest > 0 or not np.std(both / largest) > NEGLIGIBLE:
+    if rows < 2 or not largest > 0 or not np.std(both / largest) > max(NEGLIGIBLE, least / largest):
         return Indices(none, none, np.stack([none, none]), np.stack([none, none]), rows)
     # Less their mean, or the sums would lose digits; over their size, or squares might not be numbers.
     at_a, at_b, at_ab, both = at_a / largest, at_b / largest, at_ab / largest, both / largest

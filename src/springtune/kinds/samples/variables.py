@@ -29,6 +29,7 @@ SAMPLES = Group(
             "whether a reference of small strain applies to the network: not where it turns or strains too far for it",
             np.int8(0),
         ),
+        "reference_message": (("load",), "1", "why there is no reference", ""),
         "best_stiffness": (SAMPLED_REFERENCE, "N/m", "uniform stiffness without a deformation error", np.nan),
         "particles": (BODY, "1", "number of particles", 0),
     },
