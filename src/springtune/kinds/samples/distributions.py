@@ -8,12 +8,12 @@ from pydantic_core import CoreSchema, core_schema
 from ...problem.quantities import LEAST, nearest
 from ...study.fields import number, quantity
 from ...study.messages import refuse, show
-from .names import DISTRIBUTIONS, PARAMETERS
+from .names import DISTRIBUTION_KEYS, PARAMETERS
 
 DEVIATIONS = 4.0
 """Standard deviations from the mean at which a normal distribution ends where it is not told."""
 
-FARTHEST = 8.0
+MOST_DEVIATIONS = 8.0
 """Standard deviations from the mean up to which a part of the range of a normal distribution has to come."""
 
 LEGAL = {"poisson_ratio": (0.0, 0.5), "relative_mesh_size": (LEAST, 1.0)}
@@ -56,10 +56,10 @@ class Distributed:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         value = dict(self.scalar.schema)
-        keys = dict.fromkeys((key for needed in DISTRIBUTIONS.values() for key in needed), value)
+        keys = dict.fromkeys((key for needed in DISTRIBUTION_KEYS.values() for key in needed), value)
         drawn = {
             "type": "object",
-            "properties": {"distribution": {"enum": list(DISTRIBUTIONS)}} | keys,
+            "properties": {"distribution": {"enum": list(DISTRIBUTION_KEYS)}} | keys,
             "additionalProperties": False,
         }
         return {"anyOf": [value, drawn]}
@@ -68,9 +68,9 @@ class Distributed:
         if not isinstance(value, dict):
             raise refuse(f"{show(value)}, as in a grid; a sample has a value or a range: give {self.example}")
         name = value.get("distribution") or "uniform"
-        if not isinstance(name, str) or name not in DISTRIBUTIONS:
-            raise refuse(f"unknown distribution {show(name)}; {nearest(str(name), DISTRIBUTIONS)}", "distribution")
-        needed = DISTRIBUTIONS[name]
+        if not isinstance(name, str) or name not in DISTRIBUTION_KEYS:
+            raise refuse(f"unknown distribution {show(name)}; {nearest(str(name), DISTRIBUTION_KEYS)}", "distribution")
+        needed = DISTRIBUTION_KEYS[name]
         known = [*dict.fromkeys([*needed, "from", "to"]), "distribution"]
         for key in value:
             if key not in known:
@@ -90,9 +90,9 @@ class Distributed:
             raise refuse(f"{show(value['from'])} has no logarithm; give a 'from' above zero, or a uniform one", "from")
         if name == "triangular" and not low <= read["mode"] <= high:
             raise refuse(f"{show(value['mode'])} is not between 'from' and 'to'; give a mode between them", "mode")
-        if name == "normal" and not low < read["mean"] + FARTHEST * read["deviation"]:
+        if name == "normal" and not low < read["mean"] + MOST_DEVIATIONS * read["deviation"]:
             raise refuse(f"{show(value['mean'])} is far below 'from'; give ends near the mean", "mean")
-        if name == "normal" and not high > read["mean"] - FARTHEST * read["deviation"]:
+        if name == "normal" and not high > read["mean"] - MOST_DEVIATIONS * read["deviation"]:
             raise refuse(f"{show(value['mean'])} is far above 'to'; give ends near the mean", "mean")
         return {"distribution": name, "low": low, "high": high} | read
 

@@ -4,9 +4,8 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from .names import QUANTITIES
 
-SHOWN = {
+PARAMETER_AXES = {
     "length": ("length", 1e3, "mm"),
     "height": ("height", 1e3, "mm"),
     "thickness": ("thickness", 1e3, "mm"),
@@ -18,7 +17,7 @@ SHOWN = {
 }
 """Name of each parameter on an axis, what its values are multiplied with, and the unit then."""
 
-AXES = {
+QUANTITY_AXES = {
     "displacement": ("displacement", 1e3, "mm"),
     "deformation_error": ("deformation error", 100.0, "%"),
     "best_stiffness": ("best stiffness", 1.0, "N/m"),
@@ -41,7 +40,7 @@ def _is_logarithmic(values):
 
 def _unit(name, values):
     """What a parameter's values are multiplied with, and its unit."""
-    _, factor, unit = SHOWN[name]
+    _, factor, unit = PARAMETER_AXES[name]
     if name == "young_modulus" and np.nanmax(values) <= SMALL_MODULUS:
         return 1e-6, "MPa"
     if name == "force" and np.nanmin(values) >= 1e3:
@@ -58,11 +57,6 @@ def _of(tree, load):
     attributes = tree.attrs
     words = [load.capitalize(), f"{attributes['mesh_type']} meshes", f"{attributes['kinematics']} kinematics"]
     return ", ".join(words)
-
-
-def _present(data, name):
-    """Loads and definitions that a group has anything of."""
-    return data[name].notnull().any([dim for dim in data[name].dims if dim not in ("load", "definition")])
 
 
 def _panels_of_indices(data, load):
@@ -98,13 +92,22 @@ def plot_sobol(data, ax=None, *, load=None):
     ------
     ValueError
         If the dataset has no Sobol indices, the selection leaves a choice, or ``ax`` is not as many Axes as panels.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/sobol")
+    >>> axes = st.plot_sobol(tree, load="traction")
+    >>> [panel.get_title(loc="left") for panel in axes[:2]]
+    ['deformation error, paper', 'deformation error, area']
+    >>> [tick.get_text() for tick in axes[0].get_yticklabels()]
+    ['height', 'force']
     """
     found, samples = group(data, "sobol", alone=False), group(data, "samples", alone=False)
     asked = (found.base_samples + found.base_samples_without > 0).any("quantity")
     load = choose(asked, load=load)["load"]
     shown = _panels_of_indices(found, load)
     names = found.parameter.values.tolist()
-    words = [SHOWN[name][0] for name in names]
+    words = [PARAMETER_AXES[name][0] for name in names]
     columns = min(COLUMNS, max(1, len([one for one in shown if one[0] == shown[0][0]])))
     inside = 0.21 * len(names)
     figure, axes, flat, height = style.multiples(ax, len(shown), columns, inside + 0.52)
@@ -122,7 +125,7 @@ def plot_sobol(data, ax=None, *, load=None):
     for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
         one = found.sel(quantity=quantity, load=load, definition=definition)
         colour = "0.35" if quantity == "best_stiffness" else style.line(order.index(definition))["color"]
-        panel.set_title(AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}"))
+        panel.set_title(QUANTITY_AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}"))
         _bars(panel, one, colour)
         panel.set_xlim(limits)
         panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
@@ -193,6 +196,13 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     ------
     ValueError
         If the dataset has no samples, the selection leaves a choice, or ``ax`` is not as many Axes as parameters.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/sobol")
+    >>> axes = st.plot_effects(tree, load="traction")
+    >>> [panel.get_xlabel() for panel in axes]
+    ['height [mm]', 'force [N]']
     """
     effects, samples = group(data, "effects", alone=False), group(data, "samples", alone=False)
     asked = (samples.status != 0).any("sample")
@@ -209,7 +219,7 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     lines = [style.line(every.index(name)) for name in definitions]
     if figure is not None and ax is None:
         figure.set_size_inches(style.size(figure)[0], height + 0.45)
-    text, factor, unit = AXES[quantity]
+    text, factor, unit = QUANTITY_AXES[quantity]
     style.arrange(figure, axes, left=0.55, right=0.14, bottom=0.72, top=0.3, across=0.2, down=0.5,
                   title=f"{_of(samples, load)}: mean {text} over one parameter, {QUANTITY_NOTE}")  # fmt: skip
     drawn = False
@@ -229,7 +239,7 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
             style.plain(panel, "x")
         else:
             panel.locator_params(axis="x", nbins=4)
-        panel.set_xlabel(_axis(SHOWN[name][0], of))
+        panel.set_xlabel(_axis(PARAMETER_AXES[name][0], of))
         if number % columns == 0:
             panel.set_ylabel(_axis(text, unit))
     if not drawn:
@@ -259,6 +269,3 @@ def effects(tree):
 def _loads(tree):
     asked = (tree["samples"].to_dataset().status != 0).any(["sample", "definition"])
     return asked["load"].values[asked.values].tolist()
-
-
-__all__ = ["QUANTITIES", "effects", "plot_effects", "plot_sobol", "sobol"]

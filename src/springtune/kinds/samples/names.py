@@ -12,7 +12,7 @@ PARAMETERS = {
 }
 """Parameters of a sampled scene: kind of quantity, what it is, and its unit."""
 
-DISTRIBUTIONS = {
+DISTRIBUTION_KEYS = {
     "uniform": ("from", "to"),
     "log-uniform": ("from", "to"),
     "triangular": ("from", "mode", "to"),

@@ -23,7 +23,7 @@ from .designs import draw
 DRAWN = "drawn"
 """Name of the parameters among the results of a task."""
 
-LOST = "lost "
+LOST_NETWORK = "lost "
 """Beginning of the names of networks that went beyond the limits."""
 
 TOGETHER = 8
@@ -51,7 +51,7 @@ def run(tasks, spent):
         present = store.stored(path, spent.limits)
         missing = {key: scene for key, scene in tasks["results"].items() if key not in present}
         if missing or DRAWN not in present:
-            lost = {name for name in present if name.startswith(LOST)}
+            lost = {name for name in present if name.startswith(LOST_NETWORK)}
             reasons = store.read(path, lost) if lost else {}
             waiting.append(_Block(tasks, block, path, missing, {name: reasons[name]["message"] for name in lost}))
     for begin in range(0, len(waiting), TOGETHER):
@@ -69,7 +69,7 @@ def lose(tasks, key, why, limits):
         Of the network; what became of it; the limits.
     """
     name = key.partition(" ")[0]
-    store.add(Path(tasks["folder"]) / f"{name}.h5", {f"{LOST}{key}": {"message": why, store.LIMITS: limits}})
+    store.add(Path(tasks["folder"]) / f"{name}.h5", {f"{LOST_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
 
 
 class _Block:
@@ -148,8 +148,8 @@ def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
 
     def attempt(name, function):
         key = f"{block.key} {rows[0]} {name}"
-        if f"{LOST}{key}" in block.lost:
-            return _hole(block.lost[f"{LOST}{key}"], **{store.LIMITS: spent.limits})
+        if f"{LOST_NETWORK}{key}" in block.lost:
+            return _hole(block.lost[f"{LOST_NETWORK}{key}"], **{store.LIMITS: spent.limits})
         return spent.attempt(key, function, _hole)
 
     sheet = attempt("mesh", lambda: Sheet(MESH_TYPES[tasks["mesh_type"]](*box), 1.0, like=like))
@@ -199,8 +199,8 @@ def _objection(sheet, scene, drawn, row):
     if not np.isfinite([unit, answer]).all() or abs(unit - answer) <= SCALES * abs(answer):
         return ""
     return (
-        f"{scene['definition']}: answers are not in proportion to force over Young's modulus and thickness, as those of "
-        "samples have to be; put it into a grid instead"
+        f"{scene['definition']}: answers are not in proportion to force over Young's modulus and thickness, as those "
+        "of samples have to be; put it into a grid instead"
     )
 
 
