@@ -148,7 +148,7 @@ def samples():
     labels = {"sample": range(16), "load": LOADS, "definition": DEFINITIONS}
     cell = ("sample", "load", "definition")
     data = variables(labels, displacement=cell, deformation_error=cell, height=("sample",), force=("sample",))
-    data = data.set_coords(["height", "force"]).assign(status=xr.ones_like(data.displacement, dtype=np.int8))
+    data = data.assign(status=xr.ones_like(data.displacement, dtype=np.int8))
     about = {"design": "sobol-indices", "size": 4, "mesh_type": "structured", "kinematics": "linear"}
     return data.assign_attrs(about | {"varied": "height force"})
 

@@ -20,8 +20,8 @@ from .names import DROP, PARAMETERS, QUANTITIES, SOBOL_INDICES, blocks
 from .stage import DRAWN
 from .variables import EFFECTS, SAMPLES, SOBOL
 
-BINS = 16
-"""Parts of a parameter's distribution whose means are its main effect."""
+MOST_BINS, BIN_POINTS = 16, 16
+"""Most parts of a parameter's distribution whose means are its main effect, and fewest points of each."""
 
 
 def groups(study, folder):
@@ -38,7 +38,7 @@ def groups(study, folder):
         scenes.fitted(results)
     data = _with_coordinates(data, sample, drawn, study.axes)
     found = {SAMPLES.name: data}
-    axes |= {"parameter": sample.varied, "quantity": _quantities(sample), "bin": tuple(range(BINS))}
+    axes |= {"parameter": sample.varied, "quantity": _quantities(sample), "bin": _bins(sample)}
     found[EFFECTS.name] = _effects(sample, data, drawn, axes)
     if sample.design == SOBOL_INDICES:
         found[SOBOL.name] = _indices(sample, data, axes)
@@ -194,6 +194,11 @@ def _values(sample, data, quantity, load, definition):
     return np.where(here == Status.SOLVED, values.sel(definition=definition).values, np.nan)
 
 
+def _bins(sample):
+    points = sample.size * min(2, sample.rows // sample.size)
+    return tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS))))
+
+
 def _effects(sample, data, drawn, axes):
     """Means over each parameter alone, of rows that are independent of each other."""
     effects = EFFECTS.empty(axes)
@@ -201,12 +206,12 @@ def _effects(sample, data, drawn, axes):
     alone = np.flatnonzero(np.arange(sample.rows) % each < 2)  # A and B
     for p, parameter in enumerate(sample.varied):
         at = drawn[parameter][alone]
-        effects["parameter_value"].values[p] = main_effect(at, at, BINS)[0]
+        effects["parameter_value"].values[p] = main_effect(at, at, len(axes["bin"]))[0]
         for q, quantity in enumerate(axes["quantity"]):
             for load, i in ((load, axes["load"].index(load)) for load in sample.loads):
                 for name, j in ((name, axes["definition"].index(name)) for name in sample.definitions):
                     values = _values(sample, data, quantity, load, name)[alone]
-                    _, mean, error = main_effect(at, values, BINS)
+                    _, mean, error = main_effect(at, values, len(axes["bin"]))
                     effects["main_effect"].values[q, p, :, i, j] = mean
                     effects["main_effect_error"].values[q, p, :, i, j] = error
     return effects

@@ -218,9 +218,9 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     figure, axes, flat, height = style.multiples(ax, len(names), columns, 1.75, sharey=True)
     lines = [style.line(every.index(name)) for name in definitions]
     if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.45)
+        figure.set_size_inches(style.size(figure)[0], height + 0.59)
     text, factor, unit = QUANTITY_AXES[quantity]
-    style.arrange(figure, axes, left=0.55, right=0.14, bottom=0.72, top=0.3, across=0.2, down=0.5,
+    style.arrange(figure, axes, left=0.55, right=0.14, bottom=0.86, top=0.3, across=0.2, down=0.5,
                   title=f"{_of(samples, load)}: mean {text} over one parameter, {QUANTITY_NOTE}")  # fmt: skip
     drawn = False
     for number, (panel, name) in enumerate(zip(flat, names)):
@@ -244,10 +244,27 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
             panel.set_ylabel(_axis(text, unit))
     if not drawn:
         labels.say(flat[0], "no scene has a value")
-    elif figure is not None:
+    if figure is not None:
         handles, texts = flat[0].get_legend_handles_labels()
         figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
+        width, tall = style.size(figure)
+        note = labels.wrapped(_lacking(samples, load, definitions), width - 0.2)
+        figure.text(0.1 / width, 0.3 / tall, note, fontsize=style.SMALL, color="0.25")
     return flat
+
+
+def _lacking(samples, load, definitions):
+    """How many scenes the means lack, and of how many the reference does not apply; bands."""
+    scenes = samples.sel(load=load, definition=definitions)
+    unsolved, every = int((scenes.status != 1).sum()), scenes.status.size
+    said = ["bands: two standard errors"]
+    if unsolved:
+        said.append(f"without {unsolved} of {every} scenes, which are not solved")
+    beyond = int((samples.reference_applies.sel(load=load) == 0).sum()) if "reference_applies" in samples else 0
+    if beyond:
+        said.append(f"{beyond} of {samples.sizes['sample']} points are beyond small strain or without a reference, "
+                    "so that their error is not the network's alone")  # fmt: skip
+    return "; ".join(said)
 
 
 QUANTITY_NOTE = "whatever the others are"
