@@ -11,6 +11,8 @@ from .kinds.moduli.figures import plot_definitions_loads as plot_definitions_loa
 from .kinds.moduli.figures import plot_definitions_size as plot_definitions_size
 from .kinds.moduli.figures import plot_moduli as plot_moduli
 from .kinds.refinement.figures import plot_refinement as plot_refinement
+from .kinds.samples.figures import plot_effects as plot_effects
+from .kinds.samples.figures import plot_sobol as plot_sobol
 from .kinds.scenes.figures import plot_block as plot_block
 from .kinds.scenes.figures import plot_deformed as plot_deformed
 from .kinds.scenes.figures import plot_sensitivity as plot_sensitivity

@@ -160,9 +160,36 @@ def benchmark():
     )  # fmt: skip
 
 
+def samples():
+    """Rows of four base samples of two parameters."""
+    labels = {"sample": range(16), "load": LOADS, "definition": DEFINITIONS}
+    cell = ("sample", "load", "definition")
+    data = variables(labels, displacement=cell, deformation_error=cell, height=("sample",), force=("sample",))
+    data = data.assign(status=xr.ones_like(data.displacement, dtype=np.int8))
+    about = {"design": "sobol-indices", "size": 4, "mesh_type": "structured", "kinematics": "linear"}
+    return data.assign_attrs(about | {"varied": "height force"})
+
+
+def effects():
+    labels = {"quantity": ["displacement", "deformation_error"], "parameter": ["height", "force"], "bin": range(4)}
+    cell = ("quantity", "parameter", "bin", "load", "definition")
+    labels |= {"load": LOADS, "definition": DEFINITIONS}
+    return variables(labels, parameter_value=("parameter", "bin"), main_effect=cell, main_effect_error=cell)
+
+
+def sobol():
+    labels = {"quantity": ["displacement", "deformation_error"], "parameter": ["height", "force"]}
+    labels |= {"load": LOADS, "definition": DEFINITIONS}
+    names = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
+    data = variables(labels, **dict.fromkeys(names, ("quantity", "parameter", "load", "definition")))
+    counted = xr.full_like(data.first_order.isel(parameter=0, drop=True), 4, dtype=int)
+    return data.assign(base_samples=counted, base_samples_without=0 * counted).assign_attrs(bands="", failures="")
+
+
 def dataset():
     """The tree of a study of all kinds: every label that the groups share is in each of them, and all is solved."""
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
     groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
+    groups |= {"samples": samples, "effects": effects, "sobol": sobol}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})

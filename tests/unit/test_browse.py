@@ -106,14 +106,18 @@ class TestPage:
         from springtune.kinds.laying.variables import LAYING
         from springtune.kinds.moduli.variables import MODULI
         from springtune.kinds.refinement.variables import REFINEMENT
+        from springtune.kinds.samples.names import PARAMETERS
+        from springtune.kinds.samples.variables import EFFECTS, SAMPLES, SOBOL
         from springtune.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
         from springtune.kinds.stability.variables import STABILITY
 
-        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK, REFINEMENT)
+        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK)
+        groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT)
+        coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
         known = {group.name: group for group in groups}
         for view in views().values():
             variables = known[view.group].variables
-            dimensions = {name for row in variables.values() for name in row[0]}
+            dimensions = {name for row in variables.values() for name in row[0]} | coordinates.get(view.group, set())
             assert set(view.columns) <= set(variables)
             for plot in view.plots:
                 beside = {name for row in plot.beside for name in row[:2]}

@@ -131,7 +131,7 @@ def _of_the_paper(data):
 
 @pytest.fixture(scope="module")
 def repository(tmp_path_factory):
-    """What a reader has who is past the tutorial: studies, meshes of a mesher, results of two studies."""
+    """What a reader has who is past the tutorial: studies, meshes of a mesher, results of three studies."""
     folder = tmp_path_factory.mktemp("reader")
     shutil.copytree(REPOSITORY / "config", folder / "config")
     (folder / "config/meshes").mkdir()
@@ -145,7 +145,7 @@ def repository(tmp_path_factory):
     mine["message"] = mine.status.astype(str).where(mine.status > 1, "")
     mine.attrs = {"springtune_version": st.__version__, "config": (REPOSITORY / "config/quick.yaml").read_text()}
     paper = mine.map_over_datasets(_of_the_paper)
-    for name, tree in {"mine": mine, "paper": paper}.items():
+    for name, tree in {"mine": mine, "sobol": mine.copy(), "paper": paper}.items():
         tree.attrs["study"] = name
         (folder / f"results/{name}").mkdir(parents=True)
         tree.to_netcdf(folder / f"results/{name}/dataset.nc", engine="h5netcdf")

@@ -44,7 +44,7 @@ class Network:
     energies : sequence of Energy, optional
         Energies besides the springs'.
     like : Network, optional
-        A network with the same mesh and the same directions held, whose numbering this one takes over.
+        A network with the same cells and the same directions held, whose numbering this one takes over.
     solver : str, optional
         One of `springtune.linalg.SOLVERS`; by what is installed and the number of unknowns without. What is not
         positive definite has no Cholesky factor, and SuperLU takes its place.
@@ -100,7 +100,7 @@ class Network:
         self.energies = tuple(energies)
         self.has_springs = bool(np.any(stiffness)) or not self.energies
         if like is not None:
-            self._pattern = like._pattern
+            self._pattern = like._pattern if like.mesh is mesh else like._pattern.moved(mesh)
         self.first, self.second = mesh.edges.T
         self.rest_vectors = mesh.points[self.second] - mesh.points[self.first]
         self.rest_lengths = mesh.edge_lengths

@@ -1,6 +1,7 @@
 """Numbering of the unknowns of networks on one mesh, sparsity of their matrices, and order of elimination."""
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -78,6 +79,14 @@ class Pattern:
         filled = np.concatenate([[0], np.cumsum(kept)[ends - 1]])
         pointers = filled[np.concatenate([[True], self.number.ravel() >= 0])].astype(np.int32)
         return row_of[kept].astype(np.int32), pointers, source[kept]
+
+    def moved(self, mesh: Mesh) -> "Pattern":
+        """The same of a mesh with the same cells at other points; what depends on where these are is found anew."""
+        found = copy(self)
+        found.mesh = mesh
+        for name in ("order", "elimination", *(["analysis"] if self.size > DISSECTED else [])):
+            found.__dict__.pop(name, None)
+        return found
 
     @cached_property
     def codes(self) -> np.ndarray:

@@ -201,6 +201,8 @@ class Sheet:
         Of the sheet [m].
     networks : int, optional
         Networks that are kept.
+    like : Sheet, optional
+        A sheet whose numbering networks take over if its mesh has the same cells, wherever their corners are.
 
     Attributes
     ----------
@@ -221,14 +223,15 @@ class Sheet:
     'solved: 0.447 mm'
     """
 
-    def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS) -> None:
+    def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
         self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self._most = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
-        self._patterns: dict[bytes, Network] = {}
+        shared = like is not None and mesh.shares_cells(like.mesh)
+        self._patterns: dict[bytes, Network] = dict(like._patterns) if like is not None and shared else {}
         self._networks: dict[bytes, tuple[Network, dict[tuple[LoadKind, float, bool], StaticProblem]]] = {}
 
     def derive(

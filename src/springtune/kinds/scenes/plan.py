@@ -140,7 +140,7 @@ _shared: dict[str, Any] = {}
 
 
 def _common(study, scene):
-    """What scenes share that differ in their force or by a factor on the stiffness: part of their tasks, and its key."""
+    """What scenes share that differ in force or by a factor on the stiffness: a part of their tasks, and its key."""
     if _shared.get("grids") is not study.grids or _shared["outputs"] != study.outputs:
         _shared.clear()
         _shared.update(grids=study.grids, outputs=study.outputs, parts={})

@@ -1,0 +1,288 @@
+"""Figures of samples: which parameter matters, and how."""
+
+import numpy as np
+
+from ...output import labels, style
+from ...output.selection import choose, group
+
+PARAMETER_AXES = {
+    "length": ("length", 1e3, "mm"),
+    "height": ("height", 1e3, "mm"),
+    "thickness": ("thickness", 1e3, "mm"),
+    "mesh_size": ("mesh size", 1e3, "mm"),
+    "relative_mesh_size": ("mesh size / height", 1.0, ""),
+    "young_modulus": ("Young's modulus", 1e-9, "GPa"),
+    "poisson_ratio": ("Poisson's ratio", 1.0, ""),
+    "force": ("force", 1.0, "N"),
+}
+"""Name of each parameter on an axis, what its values are multiplied with, and the unit then."""
+
+QUANTITY_AXES = {
+    "displacement": ("displacement", 1e3, "mm"),
+    "deformation_error": ("deformation error", 100.0, "%"),
+    "best_stiffness": ("best stiffness", 1.0, "N/m"),
+}
+"""The same of each quantity."""
+
+COLUMNS = 4
+"""Most panels side by side."""
+
+SMALL_MODULUS = 1e9
+"""Young's modulus up to which the unit is MPa [Pa]."""
+
+
+def _is_logarithmic(values):
+    """Whether parts of a distribution that are equally probable are more evenly spaced on a logarithmic axis."""
+    spacings = [np.diff(of(values)) for of in ((np.log, np.asarray) if (values > 0).all() else (np.asarray,))]
+    spreads = [spacing.std() / spacing.mean() for spacing in spacings]
+    return spreads[0] < 0.5 * spreads[-1]
+
+
+def _unit(name, values):
+    """What a parameter's values are multiplied with, and its unit."""
+    _, factor, unit = PARAMETER_AXES[name]
+    if name == "young_modulus" and np.nanmax(values) <= SMALL_MODULUS:
+        return 1e-6, "MPa"
+    if name == "force" and np.nanmin(values) >= 1e3:
+        return 1e-3, "kN"
+    return factor, unit
+
+
+def _axis(text, unit):
+    return f"{text} [{unit}]" if unit else text
+
+
+def _of(tree, load):
+    """Words on a sample, for a title."""
+    attributes = tree.attrs
+    words = [load.capitalize(), f"{attributes['mesh_type']} meshes", f"{attributes['kinematics']} kinematics"]
+    return ", ".join(words)
+
+
+def _panels_of_indices(data, load):
+    """Quantity and definition of each panel; what is of no definition has one."""
+    asked = data.base_samples.sel(load=load) + data.base_samples_without.sel(load=load) > 0
+    found = []
+    for quantity in ("deformation_error", "displacement", "best_stiffness"):
+        if quantity in data["quantity"].values:
+            here = asked.sel(quantity=quantity)
+            names = here["definition"].values[here.values].tolist()
+            found += [(quantity, name) for name in (names[:1] if quantity == "best_stiffness" else names)]
+    return found
+
+
+@style.styled
+def plot_sobol(data, ax=None, *, load=None):
+    """Sobol indices of a sample, a panel a quantity and definition.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as there are quantities and definitions; by default a new figure.
+    load : str, optional
+        Label of the load. One that is not given must leave no choice.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_panels,)
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no Sobol indices, the selection leaves a choice, or ``ax`` is not as many Axes as panels.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/sobol")
+    >>> axes = st.plot_sobol(tree, load="traction")
+    >>> [panel.get_title(loc="left") for panel in axes[:2]]
+    ['deformation error, paper', 'deformation error, area']
+    >>> [tick.get_text() for tick in axes[0].get_yticklabels()]
+    ['height', 'force']
+    """
+    found, samples = group(data, "sobol", alone=False), group(data, "samples", alone=False)
+    asked = (found.base_samples + found.base_samples_without > 0).any("quantity")
+    load = choose(asked, load=load)["load"]
+    shown = _panels_of_indices(found, load)
+    names = found.parameter.values.tolist()
+    words = [PARAMETER_AXES[name][0] for name in names]
+    columns = min(COLUMNS, max(1, len([one for one in shown if one[0] == shown[0][0]])))
+    inside = 0.21 * len(names)
+    figure, axes, flat, height = style.multiples(ax, len(shown), columns, inside + 0.52)
+    rows, size = axes.shape[0], samples.attrs["size"]
+    note = _note(found.sel(load=load), size)
+    room = style.PAGE if columns > 1 else style.COLUMN
+    lines = labels.wrapped(note, room - 0.2).count("\n") + 1
+    if figure is not None and ax is None:
+        figure.set_size_inches(style.size(figure)[0], height + 0.25 + 0.14 * lines)
+    style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + 0.14 * lines,
+                  top=0.48, across=0.18, down=0.42 if rows > 1 else 0.0,
+                  title=f"{_of(samples, load)}: Sobol indices")  # fmt: skip
+    order = found["definition"].values.tolist()
+    limits = _limits(found, shown, load)
+    for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
+        one = found.sel(quantity=quantity, load=load, definition=definition)
+        colour = "0.35" if quantity == "best_stiffness" else style.line(order.index(definition))["color"]
+        panel.set_title(QUANTITY_AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}"))
+        _bars(panel, one, colour)
+        panel.set_xlim(limits)
+        panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
+        if not np.isfinite(one.first_order.values).any():
+            why = "does not vary" if int(one.base_samples) else "withheld, since scenes have no value"
+            labels.say(panel, why, bare=False)
+    for panel in flat[-columns:]:
+        panel.set_xlabel("share of the variance")
+    if figure is not None:
+        width, tall = style.size(figure)
+        figure.text(0.1 / width, 0.06 / tall, labels.wrapped(note, width - 0.2), fontsize=style.SMALL, color="0.25")
+    return flat
+
+
+def _limits(found, shown, load):
+    """Ends of the axis of all panels: from zero to one, farther where bands are, within reason."""
+    cells = [found.sel(quantity=quantity, load=load, definition=name) for quantity, name in shown]
+    low = min([0.0, *(float(np.nanmin([one.first_order_low, np.zeros(one.first_order.shape)])) for one in cells)])
+    ones = np.ones(cells[0].first_order.shape) if cells else 1.0
+    high = max([1.0, *(float(np.nanmax([one.total_order_high, one.first_order_high, ones])) for one in cells)])
+    return max(low, -0.3) - 0.02, min(high, 1.5) + 0.02
+
+
+def _bars(panel, indices, colour):
+    """Bars of the indices of one quantity: total order pale and wide, first order full and narrow, with bands."""
+    for order, wide, alpha, shift in (("total_order", 0.76, 0.3, 0.2), ("first_order", 0.36, 1.0, -0.2)):
+        values, low, high = (indices[f"{order}{end}"].values for end in ("", "_low", "_high"))
+        places = np.arange(len(values))
+        panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
+        panel.hlines(places + shift, low, high, color="k", linewidth=0.8)
+    panel.set_ylim(len(places) - 0.45, -0.55)
+    panel.tick_params(axis="y", length=0)
+    panel.grid(False, axis="y")
+
+
+def _note(found, size):
+    """What bars and bands are, and how many base samples they are of."""
+    used, without = found.base_samples.values, found.base_samples_without.values
+    text = "full: first order, pale: total order; lines: bootstrap bands, 95 %"
+    lost = int(without.max())
+    some = used[used > 0]
+    if not lost:
+        return f"{text}; {size} base samples"
+    kept = f"{int(some.min())} to {int(some.max())}" if some.size and some.min() < some.max() else f"{int(used.max())}"
+    return f"{text}; {kept} of {size} base samples: up to {lost} have a scene without a value"
+
+
+@style.styled
+def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
+    """Main effects of a sample: the mean of a quantity over each parameter alone, a panel a parameter.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as there are parameters; by default a new figure.
+    load : str, optional
+        Label of the load. One that is not given must leave no choice.
+    quantity : str, optional
+        ``"deformation_error"``, ``"displacement"`` or ``"best_stiffness"``.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_parameters,)
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no samples, the selection leaves a choice, or ``ax`` is not as many Axes as parameters.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/sobol")
+    >>> axes = st.plot_effects(tree, load="traction")
+    >>> [panel.get_xlabel() for panel in axes]
+    ['height [mm]', 'force [N]']
+    """
+    effects, samples = group(data, "effects", alone=False), group(data, "samples", alone=False)
+    asked = (samples.status != 0).any("sample")
+    load = choose(asked, load=load, quantity=None)["load"]
+    effects = effects.sel(
+        load=load, quantity=choose(effects.main_effect.notnull() | True, quantity=quantity)["quantity"]
+    )
+    shown = asked.sel(load=load)
+    definitions = shown["definition"].values[shown.values].tolist()
+    definitions = definitions[:1] if quantity == "best_stiffness" else definitions
+    names, every = effects.parameter.values.tolist(), effects["definition"].values.tolist()
+    columns = min(COLUMNS, len(names))
+    figure, axes, flat, height = style.multiples(ax, len(names), columns, 1.75, sharey=True)
+    lines = [style.line(every.index(name)) for name in definitions]
+    if figure is not None and ax is None:
+        figure.set_size_inches(style.size(figure)[0], height + 0.59)
+    text, factor, unit = QUANTITY_AXES[quantity]
+    style.arrange(figure, axes, left=0.55, right=0.14, bottom=0.86, top=0.3, across=0.2, down=0.5,
+                  title=f"{_of(samples, load)}: mean {text} over one parameter, {QUANTITY_NOTE}")  # fmt: skip
+    drawn = False
+    for number, (panel, name) in enumerate(zip(flat, names)):
+        values = effects.parameter_value.sel(parameter=name).values
+        by, of = _unit(name, values)
+        x = by * values
+        for definition, line in zip(definitions, lines):
+            one = effects.sel(parameter=name, definition=definition)
+            mean, error = (factor * one[which].values for which in ("main_effect", "main_effect_error"))
+            label = "uniform springs" if quantity == "best_stiffness" else definition
+            panel.plot(x, mean, label=label, **line | {"marker": ""})
+            panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=line["color"], alpha=0.15, linewidth=0)
+            drawn |= bool(np.isfinite(mean).any())
+        if _is_logarithmic(values):
+            panel.set_xscale("log")
+            style.plain(panel, "x")
+        else:
+            panel.locator_params(axis="x", nbins=4)
+        panel.set_xlabel(_axis(PARAMETER_AXES[name][0], of))
+        if number % columns == 0:
+            panel.set_ylabel(_axis(text, unit))
+    if not drawn:
+        labels.say(flat[0], "no scene has a value")
+    if figure is not None:
+        handles, texts = flat[0].get_legend_handles_labels()
+        figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
+        width, tall = style.size(figure)
+        note = labels.wrapped(_lacking(samples, load, definitions), width - 0.2)
+        figure.text(0.1 / width, 0.3 / tall, note, fontsize=style.SMALL, color="0.25")
+    return flat
+
+
+def _lacking(samples, load, definitions):
+    """How many scenes the means lack, and of how many the reference does not apply; bands."""
+    scenes = samples.sel(load=load, definition=definitions)
+    unsolved, every = int((scenes.status != 1).sum()), scenes.status.size
+    said = ["bands: two standard errors"]
+    if unsolved:
+        said.append(f"without {unsolved} of {every} scenes, which are not solved")
+    beyond = int((samples.reference_applies.sel(load=load) == 0).sum()) if "reference_applies" in samples else 0
+    if beyond:
+        said.append(f"{beyond} of {samples.sizes['sample']} points are beyond small strain or without a reference, "
+                    "so that their error is not the network's alone")  # fmt: skip
+    return "; ".join(said)
+
+
+QUANTITY_NOTE = "whatever the others are"
+"""What a main effect is, in a title."""
+
+
+def sobol(tree):
+    """Stem, function that plots, and selection of each figure."""
+    for load in _loads(tree):
+        yield f"sobol_{load}", plot_sobol, {"load": load}
+
+
+def effects(tree):
+    """Stem, function that plots, and selection of each figure."""
+    for load in _loads(tree):
+        yield f"effects_{load}", plot_effects, {"load": load}
+
+
+def _loads(tree):
+    asked = (tree["samples"].to_dataset().status != 0).any(["sample", "definition"])
+    return asked["load"].values[asked.values].tolist()

@@ -1,0 +1,134 @@
+"""Stages of samples: what their jobs are to do, and the keys of what they store."""
+
+from functools import cache
+from pathlib import Path
+
+from ...jobs.hashing import hash_of
+from ...jobs.keys import definition_key, mesh_type_key, stage_key
+from ...problem.loads import LOADS
+from ..base import Stage
+from .names import blocks, rows_each
+
+UNIFORM = "uniform"
+"""Definition whose networks tell the best uniform stiffness."""
+
+
+def load_kinds(sample):
+    """Kinds of load of a sample."""
+    return list(dict.fromkeys(LOADS[name].kind for name in sample.loads))
+
+
+def definitions(sample):
+    """Definitions whose networks are solved."""
+    wanted = (UNIFORM,) if sample.best_stiffness and UNIFORM not in sample.definitions else ()
+    return (*sample.definitions, *wanted)
+
+
+def reference_box(sample):
+    """First and last aspect ratio, and first and last Poisson's ratio."""
+    length, height, ratio = (sample.parameters[name] for name in ("length", "height", "poisson_ratio"))
+    return [length["low"] / height["high"], length["high"] / height["low"]], [ratio["low"], ratio["high"]]
+
+
+def reference_key(sample, kind):
+    """Key of the references of a kind of load, as one function."""
+    return hash_of(kind.name, reference_box(sample), stage_key("kinds.samples.interpolate"))
+
+
+def block_key(sample, first, last):
+    """Key of the parameters of some base samples, and stem of the file of their results."""
+    return hash_of(sample.design, sample.seed, sample.parameters, first, last, stage_key("kinds.samples.designs"))
+
+
+@cache
+def _solved_with(mesh_type, definition):
+    return hash_of(stage_key("kinds.samples.stage"), mesh_type_key(mesh_type), definition_key(definition))
+
+
+def result_key(sample, load, definition):
+    """Key of the scenes of a load and definition, in the file of any base samples.
+
+    Of linear kinematics they are for 1 N, which loads of a kind share.
+    """
+    linear = sample.kinematics == "linear"
+    how = LOADS[load].kind.name if linear else [LOADS[load].kind.name, LOADS[load].sign, LOADS[load].follower]
+    return hash_of(how, sample.mesh_type, sample.kinematics, _solved_with(sample.mesh_type, definition))
+
+
+def _reference_members(study, costs):
+    sample = study.parts["samples"]
+    kinds = load_kinds(sample) if sample else ()
+    return {kind.name: (costs.of("interpolant"), kind) for kind in kinds}
+
+
+def _references(study, folder, kinds):
+    sample = study.parts["samples"]
+    aspect_range, nu_range = reference_box(sample)
+    return {
+        "folder": str(folder / "samples"),
+        "references": [
+            {"key": reference_key(sample, kind), "kind": kind.name, "aspect_range": aspect_range, "nu_range": nu_range}
+            for kind in kinds
+        ],
+    }
+
+
+def _reference_products(content):
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["references"]]
+
+
+def _members(study, costs):
+    """Tasks of some base samples each; those of a sample of half the size are the first of them."""
+    sample = study.parts["samples"]
+    if not sample:
+        return {}
+    each = rows_each(sample.design, len(sample.varied)) * len(sample.loads) * len(definitions(sample))
+    return {
+        f"{first}-{last}": (costs.of("sampled", (last - first) * each), (first, last))
+        for first, last in blocks(sample.design, sample.size)
+    }
+
+
+def _content(study, folder, members):
+    sample = study.parts["samples"]
+    results = {}
+    for load in sample.loads:
+        for definition in definitions(sample):
+            scene = {"kind": LOADS[load].kind.name, "definition": definition}
+            if sample.kinematics == "nonlinear":
+                scene |= {"sign": LOADS[load].sign, "follower": LOADS[load].follower}
+            results[result_key(sample, load, definition)] = scene
+    return {
+        "folder": str(folder / "samples"),
+        "design": sample.design,
+        "seed": sample.seed,
+        "parameters": sample.parameters,
+        "mesh_type": sample.mesh_type,
+        "kinematics": sample.kinematics,
+        "results": results,
+        "blocks": [{"key": block_key(sample, *ends), "first": ends[0], "last": ends[1]} for ends in members],
+    }
+
+
+def _products(content):
+    return [Path(content["folder"]) / f"{block['key']}.h5" for block in content["blocks"]]
+
+
+STAGES = (
+    Stage(
+        "interpolate",
+        "kinds.samples.interpolate",
+        "Interpolating the references of samples",
+        _references,
+        _reference_products,
+        _reference_members,
+    ),
+    Stage(
+        "sample",
+        "kinds.samples.stage",
+        "Solving the networks of samples",
+        _content,
+        _products,
+        _members,
+    ),
+)

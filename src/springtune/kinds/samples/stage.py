@@ -1,0 +1,215 @@
+"""Stage `sample`: the networks of sampled scenes.
+
+A scene's network is that of E t = 1 under a force over E t: with linear kinematics thickness, Young's modulus and force
+only scale an answer, and rows of a design that differ in these alone are solved once. Meshes of as many cells and rows
+follow each other, since networks on them share numbering, sparsity and symbolic factorization.
+"""
+
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ...jobs import store
+from ...mesh import MESH_TYPES
+from ...problem.loads import LOAD_KINDS
+from ...problem.materials import Material
+from ...problem.status import Status
+from ...scene.sheet import Sheet
+from ...springs import DefinitionError
+from .designs import draw
+
+DRAWN = "drawn"
+"""Name of the parameters among the results of a task."""
+
+LOST_NETWORK = "lost "
+"""Beginning of the names of networks that went beyond the limits."""
+
+TOGETHER = 8
+"""Tasks whose meshes are sorted together: more of them share cells, and no more is lost if the machine fails."""
+
+SCALES = 1e-7
+"""Largest relative difference of an answer that was scaled from one that was not: they differ by rounding alone."""
+
+
+def run(tasks, spent):
+    """Solve the scenes of a bundle that are not stored yet.
+
+    Parameters
+    ----------
+    tasks : dict
+        ``folder``, ``design, seed, parameters`` (see `springtune.kinds.samples.designs.draw`), ``mesh_type,
+        kinematics``, ``results``: by key ``kind`` (of load, by name), ``definition`` and for nonlinear kinematics
+        ``sign`` and ``follower``; and ``blocks``, each with ``key`` and ``first`` and ``last`` base sample.
+    spent : Spent
+        What tasks cost is added to it.
+    """
+    waiting = []
+    for block in tasks["blocks"]:
+        path = Path(tasks["folder"]) / f"{block['key']}.h5"
+        present = store.stored(path, spent.limits)
+        missing = {key: scene for key, scene in tasks["results"].items() if key not in present}
+        if missing or DRAWN not in present:
+            lost = {name for name in present if name.startswith(LOST_NETWORK)}
+            reasons = store.read(path, lost) if lost else {}
+            waiting.append(_Block(tasks, block, path, missing, {name: reasons[name]["message"] for name in lost}))
+    for begin in range(0, len(waiting), TOGETHER):
+        _solve_together(tasks, waiting[begin : begin + TOGETHER], spent)
+
+
+def lose(tasks, key, why, limits):
+    """Store that a network is beyond its limits: its block is solved again without it.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the network; what became of it; the limits.
+    """
+    name = key.partition(" ")[0]
+    store.add(Path(tasks["folder"]) / f"{name}.h5", {f"{LOST_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
+
+
+class _Block:
+    """Rows of some base samples, and what is known of their scenes.
+
+    Parameters
+    ----------
+    tasks, block : dict
+        As in the tasks of `run`.
+    path : Path
+        File of its results.
+    missing : dict
+        Results that are not stored.
+    lost : dict of str to str
+        Networks that went beyond limits before, and what became of them.
+    """
+
+    def __init__(self, tasks, block, path, missing, lost):
+        self.key, self.path, self.missing, self.lost = block["key"], path, missing, lost
+        self.drawn = draw(tasks["design"], tasks["seed"], tasks["parameters"], block["first"], block["last"])
+        rows = len(self.drawn["length"])
+        self.particles = np.zeros(rows, dtype=np.int64)
+        self.displacement = {key: np.full(rows, np.nan) for key in missing}
+        self.status = {key: np.full(rows, Status.FAILED, dtype=np.int8) for key in missing}
+        self.messages = {key: {} for key in missing}
+        self.limited = dict.fromkeys(missing, "")
+        self.seconds = 0.0
+
+    def meshes(self):
+        """Rows of each distinct mesh, by its length, height and mesh size [m]."""
+        found = {}
+        boxes = zip(*(self.drawn[name].tolist() for name in ("length", "height", "mesh_size")))
+        for row, box in enumerate(boxes):
+            found.setdefault(box, []).append(row)
+        return found
+
+    def keep(self, key, rows, scale, result):
+        """Note what became of the scenes of some rows, a result over a scale each."""
+        self.displacement[key][rows] = result["displacement"] * scale
+        self.status[key][rows] = result["status"]
+        if result["message"]:
+            self.messages[key] |= dict.fromkeys(map(str, rows), result["message"])
+        self.limited[key] = self.limited[key] or result.get(store.LIMITS, "")
+
+    def results(self):
+        """What to store."""
+        found = {DRAWN: {**self.drawn, "particles": self.particles}}
+        for key in self.missing:
+            found[key] = {
+                "displacement": self.displacement[key],
+                "status": self.status[key],
+                "messages": self.messages[key],
+            }
+            if self.limited[key]:
+                found[key][store.LIMITS] = self.limited[key]
+        return found
+
+
+def _solve_together(tasks, blocks, spent):
+    """Solve blocks: mesh after mesh, those of as many cells after each other."""
+    meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
+    meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
+    like, scaling = None, {}
+    for box, block, rows in meshes:
+        begin = time.perf_counter()
+        like = _solve_mesh(tasks, block, box, np.array(rows), like, scaling, spent) or like
+        block.seconds += time.perf_counter() - begin
+    for block in blocks:
+        if not spent.broken:
+            store.add(block.path, block.results())
+            spent.add("sampled", len(block.particles) * len(block.missing), block.seconds)
+
+
+def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
+    """Solve the scenes of some rows of a block that share a mesh; the meshed sheet, if there is one."""
+
+    def attempt(name, function):
+        key = f"{block.key} {rows[0]} {name}"
+        if f"{LOST_NETWORK}{key}" in block.lost:
+            return _hole(block.lost[f"{LOST_NETWORK}{key}"], **{store.LIMITS: spent.limits})
+        return spent.attempt(key, function, _hole)
+
+    sheet = attempt("mesh", lambda: Sheet(MESH_TYPES[tasks["mesh_type"]](*box), 1.0, like=like))
+    if not isinstance(sheet, Sheet):
+        for key in block.missing if sheet else ():
+            block.keep(key, rows, 1.0, sheet)
+        return None
+    block.particles[rows] = len(sheet.mesh.points)
+    drawn, linear = block.drawn, tasks["kinematics"] == "linear"
+    ratios = drawn["poisson_ratio"][rows]
+    # What deforms a network of E t = 1 as the row's force does the row's.
+    loads = drawn["force"][rows] / (drawn["young_modulus"][rows] * drawn["thickness"][rows])
+    for ratio in np.unique(ratios):
+        alike = ratios == ratio
+        for key, scene in block.missing.items():
+            name = f"{scene['kind']} {scene['definition']} {ratio!r}"
+            if scene["definition"] not in scaling:
+                scaling[scene["definition"]] = _objection(sheet, scene, drawn, rows[0])
+            why = scaling[scene["definition"]]
+            if why:
+                block.keep(key, rows[alike], 1.0, _hole(why))
+            elif linear:
+                found = attempt(name, partial(_solved, sheet, scene, ratio, 1.0, "linear"))
+                if found:
+                    block.keep(key, rows[alike], loads[alike], found)
+            else:
+                for load in np.unique(loads[alike]):
+                    same = rows[alike & (loads == load)]
+                    solved = partial(_solved, sheet, scene, ratio, scene["sign"] * load, "nonlinear", scene["follower"])
+                    found = attempt(f"{name} {load!r}", solved)
+                    if found:
+                        block.keep(key, same, 1.0, found)
+    return sheet
+
+
+def _hole(why, **limits):
+    return limits | {"displacement": np.nan, "status": Status.FAILED, "message": why}
+
+
+def _objection(sheet, scene, drawn, row):
+    """Why answers of a definition do not scale as samples make use of; empty where they do, on the mesh of a row."""
+    ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
+    own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
+    answers = [_solved(sheet, scene, ratio, load, "linear"), _solved(own, scene, ratio, 1.0, "linear", modulus=modulus)]
+    unit, answer = (one["displacement"] for one in answers)
+    # What has no answer says so scene by scene.
+    if not np.isfinite([unit, answer]).all() or abs(unit - answer) <= SCALES * abs(answer):
+        return ""
+    return (
+        f"{scene['definition']}: answers are not in proportion to force over Young's modulus and thickness, as those "
+        "of samples have to be; put it into a grid instead"
+    )
+
+
+def _solved(sheet, scene, ratio, load, kinematics, follower=False, modulus=1.0):
+    """Result of a network under a force: without a modulus one of E t = 1, and the force is over E t [m]."""
+    kind = LOAD_KINDS[scene["kind"]]
+    try:
+        springs, _ = sheet.derive(scene["definition"], Material(modulus, float(ratio)))
+    except DefinitionError as error:
+        return _hole(f"{scene['definition']}: {error}")
+    found = sheet.solve(kind, springs, load, kinematics, follower)
+    return {"displacement": found.displacement, "status": found.status, "message": found.message}
