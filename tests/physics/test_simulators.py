@@ -123,6 +123,40 @@ def test_equilibria_of_all_loads_are_those_of_mujoco(mesh_type, tmp_path):
     check_equilibria(mesh_type, "2.5 mm", lambda number: LOADED, tmp_path)
 
 
+@pytest.mark.slow
+def test_random_scenes_balance_in_mujoco_and_come_to_rest(tmp_path):
+    """Bodies of 10 mm to 1 m, stiff and soft, light and heavy, on all meshes and under all loads."""
+    rng, done = np.random.default_rng(7), 0
+    for _ in range(60):
+        length = 10 ** rng.uniform(-2, 0)
+        height = length / rng.uniform(1, 6)
+        beam = st.Beam(length, height, thickness=10 ** rng.uniform(-4, -2))
+        material = st.Material(10 ** rng.uniform(4, 11.5), rng.uniform(0, 0.5), density=10 ** rng.uniform(1.5, 4.2))
+        mesh_type, load = str(rng.choice(MESHES)), str(rng.choice(LOADED))
+        name = str(rng.choice(["uniform", "lattice", "patch", "van-gelder", "delingette", "oriented", "element-fit"]))
+        mesh = st.make_mesh(beam, mesh_type, height / rng.integers(2, 7))
+        strain = 10 ** rng.uniform(-4, -1.5) * (height / length if load == "bending" else 1)
+        face = height if load in ("traction", "compression", "bending") else length
+        force = float(material.young_modulus * face * beam.thickness * strain)
+        one = st.Scene(beam, mesh, material, load, force, definition=name)
+        try:
+            result = one.solve()
+        except st.DefinitionError:
+            continue
+        if str(result.status) != "solved":
+            continue
+        model, data = loaded(one, tmp_path)
+        positions = result.displacements[~one.network.held]
+        assert out_of_balance(model, data, positions) < 1e-9, one
+        mujoco.mj_resetData(model, data)
+        mujoco.mj_step(model, data, steps_to_rest(model, one))
+        # Compression lowers the lowest frequency, and what is slower is later at rest.
+        assert np.abs(data.qpos - positions).max() < 0.05 * np.abs(positions).max(), one
+        assert not data.warning.number.any()
+        done += 1
+    assert done > 30
+
+
 def steps_to_rest(model, one):
     """Steps in which a motion that is critically damped is a hundred-thousandth of what it was, at the lowest rate."""
     motion = one.motion()
