@@ -1,4 +1,4 @@
-"""What is fed: studies, mesh files and datasets, as bytes and by their structure."""
+"""What is fed: studies, mesh files, datasets and nets, as bytes and by their structure."""
 
 import io
 import os
@@ -19,6 +19,7 @@ from mutations import WORDS, spoil_bytes, spoil_tree
 import springtune as st
 from springtune.browse.page import page
 from springtune.cli.info import info_text
+from springtune.handover.formats import ENDINGS
 from springtune.kinds import kinds, load_study
 from springtune.kinds.scenes.summary import summary
 from springtune.mechanics.moduli import axial_moduli
@@ -311,13 +312,52 @@ def read_dataset(made):
     return "accepted"
 
 
+# -- nets --------------------------------------------------------------------------------------------------------------
+
+
+@cache
+def _nets():
+    """Contents of the files of a small net, by their names: one or, of tables, several.
+
+    Not of HDF5, whose own library never comes to an end on some damaged files; no command reads nets.
+    """
+    scene = st.Scene(st.Beam(*BOX), _mesh("free"), st.Material(210e9, 0.3), "traction", 1.0, definition="delingette")
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for ending in (ending for ending in ENDINGS if ending != ".h5"):
+            written = scene.springs.write(Path(folder) / f"net{ending}", errors=False)
+            found.append({path.name: path.read_bytes() for path in written})
+    return found
+
+
+def net_bytes(random, folder):
+    files = random.choice(_nets())
+    spoiled = random.choice(list(files))
+    for name, content in files.items():
+        (folder / name).write_bytes(spoil_bytes(random, content, NUMBERS) if name == spoiled else content)
+    return folder / next(iter(files))
+
+
+def read_net(path):
+    """Read a net; what is accepted is whole, and is written and read again as it is."""
+    try:
+        net = st.SpringNet.read(path)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    net.write(path.with_name("again.json"))
+    if (st.SpringNet.read(path.with_name("again.json")).stiffness != net.stiffness).any():
+        raise Wrong("is accepted, and another one when it was written again")
+    return "accepted"
+
+
 TARGETS = (
     Target("studies as bytes", study_bytes, read_study, 32),
     Target("studies by structure", study_trees, read_study, 17),
-    Target("mesh files as bytes", mesh_bytes, read_mesh, 22),
+    Target("mesh files as bytes", mesh_bytes, read_mesh, 18),
     Target("mesh files by structure", mesh_structure, read_mesh, 18),
     Target("datasets as bytes", dataset_bytes, read_dataset, 7),
     Target("datasets by structure", dataset_structure, read_dataset, 4),
+    Target("nets as bytes", net_bytes, read_net, 4),
 )
 
 

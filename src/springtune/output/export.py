@@ -393,20 +393,32 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
                 f"{path}: {len(scenes)} scenes, and a .vtu file has one; --select one {choose}, or give a name ending "
                 "in .pvd for all of them"
             )
-        _write_scene(tree, scenes[0], path)
+        _SceneFiles(tree).write(path, scenes[0])
         return f"{path}: {', '.join(map(_label_text, scenes[0].values()))}"
     if len(scenes) > MOST_PIECES:
         raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
+    files = _SceneFiles(tree)
     with series(path) as add:
         for number, labels in enumerate(scenes):
             name = "_".join(map(_label_text, labels.values())).replace(" ", "")
-            add(float(number), partial(_write_scene, tree, labels), name)
+            add(float(number), partial(files.write, labels=labels), name)
     return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
+
+
+MESH = ("beam", "mesh_type", "mesh_size")
+"""Dimensions whose labels make a mesh."""
+
+NUMBERS = {
+    "displacement": "displacement_of_the_load",
+    "reference_displacement": "reference_displacement_of_the_load",
+    "deformation_error": "deformation_error",
+}
+"""Numbers of a scene that go with its fields, and their names there."""
 
 
 def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
     """Labels of the scenes that have fields, in the order of a dataset."""
-    order = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+    order = (*MESH, "material", "load", "definition", "kinematics")
     solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
     names = [*(name for name in order if name in solved.dims), *(name for name in solved.dims if name not in order)]
     solved = solved.transpose(*names)
@@ -419,37 +431,47 @@ def _label_text(label: str | float) -> str:
     return label if isinstance(label, str) else f"{1e3 * label:.6g} mm"
 
 
-def _write_scene(tree: xr.DataTree, labels: Mapping[str, str | float], path: Path) -> None:
-    """Write one scene of the group of fields: particles and their displacements, springs as lines, cells."""
-    from ..handover.paraview import write_vtu
+class _SceneFiles:
+    """Writes scenes of the group of fields: particles and their displacements, springs as lines, cells."""
 
-    found = reading.field(tree, **labels)
-    points = np.stack([found.x.values, found.y.values], axis=1)
-    corners = found[reading.CELL_NODES].transpose("cell", ...).values
-    cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
-    for count in (3, 4):
-        cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+    def __init__(self, tree: xr.DataTree) -> None:
+        self.tree, root = tree, tree.to_dataset()
+        self.numbers = root[[name for name in NUMBERS if name in root]].load()
+        self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
 
-    def vectors(name: str) -> np.ndarray:
-        return np.stack([found[f"{name}_x"].values, found[f"{name}_y"].values], axis=1)
+    def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
+        """Write the scene of some labels."""
+        from ..handover.paraview import write_vtu
 
-    of_particles = {"displacement": vectors("displacement")}
-    if "particle_reference_x" in found:
-        expected = vectors("particle_reference")
-        if np.isfinite(expected).all():
-            error = of_particles["displacement"] - expected
-            of_particles |= {"reference_displacement": expected, "error": error}
-    of_springs = {name: {2: found[name].values} for name in ("stiffness", "force") if name in found}
-    root = tree.to_dataset()
-    numbers = {}
-    for name in ("displacement", "reference_displacement", "deformation_error"):
-        if name in root:
-            here = root[name].sel({dim: label for dim, label in labels.items() if dim in root[name].dims})
+        mesh = {name: label for name, label in labels.items() if name in MESH}
+        if mesh != self.mesh:
+            self.mesh, self.network = mesh, reading.field(self.tree, **mesh)
+        found = self.network
+        found = found.sel({name: label for name, label in labels.items() if name not in MESH and name in found.dims})
+        corners = found[reading.CELL_NODES].transpose("cell", ...).values
+        cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
+        for count in (3, 4):
+            cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+
+        def vectors(names: str) -> np.ndarray:
+            return np.stack([found[names.format(axis)].values for axis in "xy"], axis=1)
+
+        of_particles = {"displacement": vectors("displacement_{}")}
+        if "particle_reference_x" in found:
+            expected = vectors("particle_reference_{}")
+            if np.isfinite(expected).all():
+                error = of_particles["displacement"] - expected
+                of_particles |= {"reference_displacement": expected, "error": error}
+        of_springs = {name: {2: found[name].values} for name in ("stiffness", "force") if name in found}
+        numbers = {}
+        for name, array in self.numbers.items():
+            here = array.sel({dim: label for dim, label in labels.items() if dim in array.dims})
             if here.ndim == 0 and np.isfinite(here):
-                numbers[name if name == "deformation_error" else f"{name}_of_the_load"] = float(here)
-    said = {"title": tree.attrs.get("title", ""), "study": tree.attrs.get("study", ""), **labels}
-    units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
-    write_vtu(path, points, cells, of_particles, of_springs, numbers, json.dumps(said | {"units": units}, indent=1))
+                numbers[NUMBERS[str(name)]] = float(here)
+        said = {name: self.tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels)
+        units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
+        comment = json.dumps(said | {"units": units}, indent=1)
+        write_vtu(path, vectors("{}"), cells, of_particles, of_springs, numbers, comment)
 
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:

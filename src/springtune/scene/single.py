@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..mechanics.dynamics import Motion, Run
+    from ..mechanics.integrators import BackwardEuler
     from ..reference.small_strain import ReferenceSolution
 
 
@@ -299,7 +300,7 @@ class Scene:
         self,
         path: str | Path,
         motion: "Motion",
-        integrator: str,
+        integrator: "str | BackwardEuler",
         step: float,
         steps: int,
         *,
@@ -315,8 +316,8 @@ class Scene:
             ``swing/swing_0000.vtu``, each with displacement, velocity, and stiffness and force of the springs.
         motion : Motion
             What `motion` gave, critically damped or not.
-        integrator : str
-            One of `springtune.mechanics.integrators.INTEGRATORS`.
+        integrator : str or BackwardEuler
+            As `springtune.mechanics.dynamics.Motion.run` takes it.
         step : float
             [s]
         steps : int
