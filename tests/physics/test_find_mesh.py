@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.prediction import search as searching
+from counting import counted
 from springtune.prediction.search import NEED_ENERGIES, asked_error, find_mesh
 from springtune.problem.status import Status
+from springtune.scene.sheet import Sheet
 
 BEAM, STEEL = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
 
@@ -188,18 +189,20 @@ class TestArguments:
     def test_errors(self, text, error):
         assert asked_error(text) == pytest.approx(error, rel=1e-15)
 
-    def test_an_error_that_the_reference_cannot_tell(self, monkeypatch):
-        monkeypatch.setattr(searching, "TriedMesh", None)  # nothing is solved
-        with pytest.raises(
-            ValueError, match=r"^error: '1e-05 %' is below the error estimate of the .*; give at least "
+    def test_an_error_that_the_reference_cannot_tell(self):
+        with (
+            counted(Sheet.__init__) as calls,
+            pytest.raises(ValueError, match=r"^error: '1e-05 %' is below the error estimate of the .*; give at least "),
         ):
             find_mesh(BEAM, STEEL, "1e-05 %")
+        assert not calls  # nothing is solved but the references
 
-    def test_a_load_without_reference(self, monkeypatch):
-        known = {"traction": "it did not converge"}
-        monkeypatch.setattr(searching, "references", lambda beam, material, loads: known)
-        with pytest.raises(ValueError, match="^loads: 'traction' has no reference, so .*: it did not converge"):
-            find_mesh(BEAM, STEEL, "1 %", loads=["traction"])
+    def test_a_load_without_reference(self):
+        """The most slender beam that is one."""
+        with pytest.raises(
+            ValueError, match="^loads: 'bending' has no reference, so .* such slender shapes are for beam"
+        ):
+            find_mesh(st.Beam(10.0, 1e-3), st.Material(1e9, 0.5), "1 %", loads=["traction", "bending"])
 
     @pytest.mark.parametrize("names", ["structured", [], ["triangles"], 3, [["free"]], [None]])
     def test_mesh_types(self, names):

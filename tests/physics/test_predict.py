@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import springtune as st
+from counting import counted
 from springtune.kinds.scenes.solve import solve
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MeshType
 from springtune.prediction import CASES, PREDICTED, extrapolate, predict, references
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
@@ -425,16 +427,16 @@ class TestBodies:
             ((1e-3, 1e3), "one side is 1e.06 times the other"),
         ],
     )
-    def test_that_are_none_are_refused_at_once(self, sides, why, monkeypatch):
+    def test_that_are_none_are_refused_at_once(self, sides, why):
         beam, material = Beam(*sides, name="odd"), Material(1e9, 0.3)
-        nothing = dict.fromkeys(("solve_small_strain", "TriedMesh"))  # calling None would be a TypeError
-        monkeypatch.setattr("springtune.prediction.choices.solve_small_strain", nothing["solve_small_strain"])
-        monkeypatch.setattr("springtune.prediction.search.TriedMesh", nothing["TriedMesh"])
+        mesh = MESH_TYPES["right"](0.1, 0.02, 5e-3)
         for call in (
-            lambda: predict(beam, MESH_TYPES["right"](0.1, 0.02, 5e-3), material),
+            lambda: predict(beam, mesh, material),
             lambda: references(beam, material),
             lambda: extrapolate("right", 1e-3, beam, material),
             lambda: st.find_mesh(beam, material, "1 %"),
         ):
-            with pytest.raises(ValueError, match=f"^beam 'odd': .*{why}"):
-                call()
+            with counted(solve_small_strain, MeshType.__call__, Sheet.__init__) as calls:
+                with pytest.raises(ValueError, match=f"^beam 'odd': .*{why}"):
+                    call()
+            assert not calls

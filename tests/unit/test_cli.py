@@ -14,15 +14,19 @@ import xarray as xr
 import yaml
 from click.testing import CliRunner
 
+from counting import counted
 from springtune import prediction
 from springtune.cli import COMMANDS, main
 from springtune.cli.recommendation import prediction_json, prediction_text
 from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
+from springtune.mesh.types import MeshType
 from springtune.prediction import find_mesh
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
+from springtune.reference.small_strain import solve_small_strain
+from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 from springtune.study import sections, study_model
 
@@ -501,17 +505,16 @@ class TestPredictAMesh:
         assert result.exit_code == 1 and message in result.stderr and len(result.stderr.splitlines()) == 1
         assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
 
+    def test_work_is_counted(self):
+        with counted(MeshType.__call__, solve_small_strain, Sheet.__init__) as calls:
+            run("predict", *self.STEEL, "--size", "10 mm", "--loads", "shear")
+        assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
+
     @pytest.mark.parametrize("asked", ["--size", "--error"])
     @pytest.mark.parametrize("mesh_type", [None, "free"])
-    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked, mesh_type, monkeypatch):
-        """By one line each: no mesh, no reference."""
-
-        def work(*arguments, **options):
-            raise AssertionError("something is made or solved")
-
-        monkeypatch.setattr("springtune.prediction.choices.solve_small_strain", work)
-        monkeypatch.setattr("springtune.prediction.choices.TriedMesh", work)
-        monkeypatch.setattr("springtune.mesh.types.MeshType.__call__", work)
+    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked, mesh_type):
+        """By one line each: no mesh, no reference, no network."""
+        work = (MeshType.__call__, solve_small_strain, Sheet.__init__)
         mesh = ("--mesh", mesh_type) if mesh_type else ()
         absurd = [
             *((beam, "5 mm") for beam in ("1e-9x1e-9", "1e12x1e12", "1e6x1", "1x1e6", "1e-9x1", "1e40x1e40")),
@@ -527,7 +530,8 @@ class TestPredictAMesh:
                 size = size.replace("mm", "%").replace("1e30 %", "100 %").replace("1_0 %", "1_000 %")
                 if size == "1e-9 %" or size == "1e-320 %":
                     continue  # is compared with the reference's estimate
-            result = run("predict", "--beam", beam, asked, size, "--material", "steel", *mesh)
-            assert result.exit_code == 1, (beam, size)
+            with counted(*work) as calls:
+                result = run("predict", "--beam", beam, asked, size, "--material", "steel", *mesh)
+            assert not calls and result.exit_code == 1, (beam, size)
             assert result.stdout == "" and len(result.stderr.splitlines()) == 1, (beam, size)
             assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr

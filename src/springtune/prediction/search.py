@@ -198,6 +198,8 @@ class MeshSearch:
     >>> search = st.find_mesh(beam, steel, "5 %", mesh_types=["structured", "right"])
     >>> search.best.mesh_type, search.best.choice.definition
     ('structured', 'lattice')
+    >>> search.best_springs == search.best
+    True
     >>> {name: found and found.choice.definition for name, found in search.springs_by_type.items()}
     {'structured': 'lattice', 'right': None}
     """
