@@ -1,5 +1,7 @@
 """Values that were accepted as right: their file, its tolerances, and what departs from it."""
 
+import contextlib
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -35,14 +37,24 @@ def edit(old, new):
     Path(FILE).write_text(text.replace(old, new, 1))
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder in which the results of a study were accepted."""
-    monkeypatch.chdir(tmp_path)
-    store(made())
-    result = run("accept", "small")
+@pytest.fixture(scope="module")
+def accepted(tmp_path_factory):
+    """A folder in which the results of a study were accepted, to be copied."""
+    folder = tmp_path_factory.mktemp("accepted")
+    with contextlib.chdir(folder):
+        store(made())
+        store(xr.DataTree(xr.Dataset(attrs={"springtune_version": "0"})), "empty")
+        result = run("accept", "small")
     assert result.exit_code == 0, result.output
     assert "config/expected/small.yaml: 32 scenes, 16 of /sensitivity accepted of results/small" in result.stdout
+    return folder
+
+
+@pytest.fixture
+def here(accepted, tmp_path, monkeypatch):
+    """The same, for one test."""
+    shutil.copytree(accepted, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
 
 
 class TestFile:
@@ -235,7 +247,6 @@ class TestRefusals:
         ],
     )
     def test_bad_calls_are_one_line(self, here, arguments, code, said):
-        store(xr.DataTree(xr.Dataset(attrs={"springtune_version": "0"})), "empty")
         result = run(*arguments)
         assert result.exit_code == code and said in result.stderr, result.output
         assert len([line for line in result.stderr.splitlines() if line.startswith("Error")]) == 1

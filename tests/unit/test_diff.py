@@ -30,6 +30,13 @@ SCENE = {
     "definition": "patch", "kinematics": "linear",
 }  # fmt: skip
 CURVE = {name: label for name, label in SCENE.items() if name != "definition"}
+HELD = {
+    "displacement", "deformation_error", "field_error", "stiffness", "status", "message", "iterations", "residual",
+    "solve_seconds", "solver", "material_young_modulus", "beam_length", "beam_height", "beam_thickness", "force",
+    "reference_displacement", "best_stiffness", "curve_seconds",
+}  # fmt: skip
+"""Variables of the datasets that are compared."""
+
 ATTRIBUTES = {"study": "small", "springtune_version": "0", "config": "title: small\nbeams: 1\n"}
 
 
@@ -40,7 +47,7 @@ def run(*arguments):
 def made(**axes):
     """A study of scenes and curves in memory: numbers of their own, all solved."""
     axes = AXES | axes
-    root, curves = ROOT.empty(axes), SENSITIVITY.empty(axes)
+    root, curves = ROOT.empty(axes, HELD), SENSITIVITY.empty(axes, HELD)
     for data in (root, curves):
         for name, array in data.data_vars.items():
             if array.dtype.kind == "f":
@@ -196,17 +203,16 @@ class TestChanges:
         assert found.changes == whole.changes and len(found.changes) == 8 + 4
 
     def test_dimensions_that_are_new_are_compared_by_their_numbers(self):
-        """A force that is swept is a dimension like any other."""
 
-        def swept(*forces):
-            parts = [made()["/"].to_dataset().drop_vars("force").expand_dims(force=[force]) for force in forces]
-            parts = [part.assign(displacement=part.displacement * part.force) for part in parts]
-            return xr.DataTree(xr.concat(parts, "force"))
+        def turned(*angles):
+            parts = [made()["/"].to_dataset().expand_dims(angle=[angle]) for angle in angles]
+            parts = [part.assign(displacement=part.displacement * part.angle) for part in parts]
+            return xr.DataTree(xr.concat(parts, "angle"))
 
-        found = compare(swept(1e3, 2e3), swept(2e3 * (1 + 1e-12), 3e3))
-        assert found.groups[0].labels == {"force": ([1e3], [3e3])} and not found.changes
-        unlike = compare(made(), swept(1e3), groups=["/"]).groups[0].unlike
-        assert "has other dimensions: (beam" in unlike["displacement"] and "force" in unlike["displacement"]
+        found = compare(turned(1e3, 2e3), turned(2e3 * (1 + 1e-12), 3e3))
+        assert found.groups[0].labels == {"angle": ([1e3], [3e3])} and not found.changes
+        unlike = compare(made(), turned(1e3), groups=["/"]).groups[0].unlike
+        assert "has other dimensions: (beam" in unlike["displacement"] and "angle" in unlike["displacement"]
 
     def test_samples_are_compared_by_number(self):
         def sampled(*values):
@@ -281,12 +287,19 @@ class TestCommand:
             (("small", "twice.nc"), "dimension 'beam' has the label 200x40 twice"),
         ],
     )
-    def test_trouble_is_2_and_one_line(self, arguments, said, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        written(made(), tmp_path / "results/small/dataset.nc")
-        written(made(beam=("200x40", "200x40")), tmp_path / "twice.nc")
-        (tmp_path / "text.nc").write_text("text")
-        xr.Dataset({"a": 1}).to_netcdf(tmp_path / "plain.nc")
+    def test_trouble_is_2_and_one_line(self, arguments, said, troubled, monkeypatch):
+        monkeypatch.chdir(troubled)
         result = run("diff", *arguments)
         assert result.exit_code == 2 and not result.stdout and said in result.stderr, result.output
         assert len([line for line in result.stderr.splitlines() if line.startswith("Error")]) == 1
+
+
+@pytest.fixture(scope="module")
+def troubled(tmp_path_factory):
+    """A folder with a study's dataset, and files that are none."""
+    folder = tmp_path_factory.mktemp("troubled")
+    written(made(), folder / "results/small/dataset.nc")
+    written(made(beam=("200x40", "200x40")), folder / "twice.nc")
+    (folder / "text.nc").write_text("text")
+    xr.Dataset({"a": 1}).to_netcdf(folder / "plain.nc")
+    return folder

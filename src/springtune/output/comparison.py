@@ -320,6 +320,7 @@ class _Group:
         self.axes = {name: axis(name, pair) for name in dict.fromkeys(str(one) for own in pair for one in own.sizes)}
         self.cell_dimensions = cell_dimensions(pair, roots)
         self.asked = [_asked(data, root) for data, root in zip(pair, roots)]
+        self.reduced: dict[tuple[object, ...], np.ndarray] = {}
 
     def compared(self) -> GroupChanges:
         found = GroupChanges(self.path, self.axes)
@@ -439,9 +440,9 @@ class _Group:
 
     def _further(self, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
         """Relative tolerances of cells, of a shape that goes with a variable's; NaN where there are none."""
-        array = self.pair[0].get(OF_CELLS)
-        if array is None or not set(array.dims) <= set(names):
+        if OF_CELLS not in self.pair[0].data_vars or not set(self.pair[0][OF_CELLS].dims) <= set(names):
             return np.full([1] * len(names), np.nan)
+        array = self.pair[0][OF_CELLS]
         shared = [name for name in names if name in array.dims]
         chosen = array.transpose(*shared).values[np.ix_(*(own for name, own in zip(names, places) if name in shared))]
         return chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
@@ -452,8 +453,11 @@ class _Group:
         shared = [name for name in names if mask is not None and name in mask.dims]
         if mask is None or not shared:
             return np.ones([1] * len(names), dtype=bool)
-        reduced = mask.any([name for name in mask.dims if name not in shared]).transpose(*shared).values
-        chosen = reduced[np.ix_(*(own for name, own in zip(names, places) if name in shared))]
+        key = (side, *shared)
+        if key not in self.reduced:
+            others = [name for name in mask.dims if name not in shared]
+            self.reduced[key] = mask.any(others).transpose(*shared).values
+        chosen = self.reduced[key][np.ix_(*(own for name, own in zip(names, places) if name in shared))]
         return chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
 
 
@@ -534,12 +538,11 @@ class _Kind:
 
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
     """Whether the study asks for each cell of a group, by its status or that of the root; None where none says so."""
-    status = data.get("status", root.get("status"))
+    status = next((one["status"] for one in (data, root) if "status" in one.data_vars), None)
     if status is None:
         return None
-    silent = (
-        [value for value, word in flag_words(status).items() if word == NOT_REQUESTED] if is_flagged(status) else [0]
-    )
+    words = flag_words(status) if is_flagged(status) else {0: NOT_REQUESTED}
+    silent = [value for value, word in words.items() if word == NOT_REQUESTED]
     return ~status.isin([*silent, np.nan]).compute()
 
 
