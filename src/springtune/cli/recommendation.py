@@ -127,8 +127,8 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
     if any(one is None for _, found, _ in tables for one in found.values()):
         notes.insert(
             0,
-            "None: extrapolated, a definition is given up where its error, by its change over the last doubling, would be "
-            f"too large at {search.most:,} particles, too.",
+            "None: extrapolated, a definition is given up where its error, by its change over the last doubling, "
+            f"would be too large at {search.most:,} particles, too.",
         )
     unsure = any(one and not one.confirmed for _, found, _ in tables for one in found.values())
     if unsure:
