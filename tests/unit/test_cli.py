@@ -366,7 +366,7 @@ class TestPredictAMesh:
     """`predict --error`, and what predictions are written as."""
 
     STEEL = ("--beam", "100x20", "--material", "steel")
-    FIND = (*STEEL, "--error", "5 %", "--mesh", "right,braced")
+    FIND = (*STEEL, "--error", "8 %", "--mesh", "right,braced")
     NONE = (
         "--beam",
         "100x20",
@@ -385,8 +385,8 @@ class TestPredictAMesh:
         assert result.exit_code == 0
         lines = result.stdout.splitlines()
         body = "100x20 mm; steel, E = 210 GPa, nu = 0.3, t = 1 mm"
-        assert lines[0] == f"{body}; an error of at most 5 % under traction, bending and shear"
-        search = find_mesh(Beam(0.1, 0.02), Material(210e9, 0.3), "5 %", mesh_types=["right", "braced"])
+        assert lines[0] == f"{body}; an error of at most 8 % under traction, bending and shear"
+        search = find_mesh(Beam(0.1, 0.02), Material(210e9, 0.3), "8 %", mesh_types=["right", "braced"])
         best, plain = search.best, search.best_springs
         size = f"{best.mesh_type} {1e3 * best.size:g} mm with {best.choice.definition}, {best.particles} particles"
         assert f"recommended: {size}" in lines
@@ -398,6 +398,7 @@ class TestPredictAMesh:
         assert heads.split()[-7:] == ["traction", "bending", "shear", "static", "solve", "largest", "step"]
         assert f"Solved: {len(search.tried)} meshes of " in result.stdout
         assert "every finer mesh of its type" in result.stdout and "linear kinematics" in result.stdout
+        assert "None: extrapolated, a definition is given up where its error, by its change" in result.stdout
 
     def test_none_is_said(self):
         result = run("predict", *self.NONE, "--springs-alone")
@@ -452,13 +453,15 @@ class TestPredictAMesh:
             "choice",
         ]  # fmt: skip
         assert best in found["by_type"].values() and best["confirmed"] and best["step_limit"] > 0
-        assert found["springs_by_type"]["right"] is None and found["error"] == 0.05
+        assert found["springs_by_type"]["right"] is None and found["error"] == 0.08
         assert {*found["tried"][0]} == {"mesh_type", "size", "cells", "particles", "springs", "errors"}
 
     @pytest.mark.parametrize("ending", ["csv", "json", "vtu", "h5"])
     def test_the_springs_of_what_is_recommended_are_written(self, tmp_path, ending):
         target = tmp_path / f"net.{ending}"
-        result = run("predict", *self.FIND, "--springs-alone", "--write", target)
+        result = run(
+            "predict", *self.STEEL, "--size", "10 mm", "--springs-alone", "--loads", "bending", "--write", target
+        )
         assert result.exit_code == 0 and target.is_file()
         assert f"{target}: " in result.stdout and "springs of definition " in result.stdout
 
@@ -511,11 +514,9 @@ class TestPredictAMesh:
         assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
 
     @pytest.mark.parametrize("asked", ["--size", "--error"])
-    @pytest.mark.parametrize("mesh_type", [None, "free"])
-    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked, mesh_type):
+    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked):
         """By one line each: no mesh, no reference, no network."""
         work = (MeshType.__call__, solve_small_strain, Sheet.__init__)
-        mesh = ("--mesh", mesh_type) if mesh_type else ()
         absurd = [
             *((beam, "5 mm") for beam in ("1e-9x1e-9", "1e12x1e12", "1e6x1", "1x1e6", "1e-9x1", "1e40x1e40")),
             *(
@@ -531,7 +532,7 @@ class TestPredictAMesh:
                 if size == "1e-9 %" or size == "1e-320 %":
                     continue  # is compared with the reference's estimate
             with counted(*work) as calls:
-                result = run("predict", "--beam", beam, asked, size, "--material", "steel", *mesh)
+                result = run("predict", "--beam", beam, asked, size, "--material", "steel")
             assert not calls and result.exit_code == 1, (beam, size)
             assert result.stdout == "" and len(result.stderr.splitlines()) == 1, (beam, size)
             assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr

@@ -26,7 +26,7 @@ COMMANDS = {
     "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
-    "predict": Row(STUDIES, "predict", "predict", "Recommend a definition and its stiffness for one mesh."),
+    "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
     "springs": Row(STUDIES, "springs", "springs", "Write the springs of one mesh for another program."),
     "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),

@@ -124,6 +124,12 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
             rows[-1] += [*errors, f"{1e3 * one.seconds:.2g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
         if rows[1:]:
             lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
+    if any(one is None for _, found, _ in tables for one in found.values()):
+        notes.insert(
+            0,
+            "None: extrapolated, a definition is given up where its error, by its change over the last doubling, "
+            f"would be too large at {search.most:,} particles, too.",
+        )
     unsure = any(one and not one.confirmed for _, found, _ in tables for one in found.values())
     if unsure:
         notes.insert(

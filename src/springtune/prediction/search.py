@@ -169,7 +169,7 @@ class MeshChoice:
         return not self.confirmed, self.particles, self.springs, self.choice.worst
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshSearch:
     """Which meshes keep an error, as `find_mesh` found it.
 
@@ -364,9 +364,8 @@ def _mesh_types(names: Sequence[str]) -> tuple[str, ...]:
 
 def _cells(rung: int) -> int:
     """Cells across of the meshes that are tried first: 1, 2, 3, ..., 15, 16, 20, 23, 27, 32, 39, ..."""
-    return (
-        rung + 1 if rung < EVERY_UP_TO else math.ceil(EVERY_UP_TO * 2 ** ((rung + 1 - EVERY_UP_TO) / STEPS_A_DOUBLING))
-    )
+    beyond = rung + 1 - EVERY_UP_TO
+    return rung + 1 if beyond <= 0 else math.ceil(EVERY_UP_TO * 2 ** (beyond / STEPS_A_DOUBLING))
 
 
 def _number(error: float | str) -> float:
@@ -433,14 +432,15 @@ class _TypeSearch:
         if (cells, name) not in self._found:
             mesh = self._type(self.beam.length, self.beam.height, one.size)
             tried = TriedMesh(mesh, self.beam, self.material, self.known)
+            same = tried.same[name]  # another name of the same springs
             self._found[cells, name] = MeshChoice(
                 self.name,
                 one.size,
                 cells,
-                tried.choice(name),
+                tried.choice(same),
                 one.particles,
                 one.springs,
-                *_cost(mesh, self.beam, self.material, tried.springs(name), list(self.known)),
+                *_cost(mesh, self.beam, self.material, tried.springs(same), list(self.known)),
                 tuple(self._tried[finer] for finer in self._on(name) if finer > cells),
                 sure is not None,
             )
