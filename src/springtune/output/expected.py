@@ -300,8 +300,8 @@ def write(path: str | Path, tree: xr.DataTree) -> None:
     count = sum(int((array != 0).sum() if array.dtype.kind in "iu" else (array == array).sum()) for array in arrays)
     if count > MOST_NUMBERS:
         raise ValueError(
-            f"{path}: {count} numbers are more than a text to review ({MOST_NUMBERS}); give a file ending in .nc, or fewer "
-            "--variables"
+            f"{path}: {count} numbers are more than a text to review ({MOST_NUMBERS}); give a file ending in .nc, or "
+            "fewer --variables"
         )
     write_text(path, "\n".join(_lines(tree)) + "\n")
 
