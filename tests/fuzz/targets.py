@@ -18,6 +18,7 @@ from mutations import WORDS, spoil_bytes, spoil_tree
 
 import springtune as st
 from springtune.browse.page import page
+from springtune.cli.diff import comparison_text
 from springtune.cli.info import info_text
 from springtune.handover.formats import ENDINGS
 from springtune.kinds import kinds, load_study
@@ -25,6 +26,7 @@ from springtune.kinds.scenes.summary import summary
 from springtune.mechanics.moduli import axial_moduli
 from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas
 from springtune.output import reading
+from springtune.output.comparison import compare
 from springtune.output.dataset import write
 from springtune.output.export import export
 
@@ -253,7 +255,7 @@ def dataset_bytes(random, folder):
     else:
         content = spoil_bytes(random, content)
     path.write_bytes(content)
-    return path, random.randrange(4)
+    return path, random.randrange(5)
 
 
 def dataset_structure(random, folder):
@@ -288,11 +290,11 @@ def dataset_structure(random, folder):
                     file.move(name, f"{name}_other")
             except (OSError, KeyError, ValueError, RuntimeError, TypeError):
                 continue
-    return path, random.randrange(4)
+    return path, random.randrange(5)
 
 
 def read_dataset(made):
-    """Open a dataset and say what it holds, export it, or make its page."""
+    """Open a dataset and say what it holds, export it, make its page, or say what changed from the sound one."""
     path, how = made
     try:
         reading.check_opens(path)
@@ -305,6 +307,11 @@ def read_dataset(made):
             elif how == 2:
                 target = path.with_name("out.csv")
                 export(tree, target, "/", [], {}, force=True)
+            elif how == 3:
+                sound = path.with_name("sound.nc")
+                sound.write_bytes(_dataset())
+                with reading.open(sound) as other:
+                    comparison_text(compare(other, tree, most=5), (sound, path), ("before", "after"))
             else:
                 st.field(tree, beam="200x40", mesh_type="free", mesh_size=5e-3)
     except (OSError, ValueError) as error:

@@ -58,7 +58,7 @@ def here(accepted, tmp_path, monkeypatch):
 
 
 class TestFile:
-    @pytest.mark.parametrize("ending", expected.ENDINGS)
+    @pytest.mark.parametrize("ending", expected.EXPECTED_ENDINGS)
     def test_what_is_written_is_read(self, ending, tmp_path):
         """Beyond its tolerance not a digit is lost, and an own tolerance of a scene stays."""
         kept = expected.accepted(made(), tolerances={"": Tolerance(1e-8), "displacement": Tolerance(1e-3, 1e-9)})

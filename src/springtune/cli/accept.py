@@ -146,7 +146,7 @@ def _check(results: str | None, target: Path | None, every: bool) -> None:
             files = (
                 [target]
                 if target
-                else [path for ending in expected.ENDINGS for path in EXPECTED_FOLDER.glob(f"*{ending}")]
+                else [path for ending in expected.EXPECTED_ENDINGS for path in EXPECTED_FOLDER.glob(f"*{ending}")]
             )
             if not files:
                 raise ValueError(

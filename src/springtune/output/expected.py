@@ -29,13 +29,13 @@ DEFAULTS = {
 }
 """Variables of a group that are accepted where none are named; of other groups with a status, what its cells have."""
 
-NUMBERS = 20_000
+MOST_NUMBERS = 20_000
 """Most numbers of a file in YAML: more is no file to review, and is slow to read."""
 
 ACCEPTED, TOLERANCES = "accepted", "tolerances"
 """Attributes of expected values: the study, and tolerances as JSON."""
 
-ENDINGS = (".yaml", ".nc")
+EXPECTED_ENDINGS = (".yaml", ".nc")
 
 FURTHER_DIGITS = 3
 """Digits that a number in YAML has beyond its tolerance."""
@@ -298,10 +298,10 @@ def write(path: str | Path, tree: xr.DataTree) -> None:
         raise ValueError(f"{path}: '{path.suffix}' is no form of expected values; give a file ending in .yaml or .nc")
     arrays = [array.values for node in tree.subtree for array in node.data_vars.values()]
     count = sum(int((array != 0).sum() if array.dtype.kind in "iu" else (array == array).sum()) for array in arrays)
-    if count > NUMBERS:
+    if count > MOST_NUMBERS:
         raise ValueError(
-            f"{path}: {count} numbers are more than a text to review ({NUMBERS}); give a file ending in .nc, or fewer "
-            "--variables"
+            f"{path}: {count} numbers are more than a text to review ({MOST_NUMBERS}); give a file ending in .nc, or "
+            "fewer --variables"
         )
     write_text(path, "\n".join(_lines(tree)) + "\n")
 
