@@ -45,6 +45,7 @@ def refinement_group(parameters: Collection[str]) -> Group:
             "displacement": (VALUE, "m", "displacement of the network", np.nan),
             "reference_displacement": (VALUE, "m", "displacement of the reference", np.nan),
             "reference_error_estimate": (VALUE, "1", "bound on the relative error of the reference", np.nan),
+            "reference_applies": (VALUE, "1", "whether small strain applies; -1 where there is no reference", -1),
             "deformation_error": (VALUE, "1", "(network - reference) / |reference|", np.nan),
             "particles": (VALUE, "1", "number of particles", 0),
             "status": (VALUE, "1", "what became of the scene", 0),
