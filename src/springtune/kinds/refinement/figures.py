@@ -5,7 +5,7 @@ import numpy as np
 from ...output import labels, style
 from ...output.selection import choose, group
 from ...problem.status import Status
-from .names import PARAMETERS, SPACINGS
+from .names import SPACINGS, VARIED
 
 HOLLOW = "hollow: unstable, or beyond the linear reference"
 
@@ -84,7 +84,7 @@ def plot_refinement(data, ax=None, *, refinement=None):
 def _panel(panel, data):
     """Draw one refinement; ends of its lines with their names and colours, and what there is to say below it."""
     parameter = str(data.parameter.item())
-    known = PARAMETERS[parameter]
+    known = VARIED[parameter]
     tolerance = 100 * float(data.tolerance)
     panel.axhspan(-tolerance, tolerance, color="0.92", zorder=0)
     panel.axhline(0, color="0.45", linewidth=0.8)

@@ -45,7 +45,7 @@ class Parameter:
 
         Examples
         --------
-        >>> PARAMETERS["force"].scale(20.0), PARAMETERS["force"].scale(2e4)
+        >>> VARIED["force"].scale(20.0), VARIED["force"].scale(2e4)
         (('N', 1.0), ('kN', 1000.0))
         """
         return next((one for one in self.scales if largest >= one[1]), self.scales[-1])
@@ -86,7 +86,7 @@ class Parameter:
 LENGTHS = (("mm", 1e-3),)
 """Units of lengths."""
 
-PARAMETERS = {
+VARIED = {
     "mesh_size": Parameter("asked length of an edge", "m", "length", LENGTHS),
     "force": Parameter("size of the force", "N", "force", (("kN", 1e3), ("N", 1.0))),
     "thickness": Parameter("thickness of the sheet", "m", "length", LENGTHS),

@@ -5,12 +5,12 @@ from collections.abc import Collection
 import numpy as np
 
 from ...output.dataset import Group
-from .names import PARAMETERS
+from .names import VARIED
 
 OF_ONE = ("refinement",)
 VALUE, CROSSING = (*OF_ONE, "definition", "point"), (*OF_ONE, "definition", "crossing")
 
-COORDINATES = (*(f"refined_{name}" for name in PARAMETERS), "batch", "parameter")
+COORDINATES = (*(f"refined_{name}" for name in VARIED), "batch", "parameter")
 """Auxiliary coordinates."""
 
 
@@ -27,8 +27,8 @@ def refinement_group(parameters: Collection[str]) -> Group:
     Group
     """
     values, found = {}, {}
-    for name in (name for name in PARAMETERS if name in parameters):
-        known = PARAMETERS[name]
+    for name in (name for name in VARIED if name in parameters):
+        known = VARIED[name]
         values[f"refined_{name}"] = (VALUE, known.unit, f"{known.meaning}, where it is varied", np.nan)
         found[f"crossing_{name}"] = (CROSSING, known.unit, f"{known.meaning} at which the error is crossed", np.nan)
         found[f"crossing_{name}_width"] = (CROSSING, known.unit, "distance of the values that enclose it", np.nan)
@@ -62,5 +62,5 @@ def refinement_group(parameters: Collection[str]) -> Group:
     )
 
 
-REFINEMENT = refinement_group(PARAMETERS)
+REFINEMENT = refinement_group(VARIED)
 """The group with all that a study may vary."""
