@@ -142,6 +142,7 @@ def refinement():
     data["values"] = ("refinement", "definition"), np.array([[4, 3], [4, 4]])
     data["crossing_level"] = xr.zeros_like(data.crossing_change)
     data["status"] = xr.ones_like(data.deformation_error, dtype=np.int8)
+    data["reference_applies"] = xr.ones_like(data.status)
     data.deformation_error[0, 1, 3] = np.nan
     return data
 

@@ -330,7 +330,8 @@ def _keys():
 
 
 SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
-SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark")} | {"patch", "annealed"}
+SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement")}
+SOLVING |= {"patch", "annealed"}
 REFERENCE = {"kinds.scenes.reference", "unit"}
 
 VERSIONS = {

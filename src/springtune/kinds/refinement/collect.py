@@ -15,6 +15,7 @@ OF_A_VALUE = (
     "displacement",
     "reference_displacement",
     "reference_error_estimate",
+    "reference_applies",
     "deformation_error",
     "particles",
 )

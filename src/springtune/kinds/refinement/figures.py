@@ -4,7 +4,10 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from .names import PARAMETERS, SPACINGS
+from ...problem.status import Status
+from .names import SPACINGS, VARIED
+
+HOLLOW = "hollow: unstable, or beyond the linear reference"
 
 
 def refinement(tree):
@@ -26,6 +29,7 @@ def refinement(tree):
 def plot_refinement(data, ax=None, *, refinement=None):
     """Deformation error over what is varied: a panel a refinement, a line a definition, a marker a value.
 
+    Hollow markers are of networks that are not stable, and of those that deform beyond what the reference is good for.
     The tolerance is a grey band; ticks on the line of no error are where an error is zero.
 
     Parameters
@@ -59,8 +63,8 @@ def plot_refinement(data, ax=None, *, refinement=None):
         choose(data.status != 0, refinement=refinement)
         data = data.sel(refinement=[refinement])
     names = data.refinement.values.tolist()
-    figure, axes, flat, height = style.multiples(ax, len(names), min(2, len(names)), 2.2)
-    place = {"left": 0.6, "right": 0.1, "bottom": 0.42, "top": 0.3, "across": 0.14, "down": 0.75}
+    figure, axes, flat, height = style.multiples(ax, len(names), min(2, len(names)), 2.35)
+    place = {"left": 0.6, "right": 0.1, "bottom": 0.58, "top": 0.3, "across": 0.14, "down": 0.9}
     style.arrange(figure, axes, **place)
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
     for panel, name in zip(flat, names):
@@ -68,7 +72,8 @@ def plot_refinement(data, ax=None, *, refinement=None):
         if panel.get_xscale() == "log":
             style.plain(panel, "x")
     labels.settle(figure, axes, place)
-    for panel, found in zip(flat, ends):
+    for panel, (found, said) in zip(flat, ends):
+        labels.note(panel, labels.wrapped(said, panel.get_window_extent().width / panel.figure.dpi))
         if found:
             labels.name_lines(panel, found)
         else:
@@ -77,28 +82,33 @@ def plot_refinement(data, ax=None, *, refinement=None):
 
 
 def _panel(panel, data):
-    """Draw one refinement; ends of its lines with their names and colours."""
+    """Draw one refinement; ends of its lines with their names and colours, and what there is to say below it."""
     parameter = str(data.parameter.item())
-    known = PARAMETERS[parameter]
+    known = VARIED[parameter]
     tolerance = 100 * float(data.tolerance)
     panel.axhspan(-tolerance, tolerance, color="0.92", zorder=0)
     panel.axhline(0, color="0.45", linewidth=0.8)
-    unit = f" [{known.shown}]" if known.shown else ""
+    values = data[f"refined_{parameter}"].values
+    name, size = known.scale(values[np.isfinite(values)].max(initial=0.0))
+    unit = f" [{name}]" if name else ""
     panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
     if str(data.spacing.item()) == SPACINGS[1]:
         panel.set_xscale("log")
-    ends, number = [], 0
+    ends, number, hollow = [], 0, False
     for definition in data.definition.values.tolist():
         cell = data.sel(definition=definition)
         if not int(cell["values"]):
             continue
-        x, y = known.times * cell[f"refined_{parameter}"].values, 100 * cell.deformation_error.values
+        x, y = cell[f"refined_{parameter}"].values / size, 100 * cell.deformation_error.values
         there, look = np.isfinite(x) & np.isfinite(y), style.line(number)
         number += 1
         if not there.any():
             continue
         panel.plot(x[there], y[there], markersize=2.2, linewidth=0.9, label=definition, **look)
+        doubted = there & ((cell.status.values != Status.SOLVED) | (cell.reference_applies.values == 0))
+        hollow |= bool(doubted.any())
+        panel.plot(x[doubted], y[doubted], markersize=2.2, markerfacecolor="white", **{**look, "linestyle": ""})
         ends.append((x[there][-1], y[there][-1], definition, look["color"]))
-        zeros = known.times * cell[f"crossing_{parameter}"].values[cell.crossing_level.values == 0]
+        zeros = cell[f"crossing_{parameter}"].values[cell.crossing_level.values == 0] / size
         panel.plot(zeros, np.zeros(len(zeros)), "|", color=look["color"], markersize=9)
-    return ends
+    return ends, HOLLOW if hollow else ""

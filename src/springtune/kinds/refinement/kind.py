@@ -29,7 +29,7 @@ from ...study.fields import (
 from ...study.messages import refuse, show
 from ..base import Kind
 from .batches import Rule
-from .names import PARAMETERS, SPACINGS
+from .names import SPACINGS, VARIED
 from .outputs import OUTPUTS
 from .plan import STAGES
 
@@ -61,7 +61,7 @@ End = Annotated[
 ]
 Count = Annotated[int, number("a whole number from 2 to 10001, such as 33", 2, MOST_REFINED, whole=True)]
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
-ParameterName = Annotated[str, one_of("parameter", PARAMETERS)]
+ParameterName = Annotated[str, one_of("parameter", VARIED)]
 Spacing = Annotated[str, one_of("spacing", SPACINGS)]
 
 
@@ -86,7 +86,7 @@ class RefinementConfig(Section):
     )
     kinematics: Kinematics = Field("nonlinear", validate_default=True, description="Kinematics of the network.")
     parameter: ParameterName = Field(description="What is varied: " + "; ".join(
-        f"`{name}`, {one.meaning}" for name, one in PARAMETERS.items()) + ".")  # fmt: skip
+        f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip
     start: End = Field(alias="from", description="Smallest value, with its unit.")
     stop: End = Field(alias="to", description="Largest value, with its unit.")
     points: Count = Field("5", validate_default=True, description="Values of the first batch, both ends included.")
@@ -120,7 +120,7 @@ class Refinement:
         Length of an edge [m]; zero where it is the parameter.
     definition, kinematics : str
     parameter : str
-        Key of `springtune.kinds.refinement.names.PARAMETERS`.
+        Key of `springtune.kinds.refinement.names.VARIED`.
     rule : Rule
     """
 
@@ -162,7 +162,7 @@ def _check(config, problems):
 
 def _ends(section, path, problems):
     """Both ends of a refinement in SI units; nothing where they are wrong, which is noted."""
-    known, found = PARAMETERS[section.parameter], []
+    known, found = VARIED[section.parameter], []
     for key, text in (("from", section.start), ("to", section.stop)):
         try:
             found.append(known.read(text))
@@ -207,7 +207,7 @@ def _check_definitions(section, path, problems):
 def _expand(config, declared):
     found = []
     for name, section in (config.refine or {}).items():
-        known = PARAMETERS[section.parameter]
+        known = VARIED[section.parameter]
         rule = Rule(
             known.read(section.start),
             known.read(section.stop),

@@ -16,8 +16,8 @@ class Parameter:
         In SI.
     kind : str
         Of `springtune.units.QUANTITY_KINDS`; empty for numbers.
-    shown, times : str, float
-        Unit in figures and tables, and how many of them make one in SI.
+    scales : tuple of (str, float)
+        Units of figures and their sizes in SI, the largest first; none for numbers.
     most : float
         Largest value.
     zero : bool
@@ -27,10 +27,28 @@ class Parameter:
     meaning: str
     unit: str
     kind: str = ""
-    shown: str = ""
-    times: float = 1.0
+    scales: tuple[tuple[str, float], ...] = (("", 1.0),)
     most: float = float("inf")
     zero: bool = False
+
+    def scale(self, largest: float) -> tuple[str, float]:
+        """Unit in which values are shown, and its size in SI.
+
+        Parameters
+        ----------
+        largest : float
+            Of the values.
+
+        Returns
+        -------
+        tuple of str and float
+
+        Examples
+        --------
+        >>> VARIED["force"].scale(20.0), VARIED["force"].scale(2e4)
+        (('N', 1.0), ('kN', 1000.0))
+        """
+        return next((one for one in self.scales if largest >= one[1]), self.scales[-1])
 
     def read(self, text: str) -> float:
         """Value of a text.
@@ -65,11 +83,14 @@ class Parameter:
         return value
 
 
-PARAMETERS = {
-    "mesh_size": Parameter("asked length of an edge", "m", "length", "mm", 1e3),
-    "force": Parameter("size of the force", "N", "force", "kN", 1e-3),
-    "thickness": Parameter("thickness of the sheet", "m", "length", "mm", 1e3),
-    "young_modulus": Parameter("Young's modulus", "Pa", "stress", "MPa", 1e-6),
+LENGTHS = (("mm", 1e-3),)
+"""Units of lengths."""
+
+VARIED = {
+    "mesh_size": Parameter("asked length of an edge", "m", "length", LENGTHS),
+    "force": Parameter("size of the force", "N", "force", (("kN", 1e3), ("N", 1.0))),
+    "thickness": Parameter("thickness of the sheet", "m", "length", LENGTHS),
+    "young_modulus": Parameter("Young's modulus", "Pa", "stress", (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))),
     "poisson_ratio": Parameter("Poisson's ratio", "1", most=0.5, zero=True),
     "stiffness_scale": Parameter("factor on the stiffness that the definition gives", "1"),
 }

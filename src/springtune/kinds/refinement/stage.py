@@ -138,9 +138,11 @@ def _compared(result, beam, material, force, kind, kinematics):
     result |= {"reference_displacement": displacement, "reference_error_estimate": unit.error_estimate}
     if "displacement" in result:
         result["deformation_error"] = float(deformation_error(result["displacement"], displacement))
+    result["reference_applies"] = True
     if kinematics == "nonlinear":
         size = abs(force) * scale / length
         why = beyond_linear(size * unit.rotation, size * unit.strain)
+        result["reference_applies"] = not why
         result["message"] = "; ".join(filter(None, (result["message"], why)))
     return result
 

@@ -7,13 +7,13 @@ import numpy as np
 from ...jobs.atomic import write_text
 from ...output.dataset import STATUS
 from ...output.tables import csv_text
-from .names import PARAMETERS
+from .names import VARIED
 from .outputs import REFINEMENT_TABLES
 
-COLUMNS = ("refinement", "definition", "parameter", "unit", "error", "value", "width", "change")
+CROSSING_COLUMNS = ("refinement", "definition", "parameter", "unit", "error", "value", "width", "change")
 """Columns of the table of crossings."""
 
-VALUES = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
+VALUE_COLUMNS = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
 
 
 def write(tree, folder):
@@ -44,7 +44,7 @@ def _cells(data):
             if int(cell["values"]):
                 parameter = str(cell.parameter.item())
                 labels = {"refinement": name, "definition": definition, "parameter": parameter}
-                yield cell, labels | {"unit": PARAMETERS[parameter].unit}
+                yield cell, labels | {"unit": VARIED[parameter].unit}
 
 
 def _values(data):
@@ -53,7 +53,7 @@ def _values(data):
         for point in range(int(cell["values"])):
             one = cell.isel(point=point)
             row = labels | {"value": float(one[f"refined_{labels['parameter']}"]), "batch": int(one.batch)}
-            row |= {name: float(one[name]) for name in VALUES}
+            row |= {name: float(one[name]) for name in VALUE_COLUMNS}
             rows.append(row | {"status": STATUS[int(one.status)], "message": str(one.message.item())})
     return rows
 
@@ -66,4 +66,4 @@ def _crossings(data):
             row = {"error": float(one.crossing_level), "value": float(one[name]), "width": float(one[f"{name}_width"])}
             rows.append(labels | row | {"change": float(one.crossing_change)})
     # A file without rows has its columns.
-    return rows or [dict.fromkeys(COLUMNS, "")]
+    return rows or [dict.fromkeys(CROSSING_COLUMNS, "")]

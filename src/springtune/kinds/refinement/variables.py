@@ -5,12 +5,12 @@ from collections.abc import Collection
 import numpy as np
 
 from ...output.dataset import Group
-from .names import PARAMETERS
+from .names import VARIED
 
 OF_ONE = ("refinement",)
 VALUE, CROSSING = (*OF_ONE, "definition", "point"), (*OF_ONE, "definition", "crossing")
 
-COORDINATES = (*(f"refined_{name}" for name in PARAMETERS), "batch", "parameter")
+COORDINATES = (*(f"refined_{name}" for name in VARIED), "batch", "parameter")
 """Auxiliary coordinates."""
 
 
@@ -27,8 +27,8 @@ def refinement_group(parameters: Collection[str]) -> Group:
     Group
     """
     values, found = {}, {}
-    for name in (name for name in PARAMETERS if name in parameters):
-        known = PARAMETERS[name]
+    for name in (name for name in VARIED if name in parameters):
+        known = VARIED[name]
         values[f"refined_{name}"] = (VALUE, known.unit, f"{known.meaning}, where it is varied", np.nan)
         found[f"crossing_{name}"] = (CROSSING, known.unit, f"{known.meaning} at which the error is crossed", np.nan)
         found[f"crossing_{name}_width"] = (CROSSING, known.unit, "distance of the values that enclose it", np.nan)
@@ -45,6 +45,7 @@ def refinement_group(parameters: Collection[str]) -> Group:
             "displacement": (VALUE, "m", "displacement of the network", np.nan),
             "reference_displacement": (VALUE, "m", "displacement of the reference", np.nan),
             "reference_error_estimate": (VALUE, "1", "bound on the relative error of the reference", np.nan),
+            "reference_applies": (VALUE, "1", "whether small strain applies; -1 where there is no reference", -1),
             "deformation_error": (VALUE, "1", "(network - reference) / |reference|", np.nan),
             "particles": (VALUE, "1", "number of particles", 0),
             "status": (VALUE, "1", "what became of the scene", 0),
@@ -61,5 +62,5 @@ def refinement_group(parameters: Collection[str]) -> Group:
     )
 
 
-REFINEMENT = refinement_group(PARAMETERS)
+REFINEMENT = refinement_group(VARIED)
 """The group with all that a study may vary."""

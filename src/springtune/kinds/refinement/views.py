@@ -1,7 +1,7 @@
 """What the page to browse shows of refinements."""
 
 from ...output.views import Plot, View
-from .names import PARAMETERS
+from .names import VARIED
 
 VIEWS = (
     View(
@@ -10,7 +10,7 @@ VIEWS = (
         "The deformation error over a parameter, with more values where it changes its sign or crosses the tolerance.",
         tuple(
             Plot(f"error over {known.meaning}", "deformation_error", f"refined_{name}", "definition", along="point")
-            for name, known in PARAMETERS.items()
+            for name, known in VARIED.items()
         ),
     ),
 )
