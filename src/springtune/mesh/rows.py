@@ -139,12 +139,23 @@ def _join(lines: list[np.ndarray], heights: np.ndarray) -> Mesh:
     starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
     points = np.concatenate([np.stack([line, np.full(len(line), y)], axis=1) for line, y in zip(lines, heights)])
     triangles = []
+    known: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}  # lines of few kinds alternate
     for row, (low, high) in enumerate(zip(lines[:-1], lines[1:])):
-        # Merging the mid points of both lines' cells from left to right gives the order of the triangles.
-        mids = np.concatenate([low[:-1] + low[1:], high[:-1] + high[1:]])
-        upper = np.repeat([False, True], [len(low) - 1, len(high) - 1])
-        upper = upper[np.argsort(mids, kind="stable")]
-        i = starts[row] + np.concatenate([[0], np.cumsum(~upper)])[:-1]
-        j = starts[row + 1] + np.concatenate([[0], np.cumsum(upper)])[:-1]
-        triangles.append(np.stack([i, np.where(upper, j + 1, i + 1), j], axis=1))
+        pair = id(low), id(high)
+        if pair not in known:
+            known[pair] = _joined(low, high)
+        corners, above = known[pair]
+        triangles.append(corners + np.where(above, starts[row + 1], starts[row]))
     return Mesh(points, np.concatenate(triangles))
+
+
+def _joined(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles between two lines: places of their corners in these, and whether a corner is of the upper one."""
+    # Merging the mid points of both lines' cells from left to right gives the order of the triangles.
+    mids = np.concatenate([low[:-1] + low[1:], high[:-1] + high[1:]])
+    upper = np.repeat([False, True], [len(low) - 1, len(high) - 1])
+    upper = upper[np.argsort(mids, kind="stable")]
+    i = np.concatenate([[0], np.cumsum(~upper)])[:-1]
+    j = np.concatenate([[0], np.cumsum(upper)])[:-1]
+    above = np.stack([np.zeros_like(upper), upper, np.ones_like(upper)], axis=1)
+    return np.stack([i, np.where(upper, j + 1, i + 1), j], axis=1), above
