@@ -330,7 +330,7 @@ def _keys():
 
 
 SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
-SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement")}
+SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")}
 SOLVING |= {"patch", "annealed"}
 REFERENCE = {"kinds.scenes.reference", "unit"}
 

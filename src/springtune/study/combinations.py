@@ -5,7 +5,7 @@ from itertools import chain, product
 from math import prod
 from typing import Any
 
-from .config import PARAMETERS, ExcludeConfig, GridConfig
+from .config import GRID_PARAMETERS, ExcludeConfig, GridConfig
 from .messages import Key, Problems
 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
@@ -27,9 +27,9 @@ def values_of(grid: GridConfig, name: str) -> list[Any]:
 
 
 def groups_of(grid: GridConfig) -> list[tuple[str, ...]]:
-    """Parameters of a grid in groups that go together, in the order of `PARAMETERS`."""
+    """Parameters of a grid in groups that go together, in the order of `GRID_PARAMETERS`."""
     zipped = {name: tuple(group) for group in grid.zip for name in group}
-    given = [name for name in PARAMETERS if getattr(grid, name) is not None]
+    given = [name for name in GRID_PARAMETERS if getattr(grid, name) is not None]
     return list(dict.fromkeys(zipped.get(name, (name,)) for name in given))
 
 
@@ -139,7 +139,7 @@ def combinations(name: str, grid: GridConfig, problems: Problems) -> Iterator[Co
 
 
 def _given(excluded: ExcludeConfig) -> dict[str, list[Any]]:
-    return {name: getattr(excluded, name) for name in PARAMETERS if getattr(excluded, name) is not None}
+    return {name: getattr(excluded, name) for name in GRID_PARAMETERS if getattr(excluded, name) is not None}
 
 
 def _among(value: Any, values: list[Any]) -> bool:

@@ -185,7 +185,7 @@ class MeshFileConfig(Section):
     unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
 
 
-PARAMETERS = (
+GRID_PARAMETERS = (
     "beam",
     "mesh_type",
     "mesh_size",
@@ -222,7 +222,7 @@ class ExcludeConfig(Section):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if all(getattr(self, name) is None for name in PARAMETERS):
+        if all(getattr(self, name) is None for name in GRID_PARAMETERS):
             raise refuse("no parameter at all would leave nothing; give values of one such as {mesh_size: 1 mm}")
         return self
 
@@ -230,7 +230,7 @@ class ExcludeConfig(Section):
 def _rows_may_give(schema: dict[str, Any]) -> None:
     """What a grid needs may come from its file of rows, and a value may stand twice where it is zipped."""
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["rows"]}]
-    once = {name: {"uniqueItems": True} for name in PARAMETERS}
+    once = {name: {"uniqueItems": True} for name in GRID_PARAMETERS}
     schema |= {"if": {"not": {"required": ["zip"]}}, "then": {"properties": once}}
 
 
@@ -295,7 +295,7 @@ class GridConfig(Section):
         validate_default=True,
         description="Whether springs keep their length law or their tangent at rest.",
     )
-    zip: Annotated[list[list[str]], Groups(PARAMETERS)] = Field(
+    zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
         [],
         description="Parameters that go together, such as `[mesh_size, force]`: the first value of one with the first "
         "of the other, and so on, in place of all with all. A list of such lists for several groups.",

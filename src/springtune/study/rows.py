@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..problem.quantities import nearest
-from .config import PARAMETERS
+from .config import GRID_PARAMETERS
 from .csv_files import read_lines
 from .fields import MOST_LISTED
 from .messages import Problems, show
@@ -90,8 +90,8 @@ def _heads(row: list[str], line: int, problems: Problems) -> list[tuple[str, str
     for cell in row:
         head = HEAD.fullmatch(cell)
         name = head["name"] if head else cell.strip()
-        if not head or name not in PARAMETERS:
-            problems.add((), f"unknown column {show(cell)}; {nearest(name, PARAMETERS)}", line)
+        if not head or name not in GRID_PARAMETERS:
+            problems.add((), f"unknown column {show(cell)}; {nearest(name, GRID_PARAMETERS)}", line)
         elif name in (known for known, _ in found):
             problems.add((), f"a second column '{name}'; remove one", line)
         else:

@@ -9,7 +9,7 @@ from ...problem.parameters import SWEPT, with_unit
 from ..base import distinct
 from .outputs import SCENE_LABELS
 
-UNITS = {
+ALONG_X = {
     "force": ("Force [N]", 1.0),
     "thickness": ("Thickness [mm]", 1e3),
     "young_modulus": ("Young's modulus [MPa]", 1e-6),
@@ -122,7 +122,7 @@ def plot_sweep(
     for panel, (one, definitions) in zip(flat, shown):
         drawn.append(_panel(panel, one, {name: looks[name] for name in definitions}, parameter))
         room = panel.get_window_extent().width / panel.figure.dpi
-        panel.set(title=labels.wrapped(one.attrs["words"], room, 8), xlabel=UNITS[parameter][0])
+        panel.set(title=labels.wrapped(one.attrs["words"], room, 8), xlabel=ALONG_X[parameter][0])
     under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1)
     if ax is None:
@@ -170,7 +170,7 @@ def _parts(here):
 def _panel(panel, here, looks, parameter):
     """Draw errors over a parameter: ends of lines for names, and what a note says."""
     here = here.transpose("definition", parameter, ...)
-    x, ends, said, statuses = UNITS[parameter][1] * here[parameter].values, [], [], set()
+    x, ends, said, statuses = ALONG_X[parameter][1] * here[parameter].values, [], [], set()
     for definition, look in looks.items():
         cell = here.sel(definition=definition)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
