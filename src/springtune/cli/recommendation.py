@@ -121,7 +121,7 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
             errors = [_bounds(one.choice.errors[load], _percent, "") for load in search.loads]
             rows.append([name, size_text(one.size), one.choice.definition + ("" if one.confirmed else " *")])
             rows[-1] += [f"{number:,}" for number in (one.cells, one.particles, one.springs)]
-            rows[-1] += [*errors, f"{1e3 * one.seconds:.2g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
+            rows[-1] += [*errors, f"{1e3 * one.seconds:.3g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
         if rows[1:]:
             lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
     if any(one is None for _, found, _ in tables for one in found.values()):
