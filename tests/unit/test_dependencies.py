@@ -332,7 +332,7 @@ def _keys():
 SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
 SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")}
 SOLVING |= {"patch", "annealed"}
-REFERENCE = {"kinds.scenes.reference", "unit"}
+REFERENCE = {"kinds.scenes.reference", "kinds.samples.interpolate", "unit"}
 
 VERSIONS = {
     "matplotlib": set(),

@@ -478,7 +478,8 @@ def _expected_errors(
             errors[name] = f"{NOT_COMPUTED}: {error}"
             continue
         if found.status is Status.SOLVED:
-            errors[name] = float(found.displacement / (springs.reference * known[name].displacement) - 1)
+            softer = float(found.displacement / (springs.reference * known[name].displacement) - 1)
+            errors[name] = LOADS[name].sign * softer
         else:
             errors[name] = f"{NOT_COMPUTED}: {found.message}"
     return errors
