@@ -56,8 +56,8 @@ UNITS = {
 """Units of what a net holds; those of terms stand with them."""
 
 MEANING = (
-    "displacement of the load over that of finite elements, less 1: above zero where the springs are too soft; linear "
-    "kinematics, small strain"
+    "(network - reference) / |reference| of the displacement along the force, tension positive: above zero where the "
+    "springs are too soft, under pressure below; linear kinematics, small strain"
 )
 """What an expected error is."""
 
