@@ -43,10 +43,13 @@ def test_all_doors_say_the_same_of_a_bad_study(run, name):
     assert code == 1 and message in text and "Traceback" not in text
 
 
-def test_run_passes_on_what_is_snakemakes(repository):
-    command = [sys.executable, "-m", "springtune", "run", "config/quick.yaml", "--list-rules"]
-    done = subprocess.run(command, cwd=repository, capture_output=True, text=True)
+def test_run_passes_on_what_is_snakemakes(repository, tmp_path):
+    """From anywhere, and says then where the results go."""
+    command = [sys.executable, "-m", "springtune", "run", str(repository / "config/quick.yaml"), "--list-rules"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "collect" in done.stdout.split()
+    assert f"results go to {repository / 'results/quick'}" in done.stderr.splitlines()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

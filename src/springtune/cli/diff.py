@@ -193,8 +193,9 @@ def _summary(found: "Comparison", sides: Sequence[str]) -> str:
     """One line on all."""
     said = [f"group {path} only {side}" for side, own in zip(sides, found.alone) for path in own]
     for number, side in enumerate(sides):
-        count = sum(group.cells[number].count for group in found.groups if group.name == "/")
-        said += [f"{count} scenes only {side}"] if count else []
+        for group in found.groups:
+            count, what = group.cells[number].count, "scenes" if group.name == "/" else f"cells of {group.name}"
+            said += [f"{count} {what} only {side}"] if count else []
     statuses = sum(one.changed for group in found.groups for one in group.flags)
     values = sum(one.changed for group in found.groups for one in group.values)
     unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in found.groups)
