@@ -328,9 +328,8 @@ def _keys():
 
 
 SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
-SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "samples")}
-SOLVING |= {"patch", "annealed"}
-REFERENCE = {"kinds.scenes.reference", "kinds.samples.interpolate", "unit"}
+SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark")} | {"patch", "annealed"}
+REFERENCE = {"kinds.scenes.reference", "unit"}
 
 VERSIONS = {
     "matplotlib": set(),
