@@ -1,5 +1,6 @@
 """Samples: designs that can be doubled, what is solved once, indices against closed forms, and failures that count."""
 
+import contextlib
 import shutil
 from math import prod
 from pathlib import Path
@@ -97,6 +98,21 @@ def run(*replaced, name="sample", outputs="tables"):
     for path in campaign.jobs["interpolate_0"].products:
         shutil.copy(path, "references")
     return xr.load_datatree(campaign.folder / "dataset.nc", engine="h5netcdf"), campaign
+
+
+def solved(kinematics):
+    """Dataset of a small sample under two loads, with two definitions."""
+    of = f"load: [traction, compression]\n  definition: [lattice, area]\n  kinematics: {kinematics}"
+    return run(("load: traction\n  definition: lattice", of), ("size: 16", "size: 8"))[0]
+
+
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory, references):
+    """That of linear kinematics, which several tests look at."""
+    folder = tmp_path_factory.mktemp("linear")
+    (folder / "references").symlink_to(references)
+    with contextlib.chdir(folder):
+        return solved("linear")
 
 
 class TestDesigns:
@@ -255,9 +271,8 @@ class TestOnce:
         assert sheet.mesh.edges is not before.mesh.edges
 
     @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
-    def test_sampled_scenes_are_those_of_a_sheet_each(self, here, kinematics):
-        of = f"load: [traction, compression]\n  definition: [lattice, area]\n  kinematics: {kinematics}"
-        tree, _ = run(("load: traction\n  definition: lattice", of), ("size: 16", "size: 8"))
+    def test_sampled_scenes_are_those_of_a_sheet_each(self, here, linear, kinematics):
+        tree = linear if kinematics == "linear" else solved(kinematics)
         data = tree["samples"].to_dataset()
         for row in range(0, data.sizes["sample"], 7):
             one = data.isel(sample=row)
@@ -282,7 +297,7 @@ class TestClosedForm:
         one factor alone v, and its total one v prod of the other (1 + v).
         """
         tree, _ = run(
-            ("size: 16", "size: 128"), ("definition: lattice\n  parameters", "definition: delingette\n  parameters"),
+            ("size: 16", "size: 256"), ("definition: lattice\n  parameters", "definition: delingette\n  parameters"),
             ("thickness: 1 mm", "thickness: {from: 1 mm, to: 2 mm}"), (RATIOS, "0"),
             (MODULI, MODULI.replace("100", "2")),
         )  # fmt: skip
@@ -316,7 +331,7 @@ class TestClosedForm:
 
 
 class TestRuns:
-    def test_a_doubled_size_adds_jobs_and_solves_nothing_again(self, here):
+    def test_a_doubled_size_and_a_further_definition_solve_nothing_again(self, here):
         small, _ = run(name="sample")
         new = [
             path for path in Path("results/sample/samples").iterdir() if not (Path("references") / path.name).exists()
@@ -329,17 +344,10 @@ class TestRuns:
         before, after = (tree["samples"].to_dataset().isel(sample=slice(count)) for tree in (small, large))
         xr.testing.assert_identical(before.drop_attrs(), after.drop_attrs())
         assert campaign.due()[-2:] == ["present_scenes", "browse"]
-
-    def test_a_further_definition_solves_that_alone(self, here):
-        run(name="sample")
-        path = next(Path("results/sample/samples").glob("*.h5"))
-        for one in Path("results/sample/samples").glob("*.h5"):
-            path = one if len(store.stored(one)) > 1 else path
-        before = store.stored(path)
-        tree, _ = run(
-            ("definition: lattice\n  parameters", "definition: [lattice, van-gelder]\n  parameters"), name="sample"
-        )
-        assert len(store.stored(path) - before) == 1
+        before = {path: store.stored(path) for path in new}
+        further = ("definition: lattice\n  parameters", "definition: [lattice, van-gelder]\n  parameters")
+        tree, _ = run(("size: 16", "size: 32"), further, name="sample")
+        assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
     def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
@@ -348,9 +356,8 @@ class TestRuns:
         assert tree["samples"].sizes["sample"] == 64
         assert tree["effects"].main_effect.sel(quantity="deformation_error", load="traction").notnull().all()
 
-    def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, here):
-        tree, _ = run(("size: 16", "size: 8"))
-        one = tree["samples"].to_dataset().isel(sample=3).sel(load="traction")
+    def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
+        one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
         box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
         sheet = Sheet(MESH_TYPES["structured"](*box), float(one.thickness))
         springs, _ = sheet.derive("uniform", Material(float(one.best_stiffness) / float(one.thickness), 0.3))
@@ -513,16 +520,15 @@ class TestRefusals:
 
 
 class TestFigures:
-    def test_bars_and_effects(self, here):
-        tree, _ = run(("definition: lattice\n  parameters", "definition: [lattice, area]\n  parameters"))
-        panels = plot_sobol(tree)
+    def test_bars_and_effects(self, linear):
+        panels = plot_sobol(linear, load="traction")
         titles = [panel.get_title(loc="left") for panel in panels]
         assert titles == ["deformation error, lattice", "deformation error, area", "displacement, lattice",
                           "displacement, area", "best stiffness"]  # fmt: skip
         words = [tick.get_text() for tick in panels[0].get_yticklabels()]
         assert words == ["length", "height", "mesh size", "Young's modulus", "Poisson's ratio", "force"]
         widths = [bar.get_width() for bar in panels[0].patches[: len(words)]]
-        total = tree["sobol"].total_order.sel(quantity="deformation_error", load="traction", definition="lattice")
+        total = linear["sobol"].total_order.sel(quantity="deformation_error", load="traction", definition="lattice")
         np.testing.assert_allclose(widths, np.maximum(total, 0))
-        scales = [panel.get_xscale() for panel in plot_effects(tree)]
+        scales = [panel.get_xscale() for panel in plot_effects(linear, load="traction")]
         assert scales == ["linear", "linear", "linear", "log", "linear", "linear"]

@@ -114,12 +114,13 @@ def plot_sobol(data, ax=None, *, load=None):
     rows, size = axes.shape[0], samples.attrs["size"]
     note = _note(found.sel(load=load), size)
     room = style.PAGE if columns > 1 else style.COLUMN
-    lines = labels.wrapped(note, room - 0.2).count("\n") + 1
+    lines = labels.lines_of(labels.wrapped(note, room - 0.2))
+    title = labels.wrapped(f"{_of(samples, load)}: Sobol indices", room - 0.1, 8.5)
     if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.25 + 0.14 * lines)
+        figure.set_size_inches(style.size(figure)[0], height + 0.11 + 0.14 * (lines + labels.lines_of(title)))
     style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + 0.14 * lines,
-                  top=0.48, across=0.18, down=0.42 if rows > 1 else 0.0,
-                  title=f"{_of(samples, load)}: Sobol indices")  # fmt: skip
+                  top=0.35 + 0.14 * labels.lines_of(title), across=0.18, down=0.42 if rows > 1 else 0.0,
+                  title=title)  # fmt: skip
     order = found["definition"].values.tolist()
     limits = _limits(found, shown, load)
     for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
@@ -130,7 +131,7 @@ def plot_sobol(data, ax=None, *, load=None):
         panel.set_xlim(limits)
         panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
         if not np.isfinite(one.first_order.values).any():
-            why = "does not vary" if int(one.base_samples) else "withheld, since scenes have no value"
+            why = _why(found, one)
             labels.say(panel, why, bare=False)
     for panel in flat[-columns:]:
         panel.set_xlabel("share of the variance")
@@ -138,6 +139,15 @@ def plot_sobol(data, ax=None, *, load=None):
         width, tall = style.size(figure)
         figure.text(0.1 / width, 0.06 / tall, labels.wrapped(note, width - 0.2), fontsize=style.SMALL, color="0.25")
     return flat
+
+
+def _why(found, one):
+    """Why there are no indices of a quantity."""
+    if int(one.base_samples):
+        return "does not vary"
+    if "no indices" in found.attrs["failures"]:
+        return "withheld: there are scenes without a value"
+    return "no base sample of which all scenes have a value"
 
 
 def _limits(found, shown, load):
@@ -166,11 +176,11 @@ def _note(found, size):
     used, without = found.base_samples.values, found.base_samples_without.values
     text = "full: first order, pale: total order; lines: bootstrap bands, 95 %"
     lost = int(without.max())
-    some = used[used > 0]
     if not lost:
         return f"{text}; {size} base samples"
-    kept = f"{int(some.min())} to {int(some.max())}" if some.size and some.min() < some.max() else f"{int(used.max())}"
-    return f"{text}; {kept} of {size} base samples: up to {lost} have a scene without a value"
+    some = used[used + without > 0]
+    kept = f"{int(some.min())}" if some.min() == some.max() else f"{int(some.min())} to {int(some.max())}"
+    return f"{text}; of {kept} of {size} base samples: up to {lost} have a scene without a value"
 
 
 @style.styled
@@ -217,11 +227,13 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     columns = min(COLUMNS, len(names))
     figure, axes, flat, height = style.multiples(ax, len(names), columns, 1.75, sharey=True)
     lines = [style.line(every.index(name)) for name in definitions]
-    if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.59)
     text, factor, unit = QUANTITY_AXES[quantity]
-    style.arrange(figure, axes, left=0.55, right=0.14, bottom=0.86, top=0.3, across=0.2, down=0.5,
-                  title=f"{_of(samples, load)}: mean {text} over one parameter, {QUANTITY_NOTE}")  # fmt: skip
+    title = f"{_of(samples, load)}: mean {text} over each parameter alone"
+    title = labels.wrapped(title, (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
+    if figure is not None and ax is None:
+        figure.set_size_inches(style.size(figure)[0], height + 0.45 + 0.14 * labels.lines_of(title))
+    style.arrange(figure, axes, left=0.62, right=0.14, bottom=0.86, top=0.16 + 0.14 * labels.lines_of(title),
+                  across=0.2, down=0.5, title=title)  # fmt: skip
     drawn = False
     for number, (panel, name) in enumerate(zip(flat, names)):
         values = effects.parameter_value.sel(parameter=name).values
@@ -234,16 +246,20 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
             panel.plot(x, mean, label=label, **line | {"marker": ""})
             panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=line["color"], alpha=0.15, linewidth=0)
             drawn |= bool(np.isfinite(mean).any())
-        if _is_logarithmic(values):
-            panel.set_xscale("log")
+        logarithmic = _is_logarithmic(values)
+        ends = np.array([x.min(), x.max()])
+        if logarithmic:
+            panel.set(xscale="log", xlim=ends * (ends[1] / ends[0]) ** np.array([-0.05, 0.05]))
             style.plain(panel, "x")
         else:
+            panel.set_xlim(*(ends + 0.05 * np.ptp(ends) * np.array([-1, 1])))
             panel.locator_params(axis="x", nbins=4)
         panel.set_xlabel(_axis(PARAMETER_AXES[name][0], of))
         if number % columns == 0:
             panel.set_ylabel(_axis(text, unit))
     if not drawn:
-        labels.say(flat[0], "no scene has a value")
+        for panel in flat:
+            labels.say(panel, "no scene has a value", bare=False)
     if figure is not None:
         handles, texts = flat[0].get_legend_handles_labels()
         figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
@@ -265,10 +281,6 @@ def _lacking(samples, load, definitions):
         said.append(f"{beyond} of {samples.sizes['sample']} points are beyond small strain or without a reference, "
                     "so that their error is not the network's alone")  # fmt: skip
     return "; ".join(said)
-
-
-QUANTITY_NOTE = "whatever the others are"
-"""What a main effect is, in a title."""
 
 
 def sobol(tree):
