@@ -143,7 +143,7 @@ def follow(page, folder, run=None):
                     usual = (0, 1) if words[1] == "diff" else (0,)  # which tells by it whether anything changed
                     assert done.exit_code in usual, (line, done.output, done.exception)
                     printed += done.output
-                elif words[:2] == ["make", "study"] and run:
+                elif words[:2] in (["make", "study"], ["springtune", "run"]) and run:
                     run(words[2].removeprefix("STUDY=") if words[2:] else "config/paper.yaml")
         if block.shown is not None:
             agree(page, block.shown, printed)

@@ -15,6 +15,7 @@ import springtune as st
 from springtune.kinds import load_study, outputs
 from springtune.mesh import write_mesh
 
+from campaigns import Campaign
 from pages import blocks as blocks_of
 from pages import check_command, follow, typed
 from synthetic import dataset
@@ -159,15 +160,22 @@ def test_a_page_can_be_followed(page, repository, monkeypatch):
     monkeypatch.chdir(repository)
     with matplotlib.rc_context():
         pyplot.switch_backend("agg")
-        assert list(follow(page, repository))
+        assert list(follow(page, repository, run=_run if page.name == "sweep-parameters.md" else None))
     pyplot.close("all")
+
+
+def _run(study):
+    campaign = Campaign(study)
+    campaign.plan.write()
+    for name in campaign.jobs:
+        campaign.do(name)
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if typed(page)], ids=called)
 def test_commands_are_commands(page, tmp_path):
     """Of pages as a whole, the commands in running text included; studies of one's own are those of the repository."""
     shutil.copytree(REPOSITORY / "config", tmp_path / "config")
-    for name in ("mine", "theirs", "coarse_to_fine", "columns"):
+    for name in ("mine", "theirs", "coarse_to_fine", "columns", "sweep"):
         shutil.copy(tmp_path / "config/quick.yaml", tmp_path / f"config/{name}.yaml")
     for words in typed(page):
         check_command(words, tmp_path)
