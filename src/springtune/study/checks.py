@@ -31,6 +31,9 @@ MOST_CURVE_POINTS = 10_000_000
 FEWER = "give shorter lists, or split the study into several"
 """Remedy where a study asks for too much."""
 
+MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
+"""Remedy where it is as large as it is meant to be."""
+
 
 def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str]) -> None:
     """A name that refers to what the study declares."""
@@ -117,10 +120,9 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
         if before + number > most:
             shown = " x ".join(f"{size} {label}" for label, size in lengths.items() if size > 1)
             beside = f" beside {before} of the grids above" if before else ""
-            more = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
             problems.add(
                 ("grids", name),
-                f"{_counted(number)} scenes ({shown}){beside}; a study has at most {most}: {FEWER}, {more}",
+                f"{_counted(number)} scenes ({shown}){beside}; a study has at most {most}: {FEWER}, {MORE_SCENES}",
             )
             return
         before += number

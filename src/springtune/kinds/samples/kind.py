@@ -7,9 +7,10 @@ from pydantic import Field
 
 from ...mesh import MESH_TYPES
 from ...problem.loads import LOADS
+from ...problem.parameters import MOST_SCENES
 from ...problem.quantities import nearest
 from ...springs import DEFINITIONS
-from ...study.checks import MOST_PARTICLES
+from ...study.checks import MORE_SCENES, MOST_PARTICLES, most_scenes
 from ...study.config import Section
 from ...study.fields import (
     DefinitionName,
@@ -28,9 +29,6 @@ from .distributions import Distributed
 from .names import DESIGNS, DROP, FAILURES, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, rows_each
 from .outputs import OUTPUTS
 from .plan import STAGES
-
-MOST_SAMPLED = 1_000_000
-"""Most scenes of a sample, each load and definition counted."""
 
 Drawn = dict[str, Any]
 
@@ -77,7 +75,7 @@ def _read_size(value: str) -> int:
         below = f"{above // 2} or " if above > SMALLEST_SIZE else ""
         raise refuse(
             f"{show(value)} is not a power of two from {SMALLEST_SIZE} on, which keeps a sample even and lets it be "
-            f"doubled; give {below}{min(above, MOST_SAMPLED)}"
+            f"doubled; give {below}{min(above, MOST_SCENES)}"
         )
     return size
 
@@ -192,12 +190,13 @@ def _check(config, problems):
     else:
         _check_definitions(section, problems)
     sample = _sample(section)
-    if sample.scenes > MOST_SAMPLED:
+    most = most_scenes()
+    if sample.scenes > most:
         each = f"{sample.rows // sample.size} rows x {len(sample.loads)} loads x {len(sample.definitions)} definitions"
         problems.add(
             ("samples", "size"),
-            f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {MOST_SAMPLED}: "
-            "give a smaller size, or fewer loads and definitions",
+            f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {most}: "
+            f"give a smaller size, or fewer loads and definitions, {MORE_SCENES}",
         )
 
 
