@@ -335,7 +335,8 @@ def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinemati
     """Stiffness and force of each spring, which a study keeps with seven digits."""
     scene = scene_of(definition, mesh_type, kinematics=kinematics)
     task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
-    stored = solve(scene.sheet, task | {"force": scene.force, "kinematics": kinematics}, keep_fields=True)
+    task |= {"force": scene.force, "kinematics": kinematics, "keep_fields": True}
+    stored = solve(scene.sheet, task)
     result = scene.solve()
     assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
     assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)

@@ -400,3 +400,118 @@ def test_tables_have_a_row_of_each_value(swept):
     assert table["swept"] == ["thickness_mm", "young_modulus_MPa", "poisson_ratio", "stiffness_scale"]
     first = table["rows"][0]
     assert (first["force_N"], first["thickness_mm"], first["young_modulus_MPa"]) == (100.0, 1.0, 1e3)
+
+
+def of_grids(folder, name, grids, **keys):
+    """Path of a study of one beam, 60x20, of these grids on structured meshes, linear, without curves."""
+    common = {"beam": "60x20", "mesh_type": "structured", "material": "steel", "kinematics": "linear"}
+    common |= {"sensitivity": "false", "mesh_size": "5 mm", "definition": "lattice"}
+    content = {
+        "title": name,
+        "beams": {"60x20": {"length": "60 mm", "height": "20 mm"}},
+        "materials": {"steel": {"young_modulus": "210 GPa", "poisson_ratio": "0.3"}},
+        "outputs": ["tables"],
+        "grids": {str(number): common | grid for number, grid in enumerate(grids)},
+    }
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(content | keys, sort_keys=False))
+    return path
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder of its own as the current one."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
+    """Another grid sweeps the thickness of this beam under another load; a sheet twice as thick is as far off."""
+    calibrating = {"load": "bending", "force": "100 N", "definition": "calibrated"}
+    other = {
+        "load": "traction",
+        "force": "1 kN",
+        "thickness": ["0.5 mm", "2 mm"],
+        "definition": ["lattice", "calibrated"],
+    }
+    path = of_grids(
+        here, "thick", [calibrating, other], definitions={"calibrated": {"beam": "60x20", "load": "bending"}}
+    )
+    with run(path) as tree:
+        root = tree.to_dataset().sel(definition="calibrated").squeeze(drop=True)
+        bending, traction = (
+            root.sel(load="bending", thickness=1e-3),
+            root.sel(load="traction", thickness=[0.5e-3, 2e-3]),
+        )
+        assert abs(float(bending.deformation_error)) < 1e-9  # which is what it is calibrated for
+        assert traction.stiffness.values == pytest.approx(float(bending.stiffness) * np.array([0.5, 2.0]), rel=1e-12)
+        assert traction.deformation_error.values == pytest.approx([float(traction.deformation_error[0])] * 2, rel=1e-9)
+
+
+def test_who_needs_a_field_has_it_whoever_asks_first(here):
+    """Traction and compression share unit problems: one grid has enough for an interpolant, the other needs fields."""
+    many = {"load": "compression", "force": "1 kN", "definition": "uniform", "mesh_size": "10 mm"}
+    many |= {"poisson_ratio": {"from": "0.01", "to": "0.49", "points": "49"}}
+    fitted = {"load": "traction", "force": "1 kN", "definition": ["annealed", "lattice"], "mesh_size": "10 mm"}
+    with run(of_grids(here, "fields", [many, fitted | {"poisson_ratio": ["0.2", "0.3"]}])) as tree:
+        root = tree.to_dataset().squeeze(drop=True)
+        asked = root.where(root.status != 0)
+        assert int((root.status > 1).sum()) == 0
+        interpolated = asked.sel(load="compression", definition="uniform")
+        # Those that share a unit problem with a solved one are solved with it.
+        assert set(np.round(interpolated.poisson_ratio.values[interpolated.field_error.notnull().values], 2)) == {
+            0.2,
+            0.3,
+        }
+        assert int(interpolated.reference_displacement.notnull().sum()) == 49
+
+
+def test_what_is_interpolated_is_no_part_of_what_a_network_depends_on(here):
+    """Another range of Poisson's ratio is another interpolant, and the same networks."""
+    from springtune.kinds.scenes.plan import scene_key
+
+    keys = []
+    for last, points in (("0.4", "61"), ("0.45", "71")):
+        grid = {"load": "traction", "force": "1 kN", "poisson_ratio": {"from": "0.1", "to": last, "points": points}}
+        study = load_study(of_grids(here, "keys", [grid]))
+        keys.append({scene_key(study, scene) for scene in study.scenes})
+    assert keys[0] <= keys[1]
+
+
+def test_forces_of_equal_products_are_one_label(here):
+    grid = {"load": "pressure", "pressure": ["2 MPa", "3 MPa"], "thickness": ["1 mm", "1.5 mm"]}
+    study = load_study(of_grids(here, "press", [grid], beams={"60x20": {"length": "70 mm", "height": "20 mm"}}))
+    assert study.axes["force"] == (140.0, 210.0, 315.0)
+
+
+def test_what_is_zipped_with_the_mesh_size_is_shown_on_its_own_meshes(here):
+    grid = {
+        "load": "traction",
+        "mesh_size": ["10 mm", "5 mm"],
+        "force": ["1 kN", "10 kN"],
+        "zip": ["mesh_size", "force"],
+    }
+    path = of_grids(here, "zipped", [grid], outputs=["deformed", "size", "sweep"])
+    with run(path) as tree:
+        assert np.isfinite(tree["fields"].displacement_x.values).any()
+        (panel,) = springtune.plot_size(tree, kinematics="linear")
+        errors = tree.deformation_error.squeeze(drop=True)
+        wanted = [100 * float(errors.sel(mesh_size=size, force=force)) for size, force in ((5e-3, 1e4), (10e-3, 1e3))]
+        lines = {line.get_label(): line for line in panel.lines}
+        assert lines["lattice"].get_ydata() == pytest.approx(wanted)
+        assert "1\u00a0kN to 10\u00a0kN" in panel.get_title(loc="left").replace("\n", " ")
+        (panel,) = springtune.plot_sweep(tree, parameter="force", kinematics="linear")
+        lines = {line.get_label(): line for line in panel.lines}
+        assert lines["lattice"].get_ydata() == pytest.approx(wanted[::-1])
+        assert "mesh 5 to 10\u00a0mm" in panel.get_title(loc="left").replace("\n", " ")
+
+
+def test_a_reference_that_is_lost_is_lost_in_its_own_file(tmp_path):
+    from springtune.jobs import store
+    from springtune.kinds.scenes import reference
+
+    tasks = {"folder": str(tmp_path), "references": [{"key": "a"}], "finite": []}
+    tasks["interpolants"] = [{"key": "i", "problems": {"a": (3.0, 0.3), "b": (3.0, 0.2)}}]
+    for key, file in (("a", "a"), ("b", "i"), ("i", "i")):
+        reference.lose(tasks, key, "took too long", "60 s")
+        assert key in store.stored(tmp_path / f"{file}.h5", "60 s")

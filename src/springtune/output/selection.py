@@ -89,7 +89,7 @@ def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label 
     return chosen
 
 
-def last_swept(present: xr.DataArray) -> dict[str, xr.DataArray]:
+def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray]:
     """Of what a study sweeps, the last values that each beam, material and load has.
 
     A figure that shows no sweep shows these: the largest force, under it the largest thickness, and so on.
@@ -98,18 +98,27 @@ def last_swept(present: xr.DataArray) -> dict[str, xr.DataArray]:
     ----------
     present : xarray.DataArray of bool
         Cells that the study has.
+    along : str, optional
+        Dimension that is shown: values under which it has most labels are taken before others; where it has one label
+        under each, each label has values of its own.
 
     Returns
     -------
     dict of str to xarray.DataArray
-        Value of each dimension that is swept, over ``beam, material, load`` as far as these are dimensions; nothing
-        where nothing is swept. `springtune.output.selection.at` takes it.
+        Value of each dimension that is swept, over ``beam, material, load`` as far as these are dimensions, and over
+        `along` where its labels have values of their own; nothing where nothing is swept. `at` takes it.
     """
-    names = [str(name) for name in present.dims if name in SWEPT]
+    names = [str(name) for name in present.dims if name in SWEPT and name != along]
     if not names:
         return {}
-    kept = [name for name in ("beam", "material", "load") if name in present.dims]
-    there = present.any([name for name in present.dims if name not in (*kept, *names)]).transpose(*kept, *names)
+    kept: list[str] = [name for name in ("beam", "material", "load") if name in present.dims]
+    there = present.any([name for name in present.dims if name not in (*kept, *names, along)])
+    if along in there.dims:
+        counts = there.sum(along)
+        together = int(counts.max()) == 1 and int((there.any(names).sum(along)).max()) > 1
+        kept += [along] if together else []
+        there = there if together else (counts > 0) & (counts == counts.max(names))
+    there = there.transpose(*kept, *names)
     # What is shown rather than others comes last.
     ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
     there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
@@ -118,6 +127,24 @@ def last_swept(present: xr.DataArray) -> dict[str, xr.DataArray]:
     places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), shape)
     coordinates = {name: there[name].values for name in kept}
     return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
+
+
+def on_coarsest(present: xr.DataArray) -> xr.DataArray:
+    """Cells on the coarsest mesh of each beam and mesh type.
+
+    Parameters
+    ----------
+    present : xarray.DataArray of bool
+        Cells that the study has.
+
+    Returns
+    -------
+    xarray.DataArray of bool
+        Whole fields are kept of these, see `springtune.kinds.scenes.shown`.
+    """
+    kept = [name for name in ("beam", "mesh_type", "mesh_size") if name in present.dims]
+    there = present.any([name for name in present.dims if name not in kept])
+    return present & (there.mesh_size == there.mesh_size.where(there).max("mesh_size"))
 
 
 def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:

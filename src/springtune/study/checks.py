@@ -154,7 +154,11 @@ def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, p
     cells = math.prod(map(len, lists.values()))
     if cells > MOST_CELLS:
         most = f"a dataset has at most {MOST_CELLS}"
-        problems.add(("grids",), f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}")
+        problems.add(
+            ("grids",),
+            f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}; parameters that change "
+            "together are better drawn under 'samples'",
+        )
     once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))
     points = once * config.sensitivity.points
     if curves and points > MOST_CURVE_POINTS:

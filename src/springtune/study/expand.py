@@ -17,6 +17,7 @@ from ..springs.lattice import COEFFICIENT
 from .checks import check_cells, check_files, mesh_type_names, stated_rows
 from .combinations import Combination, combinations
 from .config import StudyConfig
+from .fields import RANGE_DIGITS
 from .messages import LONGEST_SHOWN, Problems
 from .model import (
     FURTHER_REFERENCES,
@@ -204,6 +205,11 @@ class _Bodies:
         return self._meshes[key]
 
 
+def _force(pressure: float, beam: Beam) -> float:
+    """Force of a pressure on the upper side [N], rounded as a label that other pressures and thicknesses may share."""
+    return float(f"{pressure * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
+
+
 def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Grids with their scenes and curves."""
     bodies, several = _Bodies(config, mesh_files), "force" in swept(config)
@@ -215,7 +221,7 @@ def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tu
         absent = set()
         for one in combinations(name, grid, problems):
             beam, material, load = bodies.beam(one), bodies.material(one), one["load"]
-            magnitude = one["pressure"] * beam.length * beam.thickness if "pressure" in one else one["force"]
+            magnitude = _force(one["pressure"], beam) if "pressure" in one else one["force"]
             if not several:
                 other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
                 if other != magnitude:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.dataset import NO_NODE, STATUS
-from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, on_coarsest
 from ...problem.loads import LOADS
 from ...problem.parameters import with_unit
 from ..base import distinct
@@ -86,7 +86,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
     values = last_swept(curves.status != 0)
     known = at(root.sel(selection), values) if "reference_displacement" in root else None
     # The force has a place of its own.
-    words = _swept({name: value for name, value in values.items() if name != "force" or known is None})
+    words = swept_words({name: value for name, value in values.items() if name != "force" or known is None})
     return _sensitivity(at(curves, values), known, selection, words, ax)
 
 
@@ -215,10 +215,14 @@ def _force(newtons):
     return text.replace("-", "−") if np.isfinite(newtons) else "no force"
 
 
-def _swept(values):
+def swept_words(values):
     """Values of what the study sweeps that are shown, in words; nothing where nothing is swept."""
-    found = {name: float(value) for name, value in values.items()}
-    return [with_unit(name, value) for name, value in found.items() if (name, value) != ("stiffness_scale", 1.0)]
+    found = []
+    for name, value in values.items():
+        ends = list(dict.fromkeys((float(value.min()), float(value.max()))))
+        if (name, ends) != ("stiffness_scale", [1.0]):
+            found.append(" to ".join(with_unit(name, end) for end in ends))
+    return found
 
 
 def _named(selection, *names):
@@ -271,7 +275,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     """
     root = group(data, "/")
     root, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
-    values = last_swept(root.status != 0)
+    values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
     shown = []
     for name in beams:
@@ -290,7 +294,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         parts = [one for beam, one in shown if beam == name]
         part = f", {parts.index(definitions) + 1} of {len(parts)}" if len(parts) > 1 else ""
         room = panel.get_window_extent().width / panel.figure.dpi
-        words = ", ".join([labelled_beam(root, name) + part, *_swept(_of_beam(values, name))])
+        words = ", ".join([labelled_beam(root, name) + part, *swept_words(_of_beam(values, name))])
         panel.set(title=labels.wrapped(words, room, 8), xlabel="Mesh size [mm]")
     under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if values else 0.0
@@ -335,7 +339,7 @@ def _errors(panel, here, looks, first):
         said.insert(0, f"hollow: {', '.join(sorted(statuses))}")
     if "paper_displacement" in here:
         printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
-        if here.force < 0:  # printed without sign
+        if (here.force < 0).all():  # printed without sign
             printed = -printed
         if np.isfinite(printed).any():
             panel.plot(sizes, printed, "x", color="0.35", markersize=4.5, label="as printed")
@@ -437,7 +441,8 @@ def plot_deformed(
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
     cut = cut.sel(definition=definition)
-    values = last_swept((root.status != 0).sel(material=selection["material"], load=selection["load"]))  # as stored
+    present = on_coarsest(root.status != 0)  # as they are stored
+    values = last_swept(present.sel(material=selection["material"], load=selection["load"]))
     cut = at(cut, values)
     extents = [_extent(fields.sel(beam=name)) for name in beams]
     room = style.COLUMN - 0.42 - 0.08
@@ -455,7 +460,7 @@ def plot_deformed(
             fields.sel(beam=name),
             cut.sel(beam=name),
             selection,
-            ", ".join([labelled_beam(root, name), *_swept(_of_beam(values, name))]),
+            ", ".join([labelled_beam(root, name), *swept_words(_of_beam(values, name))]),
         )
         panel.apply_aspect()  # its limits
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)

@@ -73,14 +73,16 @@ def _interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[floa
     bodies = {(id(one.mesh.beam), id(one.material), one.load): one for one in scenes}
     if len(bodies) <= CHECKS:
         return {}
-    whole = {(one.mesh.beam, one.material, one.load) for one in scenes if DEFINITIONS[one.definition].needs == "cases"}
+    wanted = [one for one in scenes if DEFINITIONS[one.definition].needs == "cases"]
     if "deformed" in study.outputs:
-        whole |= {(one.mesh.beam, one.material, one.load) for one in shown(scenes, study.swept)}
+        wanted += shown(scenes, study.swept)
+    # Bodies and loads that share a unit problem share its solution, too.
+    whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}
     kinds: dict[str, dict[Body, tuple[float, float]]] = {}
     for one in bodies.values():
         body = one.mesh.beam, one.material, one.load
-        aspect_ratio, nu, kind = unit_problem(body[0], body[1], LOADS[body[2]].kind)
-        if body not in whole and kind.mirrored and -1 < nu <= 0.5:
+        aspect_ratio, nu, kind = problem = unit_problem(body[0], body[1], LOADS[body[2]].kind)
+        if problem not in whole and kind.mirrored and -1 < nu <= 0.5:
             kinds.setdefault(kind.name, {})[body] = aspect_ratio, nu
     boxes = {name: box_of(set(problems.values())) for name, problems in kinds.items()}
     return {

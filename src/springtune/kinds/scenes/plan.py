@@ -154,8 +154,10 @@ def _common(study, scene):
             "follower": load.follower and scene.kinematics == "nonlinear",
             "definition": scene.definition,
             "kinematics": scene.kinematics,
-            "reference": reference_of(study, mesh.beam, scene.material, scene.load),
         }
+        reference = reference_of(study, mesh.beam, scene.material, scene.load)
+        if "interpolant" not in reference:  # which has no field, all that a scene wants of it
+            task["reference"] = reference
         code = stage_key("kinds.scenes.solve"), definition_key(scene.definition)
         key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
         _shared["parts"][place] = {"task": task, "key": key}
@@ -190,8 +192,19 @@ def _thickness_ratio(study, scene):
     """Thickness over that of the beam that calibrates: stiffness is in proportion to it."""
     if scene.definition != "calibrated":
         return 1.0
-    calibrating = next(curve.mesh.beam for curve in study.curves if curve.mesh.beam.name == study.calibration[0])
-    return scene.mesh.beam.thickness / calibrating.thickness
+    return scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
+
+
+_thicknesses: dict[str, Any] = {}
+
+
+def _calibrating(study):
+    """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
+    if _thicknesses.get("curves") is not study.curves:
+        curves = [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
+        found = {calibration_name(one): one.mesh.beam.thickness for one in curves}
+        _thicknesses.update(curves=study.curves, found=found)
+    return _thicknesses["found"]
 
 
 def calibration_name(scene):

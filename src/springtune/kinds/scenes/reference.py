@@ -54,9 +54,10 @@ def lose(tasks, key, why, limits):
     key, why, limits : str
         Of the reference; what became of it; the limits.
     """
+    own = {task["key"] for task in (*tasks["references"], *tasks["finite"])}
     interpolants = [task for task in tasks.get("interpolants", ()) if key in (task["key"], *task["problems"])]
     # What an interpolant cannot do goes into its own file.
-    for name in [task["key"] for task in interpolants] or [key]:
+    for name in [key] if key in own else [task["key"] for task in interpolants]:
         store.add(Path(tasks["folder"]) / f"{name}.h5", {key: _hole(why) | {store.LIMITS: limits}})
 
 

@@ -26,15 +26,16 @@ def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[S
     """
     names = tuple(swept)
     coarsest: dict[tuple[str, str], float] = {}
+    for scene in scenes:
+        place = scene.mesh.beam.name, scene.mesh.mesh_type
+        coarsest[place] = max(coarsest.get(place, 0.0), scene.mesh.mesh_size)
     last: dict[tuple[str, str, str], list[float]] = {}
     ranked = []
     for scene in scenes:
         mesh = scene.mesh
-        place, body = (mesh.beam.name, mesh.mesh_type), (mesh.beam.name, scene.material.name, scene.load)
-        coarsest[place] = max(coarsest.get(place, 0.0), mesh.mesh_size)
-        rank = [shown_order(name, swept_value(scene, mesh.beam, name)) for name in names]
-        last[body] = max(last.get(body, rank), rank)
-        ranked.append((scene, place, body, rank))
-    return frozenset(
-        scene for scene, place, body, rank in ranked if rank == last[body] and scene.mesh.mesh_size == coarsest[place]
-    )
+        if mesh.mesh_size == coarsest[mesh.beam.name, mesh.mesh_type]:
+            body = mesh.beam.name, scene.material.name, scene.load
+            rank = [shown_order(name, swept_value(scene, mesh.beam, name)) for name in names]
+            last[body] = max(last.get(body, rank), rank)
+            ranked.append((scene, body, rank))
+    return frozenset(scene for scene, body, rank in ranked if rank == last[body])

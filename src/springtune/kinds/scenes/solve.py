@@ -31,9 +31,9 @@ def run(tasks, spent):
         ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
         or nothing) and ``families``, each with ``name, thickness`` and ``scenes``, and each of these with
         ``key, material, kind`` (the load's, by name), ``follower, force, definition, kinematics``, ``reference`` (see
-        `springtune.kinds.scenes.stored_reference.read`), ``stiffness`` where it is told, ``stiffness_scale`` where it
-        is not 1, ``keep_fields`` where displacements of all particles and forces of all springs are kept, and
-        ``thickness_ratio`` and ``calibration``, the name of a group, where it is calibrated.
+        `springtune.kinds.scenes.stored_reference.read`) where it has a field, ``stiffness`` where it is told,
+        ``stiffness_scale`` where it is not 1, ``keep_fields`` where displacements of all particles and forces of all
+        springs are kept, and ``thickness_ratio`` and ``calibration``, the name of a group, where it is calibrated.
     spent : Spent
         What tasks cost is added to it.
     """
@@ -170,7 +170,7 @@ def _solved(sheet, scene, reference, calibration):
         if group["stiffness"] is None:
             return {"status": Status.FAILED, "message": group["message"]}
         stiffness = group["stiffness"] * scene["thickness_ratio"]
-    field = reference(scene["reference"]) if reference else None
+    field = reference(scene["reference"]) if reference and "reference" in scene else None
     kind, force, kinematics = LOAD_KINDS[scene["kind"]], scene["force"], scene["kinematics"]
     definition = definition_of(scene["definition"])
     springs, seconds = sheet.derive(definition, Material(**scene["material"]), stiffness, (kind, force, field))

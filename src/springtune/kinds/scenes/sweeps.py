@@ -5,8 +5,9 @@ import numpy as np
 from ...output import labels, style
 from ...output.dataset import STATUS
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept
-from ...problem.parameters import SWEPT, with_unit
+from ...problem.parameters import SWEPT
 from ..base import distinct
+from .figures import swept_words
 from .outputs import SCENE_LABELS
 
 ALONG_X = {
@@ -76,7 +77,7 @@ def plot_sweep(
     beam : str, optional
         One beam in place of all.
     mesh_size : float, optional
-        [m]; the finest one of each beam without.
+        [m]; without, of each beam the one that has most values, the finest of several.
     mesh_type, material, load, kinematics : str, optional
         Labels of the scenes. One that is not given must leave no choice.
 
@@ -148,17 +149,23 @@ def _most(present, parameter):
 def _of_beam(root, name, parameter, mesh_size):
     """Errors of a beam over a parameter and definitions, with what they are of in words."""
     here = root.sel(beam=name)
-    sizes = labels_of(here.status != 0, "mesh_size")
-    size = min(sizes) if mesh_size is None else mesh_size
-    if size not in sizes:
-        raise ValueError(f"mesh_size: nothing of beam {name!r} has {size!r} m; it has {', '.join(map(str, sizes))}")
-    here = here.sel(mesh_size=size)
-    present = (here.status != 0).any("definition")
-    counts = present.sum(parameter)
-    values = last_swept(counts == counts.max())
-    words = [labelled_beam(root, name), f"mesh {1e3 * size:g}\u00a0mm"]
-    found = {one: float(value) for one, value in values.items()}
-    words += [with_unit(one, value) for one, value in found.items() if (one, value) != ("stiffness_scale", 1.0)]
+    present = here.status != 0
+    sizes = labels_of(present, "mesh_size")
+    if mesh_size is not None and mesh_size not in sizes:
+        listed = ", ".join(map(str, sizes))
+        raise ValueError(f"mesh_size: nothing of beam {name!r} has {mesh_size!r} m; it has {listed}")
+    there = present.any([one for one in present.dims if one not in ("mesh_size", parameter)])
+    counts = {size: int(there.sel(mesh_size=size).sum()) for size in sizes}
+    if mesh_size is None and max(counts.values()) == 1 and len(sizes) > 1:
+        # Each value has a mesh of its own: the finest where it has several.
+        here = here.isel(mesh_size=there.argmax("mesh_size"))
+        meshes = f"mesh {1e3 * min(sizes):g} to {1e3 * max(sizes):g}\u00a0mm"
+    else:
+        size = max(sizes, key=lambda one: (counts[one], -one)) if mesh_size is None else mesh_size
+        here, meshes = here.sel(mesh_size=size), f"mesh {1e3 * size:g}\u00a0mm"
+    values = last_swept(here.status != 0, parameter)
+    words = [labelled_beam(root, name), meshes]
+    words += swept_words(values)
     return at(here, values).assign_attrs(words=", ".join(words))
 
 
