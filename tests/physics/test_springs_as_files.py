@@ -222,11 +222,23 @@ class TestHeader:
             for load, error in errors.items():
                 assert error == pytest.approx(choices[name].errors[load], abs=1e-9), (name, load)
 
-    def test_error_under_a_load_of_another_kind(self):
-        scene = scene_of("lattice", load="pressure", force="100 N")
-        header = st.SpringNet.from_scene(scene).header
-        solved = scene_of("lattice", load="pressure", force="1 N", kinematics="linear").solve()
-        assert header["expected_error"]["pressure"] == pytest.approx(solved.error, abs=1e-9)
+    @pytest.mark.parametrize("load", ["pressure", "compression", "follower-pressure"])
+    def test_error_under_the_load_of_a_scene(self, load):
+        """Also where it holds as another one does, or turns with its side, which linear kinematics do not see."""
+        errors = st.SpringNet.from_scene(scene_of("lattice", load=load, force="100 N")).header["expected_error"]
+        assert list(errors) == ["traction", "bending", "shear", load]
+        steady = load.removeprefix("follower-")
+        solved = scene_of("lattice", load=steady, force="1 N", kinematics="linear").solve()
+        assert errors[load] == pytest.approx(solved.error, abs=1e-9)
+
+    def test_errors_are_of_the_loads_asked_for(self):
+        mesh, loads = scene_of("patch").mesh, ["pressure", "compression"]
+        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL, loads=loads)}
+        net = st.SpringNet.from_mesh(mesh, STEEL, "patch", beam=BEAM, loads=loads)
+        assert net.header["expected_error"] == choices["patch"].errors
+        for given, options in (["shake"], {"beam": BEAM}), (["traction"], {}):
+            with pytest.raises(ValueError, match="^loads: "):
+                st.SpringNet.from_mesh(mesh, STEEL, "patch", loads=given, **options)
 
     def test_what_is_not_computed_says_why(self):
         loose = st.SpringNet.from_mesh(scene_of("lattice").mesh, replace(STEEL, density=None), "lattice")
