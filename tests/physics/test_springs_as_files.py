@@ -411,6 +411,24 @@ class TestFiles:
         with pytest.raises(ValueError, match="is damaged, or no net"):
             st.SpringNet.read(tmp_path / "net.csv")
 
+    @pytest.mark.parametrize("table", ["particles", "triangles"])
+    def test_a_table_that_is_gone_is_missed(self, table, tmp_path):
+        net = net_of(scene_of("delingette"))
+        net.write(tmp_path / "net.csv")
+        (tmp_path / f"net.{table}.csv").unlink()
+        with pytest.raises(
+            ValueError, match=rf"net\.csv: .*\(net\.{table}\.csv, .*not beside it\); write it again"
+        ) as error:
+            st.SpringNet.read(tmp_path / "net.csv")
+        assert f" {net.header['mesh'][table]} {table}, " in str(error.value)
+
+    @pytest.mark.parametrize("ending", ENDINGS)
+    def test_a_file_with_fewer_cells_than_its_header_says_is_refused(self, ending, tmp_path):
+        net = net_of(scene_of("lattice"))
+        replace(net, triangles=net.triangles[:-1]).write(tmp_path / f"net{ending}")
+        with pytest.raises(ValueError, match=r"204 triangles, and its header says 205\); write it again"):
+            st.SpringNet.read(tmp_path / f"net{ending}")
+
     def test_tables_of_a_net_of_before_are_gone(self, tmp_path):
         net_of(scene_of("lattice")).write(tmp_path / "net.csv")
         net_of(scene_of("lattice", "braced")).write(tmp_path / "net.csv")
