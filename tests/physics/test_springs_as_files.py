@@ -3,6 +3,7 @@
 import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -11,8 +12,10 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
+from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
 from springtune.kinds.scenes.solve import solve
+from springtune.kinds.scenes.stored_scene import packed, unpacked
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
@@ -347,7 +350,8 @@ def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinemati
     """Stiffness and force of each spring, which a study keeps with seven digits."""
     scene = scene_of(definition, mesh_type, kinematics=kinematics)
     task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
-    stored = solve(scene.sheet, task | {"force": scene.force, "kinematics": kinematics}, keep_fields=True)
+    task |= {"force": scene.force, "kinematics": kinematics, "keep_fields": True}
+    stored = unpacked(packed(solve(scene.sheet, task)))
     result = scene.solve()
     assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
     assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
@@ -358,6 +362,48 @@ def series(path):
     """Times of a collection and the grids of its pieces."""
     rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
     return [float(row.get("timestep")) for row in rows], [meshio.read(path.parent / row.get("file")) for row in rows]
+
+
+class TestSeries:
+    """What becomes of a collection where the disk is full."""
+
+    @pytest.fixture(params=["write_text", "replace"])
+    def full(self, request, monkeypatch):
+        """A disk on which a list has no room, or on which its last piece does not get its name."""
+        able, done = getattr(Path, request.param), []
+
+        def fail(path, *given, **options):
+            done.append(path)
+            if request.param == "write_text" or len(done) == 2:
+                raise OSError(28, "No space left on device")
+            return able(path, *given, **options)
+
+        monkeypatch.setattr(Path, request.param, fail)
+
+    def test_nothing_is_left(self, full, tmp_path):
+        with pytest.raises(OSError, match="No space left on device"):
+            scene_of("lattice").solve().write(tmp_path / "path.pvd", steps=2)
+        assert not list(tmp_path.iterdir())
+
+    def test_other_files_in_the_folder_do_not_hide_the_cause(self, tmp_path):
+        with pytest.raises(OSError, match="No space left on device"), paraview.series(tmp_path / "path.pvd") as add:
+            add(0.0, lambda path: (path.write_text("piece"), (tmp_path / "path/notes.txt").touch()))
+            raise OSError(28, "No space left on device")
+        assert [path.name for path in tmp_path.rglob("*")] == ["path", "notes.txt"]
+
+
+def test_a_collection_stays_where_there_is_no_room_for_another(tmp_path, monkeypatch):
+    result = scene_of("lattice").solve()
+    result.write(tmp_path / "path.pvd", steps=1)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+
+    def fill(path, text, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", fill)
+    with pytest.raises(OSError, match="No space left on device"):
+        scene_of("area").solve().write(tmp_path / "path.pvd", steps=3)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
 
 
 class TestMotion:
