@@ -3,6 +3,7 @@
 import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -11,8 +12,10 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
+from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
 from springtune.kinds.scenes.solve import solve
+from springtune.kinds.scenes.stored_scene import packed, unpacked
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
@@ -222,11 +225,23 @@ class TestHeader:
             for load, error in errors.items():
                 assert error == pytest.approx(choices[name].errors[load], abs=1e-9), (name, load)
 
-    def test_error_under_a_load_of_another_kind(self):
-        scene = scene_of("lattice", load="pressure", force="100 N")
-        header = st.SpringNet.from_scene(scene).header
-        solved = scene_of("lattice", load="pressure", force="1 N", kinematics="linear").solve()
-        assert header["expected_error"]["pressure"] == pytest.approx(solved.error, abs=1e-9)
+    @pytest.mark.parametrize("load", ["pressure", "compression", "follower-pressure"])
+    def test_error_under_the_load_of_a_scene(self, load):
+        """Also where it holds as another one does, or turns with its side, which linear kinematics do not see."""
+        errors = st.SpringNet.from_scene(scene_of("lattice", load=load, force="100 N")).header["expected_error"]
+        assert list(errors) == ["traction", "bending", "shear", load]
+        steady = load.removeprefix("follower-")
+        solved = scene_of("lattice", load=steady, force="1 N", kinematics="linear").solve()
+        assert errors[load] == pytest.approx(solved.error, abs=1e-9)
+
+    def test_errors_are_of_the_loads_asked_for(self):
+        mesh, loads = scene_of("patch").mesh, ["pressure", "compression"]
+        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL, loads=loads)}
+        net = st.SpringNet.from_mesh(mesh, STEEL, "patch", beam=BEAM, loads=loads)
+        assert net.header["expected_error"] == choices["patch"].errors
+        for given, options in (["shake"], {"beam": BEAM}), (["traction"], {}):
+            with pytest.raises(ValueError, match="^loads: "):
+                st.SpringNet.from_mesh(mesh, STEEL, "patch", loads=given, **options)
 
     def test_what_is_not_computed_says_why(self):
         loose = st.SpringNet.from_mesh(scene_of("lattice").mesh, replace(STEEL, density=None), "lattice")
@@ -336,7 +351,7 @@ def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinemati
     scene = scene_of(definition, mesh_type, kinematics=kinematics)
     task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
     task |= {"force": scene.force, "kinematics": kinematics, "keep_fields": True}
-    stored = solve(scene.sheet, task)
+    stored = unpacked(packed(solve(scene.sheet, task)))
     result = scene.solve()
     assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
     assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
@@ -347,6 +362,48 @@ def series(path):
     """Times of a collection and the grids of its pieces."""
     rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
     return [float(row.get("timestep")) for row in rows], [meshio.read(path.parent / row.get("file")) for row in rows]
+
+
+class TestSeries:
+    """What becomes of a collection where the disk is full."""
+
+    @pytest.fixture(params=["write_text", "replace"])
+    def full(self, request, monkeypatch):
+        """A disk on which a list has no room, or on which its last piece does not get its name."""
+        able, done = getattr(Path, request.param), []
+
+        def fail(path, *given, **options):
+            done.append(path)
+            if request.param == "write_text" or len(done) == 2:
+                raise OSError(28, "No space left on device")
+            return able(path, *given, **options)
+
+        monkeypatch.setattr(Path, request.param, fail)
+
+    def test_nothing_is_left(self, full, tmp_path):
+        with pytest.raises(OSError, match="No space left on device"):
+            scene_of("lattice").solve().write(tmp_path / "path.pvd", steps=2)
+        assert not list(tmp_path.iterdir())
+
+    def test_other_files_in_the_folder_do_not_hide_the_cause(self, tmp_path):
+        with pytest.raises(OSError, match="No space left on device"), paraview.series(tmp_path / "path.pvd") as add:
+            add(0.0, lambda path: (path.write_text("piece"), (tmp_path / "path/notes.txt").touch()))
+            raise OSError(28, "No space left on device")
+        assert [path.name for path in tmp_path.rglob("*")] == ["path", "notes.txt"]
+
+
+def test_a_collection_stays_where_there_is_no_room_for_another(tmp_path, monkeypatch):
+    result = scene_of("lattice").solve()
+    result.write(tmp_path / "path.pvd", steps=1)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+
+    def fill(path, text, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", fill)
+    with pytest.raises(OSError, match="No space left on device"):
+        scene_of("area").solve().write(tmp_path / "path.pvd", steps=3)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
 
 
 class TestMotion:
@@ -399,6 +456,24 @@ class TestFiles:
         (tmp_path / "other.particles.csv").replace(tmp_path / "net.particles.csv")
         with pytest.raises(ValueError, match="is damaged, or no net"):
             st.SpringNet.read(tmp_path / "net.csv")
+
+    @pytest.mark.parametrize("table", ["particles", "triangles"])
+    def test_a_table_that_is_gone_is_missed(self, table, tmp_path):
+        net = net_of(scene_of("delingette"))
+        net.write(tmp_path / "net.csv")
+        (tmp_path / f"net.{table}.csv").unlink()
+        with pytest.raises(
+            ValueError, match=rf"net\.csv: .*\(net\.{table}\.csv, .*not beside it\); write it again"
+        ) as error:
+            st.SpringNet.read(tmp_path / "net.csv")
+        assert f" {net.header['mesh'][table]} {table}, " in str(error.value)
+
+    @pytest.mark.parametrize("ending", ENDINGS)
+    def test_a_file_with_fewer_cells_than_its_header_says_is_refused(self, ending, tmp_path):
+        net = net_of(scene_of("lattice"))
+        replace(net, triangles=net.triangles[:-1]).write(tmp_path / f"net{ending}")
+        with pytest.raises(ValueError, match=r"204 triangles, and its header says 205\); write it again"):
+            st.SpringNet.read(tmp_path / f"net{ending}")
 
     def test_tables_of_a_net_of_before_are_gone(self, tmp_path):
         net_of(scene_of("lattice")).write(tmp_path / "net.csv")

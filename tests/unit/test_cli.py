@@ -480,6 +480,11 @@ class TestPredictAMesh:
         header = json.loads(target.read_text())["header"]
         assert "recommended: patch; with springs alone: patch" in said.stdout and header["definition"] == "patch"
 
+        said = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "pressure", "--write", target, "--json")
+        choices, header = json.loads(said.stdout)["choices"], json.loads(target.read_text())["header"]
+        assert header["definition"] == choices[0]["definition"] and [*header["expected_error"]] == ["pressure"]
+        assert header["expected_error"] == pytest.approx(choices[0]["errors"], rel=1e-9)
+
     def test_nothing_is_written_where_nothing_is_recommended(self, tmp_path):
         target = tmp_path / "net.json"
         result = run("predict", *self.NONE, "--springs-alone", "--write", target)

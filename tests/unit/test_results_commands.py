@@ -192,7 +192,7 @@ class TestExport:
             for shift, definition in enumerate(("lattice", "patch")):
                 cell = load | {"definition": definition, "kinematics": "linear"}
                 fields[f"displacement_{axis}"].loc[cell] = [0.0, 0.75 + shift, 0.0, np.nan]
-                fields["stiffness"].loc[cell], fields["force"].loc[cell] = [1, 2, 3, np.nan], [4, 5, 6, np.nan]
+                fields["stiffness"].loc[cell], fields["spring_force"].loc[cell] = [1, 2, 3, np.nan], [4, 5, 6, np.nan]
                 root["deformation_error"].loc[cell] = 0.125
         dataset.write(tmp_path / "dataset.nc", {"/": root, "/fields": fields}, {"springtune_version": "0"})
         return tmp_path

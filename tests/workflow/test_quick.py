@@ -143,13 +143,13 @@ def test_fields_are_meshes_in_equilibrium(tree, mesh_type):
     areas = 0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
     assert (areas > 0).all() and areas.sum() == pytest.approx(0.1 * 0.02)
     along = points[ends[:, 1]] - points[ends[:, 0]]
-    pulls = network.force.values[:, None] * along / np.linalg.norm(along, axis=1)[:, None]
+    pulls = network.spring_force.values[:, None] * along / np.linalg.norm(along, axis=1)[:, None]
     total = np.zeros_like(points)
     np.add.at(total, ends[:, 0], pulls)
     np.add.at(total, ends[:, 1], -pulls)
     inside = (points[:, 0] > 1e-9) & (points[:, 0] < 0.1 - 1e-9)
     # Forces are stored with seven digits, and at most eight springs meet.
-    assert np.abs(total[inside]).max() <= 1e-6 * np.abs(network.force.values).max()
+    assert np.abs(total[inside]).max() <= 1e-6 * np.abs(network.spring_force.values).max()
     axis, size = {"traction": (0, 20e3), "bending": (1, 200.0)}[load]
     right = points[:, 0] >= 0.1 - 1e-9
     assert abs(total[right, axis].sum()) == pytest.approx(size, rel=1e-5)

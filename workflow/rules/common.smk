@@ -84,7 +84,7 @@ def files(one):
     paths = [RESULTS / file for file in due.output_files(one, STUDY)]
     chosen = [of_figures.get(path.stem, {}) if path.parent.name == "figures" else {} for path in paths]
     return [
-        path if path.parent.name == "figures" and path.suffix != f".{SHOWN}" else shown(one, path, selection)
+        shown(one, path, selection) if path.parent.name == "tables" or path.suffix == f".{SHOWN}" else path
         for path, selection in zip(paths, chosen)
     ]
 

@@ -15,6 +15,7 @@ from ..jobs.keys import stage_key
 from ..jobs.run_tasks import RECORDS
 from ..kinds import KINDS, kinds, outputs
 from ..kinds.base import FORMATS
+from ..kinds.scenes.shown import keeps_fields
 from .plan import Plan, table_files
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def output_files(output: "Output", study: "Study") -> list[str]:
         From the study's folder on.
     """
     figures = [f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS]
-    return figures + [f"tables/{name}" for name in table_files(output, study)]
+    return figures + [f"{output.into}/{name}" for name in table_files(output, study)]
 
 
 def linked(study: "Study") -> list[str]:
@@ -158,7 +159,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
         named,
         parts,
         [made.name for made in collected],
-        "deformed" in study.outputs,
+        keeps_fields(study),
         printed,
         stages,
         code,

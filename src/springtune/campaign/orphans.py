@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..handover.paraview import pieces_of
 from ..jobs.atomic import UNFINISHED
 from ..jobs.damage import ASIDE
 from ..kinds.base import FORMATS
@@ -15,7 +16,14 @@ if TYPE_CHECKING:
 JOB_FILES = {"tasks": ".json", "done": ".json", "logs": ".log", "benchmarks": ".tsv"}
 """Folders of files that each job has one of, and how these end."""
 
-OUTPUT_FILES = {"figures": tuple(f".{ending}" for ending in FORMATS), "tables": (".csv", ".html", ".md")}
+COLLECTED, PIECE = ".pvd", ".vtu"
+"""How files end of which ParaView opens many at once, and those that they name, in a folder beside them."""
+
+OUTPUT_FILES = {
+    "figures": tuple(f".{ending}" for ending in FORMATS),
+    "tables": (".csv", ".html", ".md"),
+    "paraview": (COLLECTED,),
+}
 """Folders of outputs, and how their files end."""
 
 STORED, STORES = (
@@ -41,7 +49,9 @@ def orphans(study: "Study", folder: Path) -> list[Path]:
     """
     planned = plan.plan(study, folder, 1)
     jobs = due.jobs(study, planned)
-    kept = {folder / plan.BUNDLES_FILE} | {Path(path) for job in jobs.values() for path in job.products}
+    products = [Path(path) for job in jobs.values() for path in job.products]
+    kept = {folder / plan.BUNDLES_FILE, *products}
+    kept |= {piece for path in products if path.suffix == COLLECTED for piece in pieces_of(path)}
     found = {path for path in _candidates(folder) if path not in kept}
     found -= {folder / name / f"{job}{ending}" for name, ending in JOB_FILES.items() for job in jobs}
     return sorted(found)
@@ -56,6 +66,8 @@ def _candidates(folder: Path) -> Iterator[Path]:
     for below in sorted(folder.iterdir()):
         if below.is_symlink() or not below.is_dir():
             continue
+        if below.name in OUTPUT_FILES and COLLECTED in OUTPUT_FILES[below.name]:
+            yield from (path for path in sorted(below.glob(f"*/*{PIECE}")) if path.is_file() and not path.is_symlink())
         for path in _files(below):
             stage, mark, _ = path.name.partition("_")
             made = path.suffix in OUTPUT_FILES.get(below.name, ())

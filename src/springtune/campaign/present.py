@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
-    """Draw the figures of outputs into ``folder/figures`` and write their tables into ``folder/tables``.
+    """Draw the figures of outputs into ``folder/figures``, and write their tables and other files into their folders.
 
     Parameters
     ----------
@@ -34,16 +34,17 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     with xr.open_datatree(dataset, engine="netcdf4") as tree:
         tree.load()
     made: list[Path] = []
-    figures, tables = Path(folder) / "figures", Path(folder) / "tables"
+    figures = Path(folder) / "figures"
     for output in (outputs()[name] for name in names):
         if output.plot:
             made += _draw(output, tree, figures)
+        into = Path(folder) / output.into
         if output.page:
             from . import page  # here: few jobs write the page
 
-            made += [tables / name for name in page.write(tree, tables)]
+            made += [into / name for name in page.write(tree, into)]
         elif output.write:
-            made += [tables / name for name in import_module(f"springtune.{output.write}").write(tree, tables)]
+            made += [into / name for name in import_module(f"springtune.{output.write}").write(tree, into)]
     return made
 
 

@@ -145,7 +145,7 @@ def _predict(
         if not solved:
             raise ValueError("--write: nothing is recommended for this mesh, so nothing is written; take another mesh")
         mesh = _asked_mesh(beam, mesh_type, edge, unit) if mesh is None else mesh
-        _write(beam, mesh, material, solved[0], name, target, quiet=as_json)
+        _write(beam, mesh, material, solved[0], name, loads, target, quiet=as_json)
 
 
 def _find(
@@ -179,7 +179,7 @@ def _find(
             raise ValueError(f"--write: no mesh keeps {error}, so nothing is written; allow a larger error")
         mesh = MESH_TYPES[best.mesh_type](beam.length, beam.height, best.size)
         name = f"{best.mesh_type} {size_text(best.size)}"
-        _write(beam, mesh, material, best.choice.definition, name, target, quiet=as_json)
+        _write(beam, mesh, material, best.choice.definition, name, loads, target, quiet=as_json)
 
 
 def _refused(message: str) -> int:
@@ -209,12 +209,19 @@ def _asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> 
 
 
 def _write(
-    beam: "Beam", mesh: "Mesh", material: "Material", definition: str, name: str, target: Path, quiet: bool
+    beam: "Beam",
+    mesh: "Mesh",
+    material: "Material",
+    definition: str,
+    name: str,
+    loads: tuple[str, ...],
+    target: Path,
+    quiet: bool,
 ) -> None:
     """Write the springs of a definition, and say so; not where what is printed is for a program."""
     from ..handover.net import SpringNet
     from .springs import written_text
 
-    net = SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name)
+    net = SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name, loads=loads)
     written = net.write(target)
     click.echo(written_text(net, written) if quiet else "\n" + written_text(net, written), err=quiet)

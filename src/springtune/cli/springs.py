@@ -95,8 +95,8 @@ def springs(
 ) -> None:
     """Write the springs of a mesh: their rest lengths and stiffnesses, masses, and energies besides them.
 
-    The file says what its numbers are: definition, formula and source, and how far off the network is under three
-    loads, solved on this very mesh.
+    The file says what its numbers are: definition, formula and source, and how far off the network is under traction,
+    bending, shear and the load that is given, solved on this very mesh.
     """
     from ..handover.formats import check_ending
     from ..springs import DefinitionError

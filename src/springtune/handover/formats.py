@@ -36,6 +36,9 @@ ARRAYS = {
 CELL_ARRAYS = {3: "triangles", 4: "quads"}
 """Arrays that cells stand in, by their corners."""
 
+COUNTED = {"particles": "points", "springs": "springs", "triangles": "triangles", "quads": "quads"}
+"""Arrays by what the header of a net calls their lengths."""
+
 
 class Content(NamedTuple):
     """What a file of a net holds.
@@ -159,7 +162,16 @@ def _checked(content: Content) -> Content:
             raise ValueError(f"{name} of particles that it does not have")
     if not isinstance(content.header.get("thickness"), float):
         raise ValueError("its header has no thickness")
+    for said, length in _counts(content.header).items():
+        if len(arrays[COUNTED[said]]) != length:
+            raise ValueError(f"{len(arrays[COUNTED[said]])} {said}, and its header says {length}")
     return content
+
+
+def _counts(header: Mapping[str, Any]) -> dict[str, Any]:
+    """How many particles, springs and cells a header says that a net has; a header of one's own may not say it."""
+    mesh = header.get("mesh")
+    return {name: mesh[name] for name in COUNTED if name in mesh} if isinstance(mesh, dict) else {}
 
 
 # -- tables of cells: the terms of their energies, column by column ------------------------------------------------
@@ -280,8 +292,11 @@ def _csv_text(table: Mapping[str, np.ndarray]) -> str:
 
 def _read_csv(path: Path) -> Content:
     lines = path.read_text(encoding="utf-8").splitlines()
-    head = [line[2:] for line in lines if line.startswith("#")]
+    header = _header_of(line[2:] for line in lines if line.startswith("#"))
     others = companions(path)
+    for said, length in _counts(header).items():
+        if length and said in others and not others[said].is_file():
+            raise ValueError(f"{others[said].name}, which has its {length} {said}, is not beside it")
     tables = {"": _csv_table(lines)} | {
         name: _csv_table(other.read_text(encoding="utf-8").splitlines())
         for name, other in others.items()
@@ -298,7 +313,7 @@ def _read_csv(path: Path) -> Content:
                 arrays[name] = (found if columns else found[:, 0]).astype(ARRAYS[name][0])
         if place in CELL_ARRAYS.values():
             energies += _terms(arrays[place], _joined(table, len(TITLES[place])))
-    return Content(arrays, tuple(energies), _header_of(head))
+    return Content(arrays, tuple(energies), header)
 
 
 def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:

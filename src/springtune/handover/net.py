@@ -14,28 +14,25 @@ the quadratic form of its second derivative at rest.
 
 import inspect
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse.linalg import ArpackError
 
 from .. import __version__
-from ..linalg.factors import SingularError
-from ..mechanics.dynamics import Motion, masses
+from ..mechanics.dynamics import masses
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
-from ..mechanics.network import Network
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import no_cells
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import Material
 from ..problem.quantities import positive
-from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
-from ..scene.motion import motion_of
+from ..scene.motion import stable_steps
 from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..springs import Definition, DefinitionError, Springs
@@ -57,7 +54,7 @@ UNITS = {
 
 MEANING = (
     "(network - reference) / |reference| of the displacement along the force, tension positive: above zero where the "
-    "springs are too soft, under pressure below; linear kinematics, small strain"
+    "springs are too soft, under compression and pressure below; linear kinematics, small strain"
 )
 """What an expected error is."""
 
@@ -166,8 +163,11 @@ class SpringNet:
         header = _header(scene.definition, scene.sheet, scene.material, springs, scene.kind, mesh_name)
         header |= {"beam": _beam(scene.beam), "load": load}
         if errors:
+            from ..prediction import CASES  # here, since finite elements take half a second to import
+
+            loads = tuple(dict.fromkeys((*CASES, scene.load)))
             header["expected_error"] = _expected_errors(
-                scene.sheet, scene.definition, springs, scene.beam, scene.material, scene.load
+                scene.sheet, scene.definition, springs, scene.beam, scene.material, loads
             )
         return cls(**parts, header=header)
 
@@ -184,6 +184,7 @@ class SpringNet:
         springs: Springs | None = None,
         mesh_name: str = "",
         errors: bool = True,
+        loads: Iterable[str] | None = None,
     ) -> "SpringNet":
         """Springs of a definition on a mesh of any outline, without a load.
 
@@ -203,6 +204,9 @@ class SpringNet:
             In the place of those that the definition gives.
         mesh_name, errors : optional
             As of `from_scene`.
+        loads : iterable of str, optional
+            Loads whose expected errors the header says: of traction, compression, bending, shear and pressure;
+            traction, bending and shear without.
 
         Returns
         -------
@@ -211,7 +215,8 @@ class SpringNet:
         Raises
         ------
         ValueError
-            If an argument is unknown or out of its range, or the mesh does not fill the beam.
+            If an argument is unknown or out of its range, the mesh does not fill the beam, or loads are given without
+            a beam.
         DefinitionError
             If the definition cannot live on the mesh or with the material, or is not told what it needs.
         """
@@ -220,6 +225,8 @@ class SpringNet:
         if beam is not None:
             is_a(beam, Beam, "beam", A_BEAM)
             check_filled(mesh, beam)
+        elif loads is not None:
+            raise ValueError(f"loads: {loads!r} have expected errors on the mesh of a beam alone; give beam, too")
         chosen = definition_of(definition)
         sheet = Sheet(mesh, positive(thickness, "length", "thickness") if beam is None else beam.thickness)
         if springs is None:
@@ -233,7 +240,10 @@ class SpringNet:
         else:
             header["beam"] = _beam(beam)
             if errors:
-                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material)
+                from ..prediction.choices import CASES, check_loads
+
+                said = check_loads(CASES if loads is None else loads)
+                header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
         return cls(**_parts(sheet, springs, material, None, 0.0), header=header)
 
     def write(self, path: str | Path) -> list[Path]:
@@ -447,42 +457,38 @@ def _expected_errors(
     springs: Springs,
     beam: Beam,
     material: Material,
-    load: str | None = None,
+    loads: Sequence[str],
 ) -> dict[str, float | str]:
     """Error of the displacement by load, linear kinematics against the reference of small strain; or why none."""
-    from ..prediction import CASES, SOLVED, references  # here, since finite elements take half a second to import
-    from ..reference.small_strain import ReferenceNotConvergedError, solve_small_strain
+    # Here, since finite elements take half a second to import.
+    from ..prediction.choices import PREDICTED, SOLVED, displacement_of, error_of, references
 
-    names = [*CASES]
-    if load is not None and LOADS[load].kind not in [LOADS[name].kind for name in names]:
-        names.append(load)
     count = len(sheet.mesh.points)
     if count > SOLVED:
         why = f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header"
-        return dict.fromkeys(names, why)
-    known: dict[str, Any] = dict(references(beam, material))
-    errors: dict[str, float | str] = {}
-    for name in names:
-        kind = LOADS[name].kind
-        if definition.uniaxial and not kind.uniaxial:
-            errors[name] = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
+        return dict.fromkeys(loads, why)
+    refused = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
+    solved = [name for name in loads if LOADS[name].kind.uniaxial or not definition.uniaxial]
+    # To linear kinematics a load that turns with its side is the one that does not.
+    steady = {name: name if name in PREDICTED else _steady(name) for name in solved}
+    known = references(beam, material, steady.values()) if solved else {}
+    displacements: dict[LoadKind, float | str] = {}
+    errors: dict[str, float | str] = dict.fromkeys(loads, refused)
+    for name in solved:
+        kind, reference = LOADS[name].kind, known[steady[name]]
+        if isinstance(reference, str):
+            errors[name] = f"{NOT_COMPUTED}: {reference}"
             continue
-        try:
-            if name not in known:
-                known[name] = solve_small_strain(beam, material, 1.0, kind=kind)
-            if isinstance(known[name], str):
-                errors[name] = f"{NOT_COMPUTED}: {known[name]}"
-                continue
-            found = sheet.solve(kind, springs, springs.reference, "linear")
-        except (SingularError, ReferenceNotConvergedError) as error:
-            errors[name] = f"{NOT_COMPUTED}: {error}"
-            continue
-        if found.status is Status.SOLVED:
-            softer = float(found.displacement / (springs.reference * known[name].displacement) - 1)
-            errors[name] = LOADS[name].sign * softer
-        else:
-            errors[name] = f"{NOT_COMPUTED}: {found.message}"
+        if kind not in displacements:
+            displacements[kind] = displacement_of(sheet, springs, kind)
+        error = error_of(displacements[kind], springs, name, reference)
+        errors[name] = f"{NOT_COMPUTED}: {error}" if isinstance(error, str) else error
     return errors
+
+
+def _steady(load: str) -> str:
+    """The load that differs from one in that it does not turn with its side."""
+    return next(name for name, one in LOADS.items() if one == replace(LOADS[load], follower=False))
 
 
 def _stable_steps(
@@ -491,13 +497,7 @@ def _stable_steps(
     """Largest stable step of each integrator, undamped [s], or that any is stable; or why there is none."""
     if material.density is None:
         return f"{NOT_COMPUTED}: material '{material.name}' has no density"
-    if kind is None:
-        free = np.zeros(sheet.mesh.points.shape, dtype=bool)
-        inertia = masses(sheet.mesh, material.density, sheet.thickness) / springs.reference
-        motion = Motion(Network(sheet.mesh, free, springs.relative, springs.energies), inertia)
-    else:
-        motion = motion_of(sheet, kind, springs, material.density)
-    try:
-        return {name: "unlimited" if name in IMPLICIT else motion.step_limit(name) for name in INTEGRATORS}
-    except ArpackError as error:
-        return f"{NOT_COMPUTED}: {error}"
+    steps = stable_steps(sheet, springs, material.density, INTEGRATORS, kind)
+    if isinstance(steps, str):
+        return f"{NOT_COMPUTED}: {steps}"
+    return {name: "unlimited" if name in IMPLICIT else step for name, step in steps.items()}

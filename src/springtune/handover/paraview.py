@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from xml.sax.saxutils import quoteattr, unescape
 
 import numpy as np
 
-from ..jobs.atomic import UNFINISHED, replacing, write_text
+from ..jobs.atomic import UNFINISHED, replacing
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
 """meshio's names of cells by their corners."""
@@ -132,25 +132,29 @@ def series(path: str | Path) -> Iterator[Add]:
         times.append(time)
         write(pieces[-1])
 
+    finished: list[Path] = []
     try:
         yield add
-        finished = [piece.with_suffix("") for piece in pieces]
-        for piece, final in zip(pieces, finished):
-            piece.replace(final)
+        names = [piece.stem for piece in pieces]
         rows = [
-            f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(f"{folder.name}/{final.name}")}/>'
-            for time, final in zip(times, finished)
+            f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(f"{folder.name}/{name}")}/>'
+            for time, name in zip(times, names)
         ]
         lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
-        write_text(path, "\n".join([*lines, *rows, "  </Collection>", "</VTKFile>", ""]))
-        for old in set(before) - set(finished):
-            old.unlink(missing_ok=True)
+        with replacing(path) as unfinished:
+            # All that takes room on a disk comes before the first file gets its name.
+            unfinished.write_text("\n".join([*lines, *rows, "  </Collection>", "</VTKFile>", ""]), encoding="utf-8")
+            for piece, name in zip(pieces, names):
+                finished.append(piece.replace(folder / name))
     except BaseException:
-        for piece in pieces:
+        for piece in {*pieces, *finished} - set(before):
             piece.unlink(missing_ok=True)
         if made:
-            folder.rmdir()
+            with suppress(OSError):  # where it is not empty: the cause is what is to be told
+                folder.rmdir()
         raise
+    for old in set(before) - set(finished):
+        old.unlink(missing_ok=True)
 
 
 def pieces_of(path: str | Path) -> list[Path]:

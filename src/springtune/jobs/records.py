@@ -62,7 +62,7 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
     digest : str
         Of what it is to do.
     products : iterable of str or Path
-        Files that it is to make.
+        Files that it is to make; those that its record names besides are compared, too.
     wholly : bool, optional
         Whether to compare the checksum of each of them, not only of those whose size or time is another.
 
@@ -79,7 +79,8 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
         return f"{path}{DAMAGED}"
     if record["digest"] != digest:
         return "something else is asked for"
-    for product in map(Path, products):
+    # A job may make more than it is known to before it runs.
+    for product in map(Path, dict.fromkeys([*map(str, products), *record["products"]])):
         known = record["products"].get(str(product))
         try:
             state = product.stat()

@@ -42,7 +42,9 @@ class Output:
     tables : callable, optional
         Of a study: names of the files of its tables.
     write : str
-        Module with ``write(tree, folder)``, which writes them; from the package on.
+        Module with ``write(tree, folder)``, which writes them, and may write more that they name; from the package on.
+    into : str
+        Folder of these files, in the study's.
     page : bool
         Whether it is the page of all tables, `springtune.campaign.page`.
     lack : callable, optional
@@ -59,6 +61,7 @@ class Output:
     job: str = ""
     tables: Callable[[Study], Iterable[str]] = lambda study: []
     write: str = ""
+    into: str = "tables"
     page: bool = False
     lack: Callable[[Study], str] = lambda study: ""
     usual: bool = False

@@ -20,6 +20,7 @@ from ..jobs.atomic import UNFINISHED, replacing, write_bytes, write_text
 from ..problem.quantities import nearest
 from ..units import QUANTITY_KINDS, UnitError, parse
 from . import reading
+from .selection import at, last_swept
 
 EXTRA = "install what is missing with `pip install springtune[export]`"
 
@@ -378,10 +379,12 @@ def _mesh(
 
 def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
     """Write scenes of the group of fields as files for ParaView."""
-    from ..handover.paraview import MOST_PIECES, series
+    from ..handover.paraview import MOST_PIECES
 
     if "fields" not in tree.children:
-        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
+        raise ValueError(
+            "the dataset has no group '/fields'; add 'deformed' or 'paraview' to the outputs of the study, and run it"
+        )
     scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
     if not scenes:
         raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")
@@ -397,12 +400,37 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
         return f"{path}: {', '.join(map(_label_text, scenes[0].values()))}"
     if len(scenes) > MOST_PIECES:
         raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
+    write_scenes(tree, path, scenes)
+    return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
+
+
+def write_scenes(
+    tree: xr.DataTree, path: Path, scenes: Sequence[Mapping[str, str | float]] | None = None
+) -> list[Path]:
+    """Write scenes of the group of fields as a collection for ParaView.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        With the group `fields`.
+    path : Path
+        Ending in ``.pvd``; files of its scenes are in a folder of its name without that.
+    scenes : sequence of dict, optional
+        Labels of each; all that have fields without.
+
+    Returns
+    -------
+    list of Path
+        What was written, the collection first.
+    """
+    from ..handover.paraview import pieces_of, series
+
     files = _SceneFiles(tree)
     with series(path) as add:
-        for number, labels in enumerate(scenes):
+        for number, labels in enumerate(_scenes_of(tree["fields"].to_dataset()) if scenes is None else scenes):
             name = "_".join(map(_label_text, labels.values())).replace(" ", "")
             add(float(number), partial(files.write, labels=labels), name)
-    return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
+    return pieces_of(path)
 
 
 MESH = ("beam", "mesh_type", "mesh_size")
@@ -413,7 +441,8 @@ NUMBERS = {
     "reference_displacement": "reference_displacement_of_the_load",
     "deformation_error": "deformation_error",
 }
-"""Numbers of a scene that go with its fields, and their names there."""
+"""Numbers of a scene that go with its fields, and their names there; what is swept goes by its own, but for forces,
+which the springs have, too."""
 
 
 def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
@@ -436,7 +465,10 @@ class _SceneFiles:
 
     def __init__(self, tree: xr.DataTree) -> None:
         self.tree, root = tree, tree.to_dataset()
-        self.numbers = root[[name for name in NUMBERS if name in root]].load()
+        # Of what a study sweeps, the values whose fields it keeps.
+        swept = last_swept(root.status != 0)
+        names = [name for name in NUMBERS if name in root]
+        self.numbers = at(root[names], swept)[names].assign(swept).load()
         self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
@@ -462,12 +494,14 @@ class _SceneFiles:
             if np.isfinite(expected).all():
                 error = of_particles["displacement"] - expected
                 of_particles |= {"reference_displacement": expected, "error": error}
-        of_springs = {name: {2: found[name].values} for name in ("stiffness", "force") if name in found}
+        named = {"stiffness": "stiffness", "force": "spring_force"}
+        of_springs = {name: {2: found[stored].values} for name, stored in named.items() if stored in found}
         numbers = {}
         for name, array in self.numbers.items():
             here = array.sel({dim: label for dim, label in labels.items() if dim in array.dims})
             if here.ndim == 0 and np.isfinite(here):
-                numbers[NUMBERS[str(name)]] = float(here)
+                name = "force_of_the_load" if name == "force" else str(name)
+                numbers[NUMBERS.get(name, name)] = float(here)
         said = {name: self.tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels)
         units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
         comment = json.dumps(said | {"units": units}, indent=1)

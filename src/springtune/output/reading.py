@@ -239,8 +239,8 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
     xarray.Dataset
         In memory, dimensions ``particle``, ``spring`` and ``cell`` as long as the mesh has of each: positions ``x``,
         ``y`` [m], ``spring_nodes`` and ``cell_nodes`` (particles from 0, -1 where a cell has fewer corners than
-        others), the network's displacements [m], each spring's ``stiffness`` [N/m] and axial ``force`` [N], and the
-        reference's outline.
+        others), the network's displacements [m], each spring's ``stiffness`` [N/m] and axial
+        ``spring_force`` [N], and the reference's outline.
 
     Raises
     ------
@@ -263,7 +263,9 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
     if not hasattr(data, "children"):
         raise ValueError(f"data: {type(data).__name__} is no dataset; give what springtune.open returns")
     if "fields" not in data.children:
-        raise ValueError("the dataset has no group '/fields'; add 'deformed' to the outputs of the study, and run it")
+        raise ValueError(
+            "the dataset has no group '/fields'; add 'deformed' or 'paraview' to the outputs of the study, and run it"
+        )
     with guarded("the group '/fields'"):
         return _field(data, labels)
 

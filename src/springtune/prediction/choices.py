@@ -274,6 +274,51 @@ def predict(
     return sorted(choices, key=lambda choice: choice.worst)
 
 
+def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
+    """Displacement of a load for a force of the springs' reference stiffness times a metre, linear kinematics.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    springs : Springs
+    kind : LoadKind
+
+    Returns
+    -------
+    float or str
+        [1]; or why there is none.
+    """
+    try:
+        found = sheet.solve(kind, springs, springs.reference, "linear")
+    except SingularError as error:
+        return f"unstable: {error}"
+    return found.displacement if found.status is Status.SOLVED else found.message
+
+
+def error_of(displacement: float | str, springs: Springs, load: str, known: ReferenceSolution | str) -> float | str:
+    """Error of springs under a load: what `Choice.errors` has, and the header of a `springtune.SpringNet`.
+
+    Parameters
+    ----------
+    displacement : float or str
+        As of `displacement_of`.
+    springs : Springs
+    load : str
+    known : ReferenceSolution or str
+        Reference of 1 N, or why there is none.
+
+    Returns
+    -------
+    float or str
+        [1]; NaN where there is no reference; why the network has no displacement.
+    """
+    if isinstance(displacement, str):
+        return displacement
+    if isinstance(known, str):
+        return nan
+    return float(LOADS[load].sign * (displacement / (springs.reference * known.displacement) - 1))
+
+
 class TriedMesh:
     """A mesh on which definitions are solved; networks that differ in their reference stiffness alone once.
 
@@ -348,16 +393,11 @@ class TriedMesh:
         -------
         float or str
         """
-        springs, kind, known = self._springs[name], LOADS[load].kind, self.known[load]
+        springs, kind = self._springs[name], LOADS[load].kind
         key = kind, _key(springs)
         if key not in self._displacements:
-            self._displacements[key] = self._displacement(springs, kind)
-        displacement = self._displacements[key]
-        if isinstance(displacement, str):
-            return displacement
-        if isinstance(known, str):
-            return nan
-        return float(LOADS[load].sign * (displacement / (springs.reference * known.displacement) - 1))
+            self._displacements[key] = displacement_of(self._sheet, springs, kind)
+        return error_of(self._displacements[key], springs, load, self.known[load])
 
     def choice(self, name: str) -> Choice:
         """What a definition is worth.
@@ -410,14 +450,6 @@ class TriedMesh:
         """
         errors: dict[str, Number] = dict.fromkeys(self.known, nan)
         return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
-
-    def _displacement(self, springs: Springs, kind: LoadKind) -> float | str:
-        """Displacement of a load for unit force over reference stiffness [1], or why there is none."""
-        try:
-            found = self._sheet.solve(kind, springs, springs.reference, "linear")
-        except SingularError as error:
-            return f"unstable: {error}"
-        return found.displacement if found.status is Status.SOLVED else found.message
 
     def _parts(self, name: str, springs: Springs) -> tuple[float, float, str]:
         """Stiffness of sides inside and on the outline, and in words what else there is."""

@@ -14,17 +14,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import count, takewhile
 
-import numpy as np
-from scipy.sparse.linalg import ArpackError
-
-from ..mechanics.dynamics import Motion, masses
-from ..mechanics.network import Network
 from ..mesh import MESH_TYPES, Mesh
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import Material
 from ..problem.quantities import nearest
 from ..scene.meshes import A_MATERIAL, check_filled, is_a
+from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet
 from ..springs import Springs
 from ..units import parse
@@ -546,9 +542,5 @@ def _cost(mesh: Mesh, beam: Beam, material: Material, springs: Springs, loads: l
         seconds = max(seconds, time.perf_counter() - begin)
     if material.density is None:
         return seconds, math.nan
-    inertia = masses(mesh, material.density, beam.thickness) / springs.reference
-    free = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
-    try:
-        return seconds, Motion(free, inertia).step_limit("central-difference")
-    except ArpackError:
-        return seconds, math.nan
+    steps = stable_steps(Sheet(mesh, beam.thickness), springs, material.density, ["central-difference"])
+    return seconds, math.nan if isinstance(steps, str) else steps["central-difference"]

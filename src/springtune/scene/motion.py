@@ -1,8 +1,13 @@
 """A sheet in time: the masses of its particles, and its load switched on at rest."""
 
+from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+from scipy.sparse.linalg import ArpackError
+
 from ..mechanics.dynamics import Motion, masses
+from ..mechanics.network import Network
 from ..problem.loads import LoadKind
 from ..springs import Springs
 from .sheet import Sheet
@@ -44,3 +49,45 @@ def motion_of(
     inertia = masses(sheet.mesh, density, sheet.thickness) / springs.reference
     load = {} if "load" in options else {"load": force / springs.reference * sheet.pattern(kind, springs)}
     return Motion(sheet.problem(kind, springs).network, inertia, **(load | options))
+
+
+def stable_steps(
+    sheet: Sheet, springs: Springs, density: float, integrators: Iterable[str], kind: LoadKind | None = None
+) -> dict[str, float] | str:
+    """Largest stable steps of springs about rest, undamped.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    springs : Springs
+    density : float
+        Of the material [kg/m3].
+    integrators : iterable of str
+        Of `springtune.mechanics.integrators.INTEGRATORS`.
+    kind : LoadKind, optional
+        Which directions are held; none without.
+
+    Returns
+    -------
+    dict of str to float, or str
+        By integrator [s], infinite where any step is stable; or why they were not found.
+
+    Examples
+    --------
+    >>> from springtune.mesh import MESH_TYPES
+    >>> from springtune.problem.materials import Material
+    >>> sheet = Sheet(MESH_TYPES["structured"](0.1, 0.02, 5e-3), 1e-3)
+    >>> springs, _ = sheet.derive("lattice", Material(210e9, 0.3))
+    >>> f"{1e9 * stable_steps(sheet, springs, 7850.0, ['central-difference'])['central-difference']:.0f} ns"
+    '602 ns'
+    """
+    if kind is None:
+        inertia = masses(sheet.mesh, density, sheet.thickness) / springs.reference
+        held = np.zeros(sheet.mesh.points.shape, dtype=bool)
+        motion = Motion(Network(sheet.mesh, held, springs.relative, springs.energies), inertia)
+    else:
+        motion = motion_of(sheet, kind, springs, density)
+    try:
+        return {name: motion.step_limit(name) for name in integrators}
+    except ArpackError as error:
+        return str(error)

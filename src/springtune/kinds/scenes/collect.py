@@ -15,6 +15,7 @@ from ...springs.lattice import predicted_stiffness
 from ...study.model import Reference
 from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
+from .shown import keeps_fields
 from .stored_scene import PACKED, fields_key, unpacked
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, swept
 
@@ -65,7 +66,7 @@ def groups(study, folder):
     _meshes(study, folder, root)
     displacements, objections = _references(study, folder, root)
     block = _block(study, folder, axes) if pressed(study) else None
-    fields = _fields(study, folder, axes) if "deformed" in study.outputs else None
+    fields = _fields(study, folder, axes) if keeps_fields(study) else None
     _scenes(study, folder, root, block, fields, objections)
     _bodies(study, root)
     _printed(study, root)
@@ -183,7 +184,7 @@ def _scenes(study, folder, root, block, fields, objections):
                 block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **labels)
             if "displacements" in result:  # of one value of what is swept
                 x, y = result["displacements"].T
-                of_springs = {"stiffness": result["spring_stiffnesses"], "force": result["spring_forces"]}
+                of_springs = {"stiffness": result["spring_stiffnesses"], "spring_force": result["spring_forces"]}
                 fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **labels)
                 place = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
                 if tuple(place.values()) not in compared:  # scenes differ in their definitions

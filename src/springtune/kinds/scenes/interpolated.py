@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem
 from ...springs import DEFINITIONS
-from .shown import shown
+from .shown import keeps_fields, shown
 
 if TYPE_CHECKING:
     from ...problem.geometry import Beam
@@ -74,7 +74,7 @@ def _interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[floa
     if len(bodies) <= CHECKS:
         return {}
     wanted = [one for one in scenes if DEFINITIONS[one.definition].needs == "cases"]
-    if "deformed" in study.outputs:
+    if keeps_fields(study):
         wanted += shown(scenes, study.swept)
     # Bodies and loads that share a unit problem share its solution, too.
     whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}

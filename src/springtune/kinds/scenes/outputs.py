@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from ...problem.loads import LOADS
 from ...study.model import swept_value
 from ..base import Output, distinct
+from .shown import shown
 
 if TYPE_CHECKING:
     from ...study.model import CurveSpec, SceneSpec, Study
@@ -17,6 +18,9 @@ SCENE_LABELS = ("mesh_type", "material", "load")
 """The same for figures of errors against mesh size, and of deformed networks."""
 
 PLOTS = "kinds.scenes.figures"
+
+COLLECTION = "scenes.pvd"
+"""What ParaView opens."""
 
 TABLE = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""
@@ -65,6 +69,14 @@ def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
     return found
 
 
+def _too_many(study: "Study") -> str:
+    from ...handover.paraview import MOST_PIECES  # here, since it needs numpy
+
+    count = len(shown(study.scenes, study.swept))
+    remedy = "choose fewer scenes, or `springtune export --select ... --to scenes.pvd` in its place"
+    return "" if count <= MOST_PIECES else f"would write {count} files, and at most {MOST_PIECES} are; {remedy}"
+
+
 OUTPUTS = (
     Output(
         "sensitivity",
@@ -96,6 +108,16 @@ OUTPUTS = (
         plot="kinds.scenes.sweeps:sweep",
         job="scenes",
         usual=True,
+    ),
+    Output(
+        "paraview",
+        "deformed networks with displacements, their error, and stiffness and force of each spring, as files for "
+        "ParaView (and the group `/fields` behind them)",
+        tables=lambda study: [COLLECTION],
+        write="kinds.scenes.paraview",
+        into="paraview",
+        job="scenes",
+        lack=_too_many,
     ),
     Output("tables", "tables as the paper's, on one page", page=True, job="scenes", usual=True),
     Output(

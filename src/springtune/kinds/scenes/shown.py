@@ -7,7 +7,24 @@ from ...problem.parameters import shown_order
 from ...study.model import swept_value
 
 if TYPE_CHECKING:
-    from ...study.model import SceneSpec
+    from ...study.model import SceneSpec, Study
+
+SHOWING = ("deformed", "paraview")
+"""Outputs that are made of whole fields."""
+
+
+def keeps_fields(study: "Study") -> bool:
+    """Whether a study's dataset has whole fields, its group `/fields`.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    bool
+    """
+    return any(name in study.outputs for name in SHOWING)
 
 
 def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[SceneSpec]":

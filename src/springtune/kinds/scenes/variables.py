@@ -238,7 +238,8 @@ FIELDS = Group(
             np.nan,
         ),
         "stiffness": (SPRING, "N/m", "stiffness of each spring", np.float32(np.nan)),
-        "force": (
+        # Not "force", which is a dimension of the root where a study sweeps it, and would hide this one.
+        "spring_force": (
             SPRING,
             "N",
             "axial force of each spring, tension positive, energies' part left out",
@@ -264,7 +265,7 @@ FIELDS = Group(
         "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
         **{name: {"mesh": "mesh", "location": "node"} for name in ("displacement_x", "displacement_y")},
         **{name: {"mesh": "mesh", "location": "node"} for name in ("particle_reference_x", "particle_reference_y")},
-        **{name: {"mesh": "mesh", "location": "edge"} for name in ("stiffness", "force")},
+        **{name: {"mesh": "mesh", "location": "edge"} for name in ("stiffness", "spring_force")},
     },
 )
 """Whole fields, of each beam's and mesh type's coarsest mesh: they are there to be looked at.

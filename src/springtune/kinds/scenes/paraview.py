@@ -1,0 +1,21 @@
+"""Scenes of a study for ParaView: a collection of those whose fields its dataset has, and a file for each of them."""
+
+from ...output.export import write_scenes
+from .outputs import COLLECTION
+
+
+def write(tree, folder):
+    """Write the collection and its files.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+    folder : Path
+
+    Returns
+    -------
+    list of Path
+        What was written, from the folder on; a scene that has no equilibrium has no file.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    return [path.relative_to(folder) for path in write_scenes(tree, folder / COLLECTION)]
