@@ -93,7 +93,9 @@ def _accept(
     if relative is not None or absolute is not None:
         own = expected.tolerances(made)
         before = own.get("", comparison.Tolerance())
-        given = comparison.Tolerance(before.relative if relative is None else relative, absolute)
+        given = comparison.Tolerance(
+            before.relative if relative is None else relative, before.absolute if absolute is None else absolute
+        )
         made = expected.with_tolerances(made, own | {"": given})
     if former is not None:
         found = comparison.compare(former, made, groups=(), own=expected.tolerances(former), most=20)
