@@ -184,7 +184,7 @@ def tolerances(tree: xr.DataTree) -> dict[str, Tolerance]:
 
 
 def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
-    """Expected values with the tolerances of former ones, those of single cells among them, as far as they are of these.
+    """Expected values with the tolerances of former ones, those of cells among them, as far as they have a value here.
 
     Parameters
     ----------
