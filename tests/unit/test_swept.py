@@ -1,5 +1,7 @@
 """Studies of which one sweeps what the other one states once: their scenes are matched by it."""
 
+import itertools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -65,6 +67,20 @@ def test_studies_with_and_without_a_sweep_merge():
             both["displacement"].sel(force=force, drop=True), stated(force)["displacement"], rtol=1e-12
         )
     assert "force" not in both.data_vars and both["beam_length"].dims == ("beam",)
+
+
+def test_any_order_of_studies_merges():
+    """The first study that sweeps need not have every group, nor the second."""
+    lacking = xr.DataTree(swept(3e3)["/"].to_dataset())
+    trees = {"a": lacking, "b": swept(*FORCES), "c": stated(4e3)}
+    merged = [st.merge([trees[name] for name in names]) for names in itertools.permutations(trees)]
+    for both in merged:
+        assert both["force"].values.tolist() == [1e3, 2e3, 3e3, 4e3]
+        assert "force" in both["sensitivity/message"].dims and (both["status"] == st.Status.SOLVED).all()
+        assert not compare(merged[0], both).different
+        xr.testing.assert_equal(
+            both["sensitivity/displacement"].sel(force=4e3, drop=True), stated(4e3)["sensitivity/displacement"]
+        )
 
 
 @pytest.mark.parametrize(

@@ -109,10 +109,13 @@ class _Merger:
 
     def _group(self, path: str, held: dict[int, xr.Dataset]) -> xr.Dataset:
         first = next(iter(held.values()))
-        names = [str(name) for data in held.values() for name in data.variables if name not in data.dims]
         # What a label means comes first: a beam of two lengths is told, not what follows from it.
-        ranks = {name: max(data[name].ndim for data in held.values() if name in data) for name in names}
-        made = {name: self._variable(path, name, held) for name in sorted(ranks, key=lambda name: ranks[name])}
+        ranks: dict[str, int] = {}
+        for data in held.values():
+            for name, variable in data.variables.items():
+                if name not in data.dims:
+                    ranks[str(name)] = max(variable.ndim, ranks.get(str(name), 0))
+        made = {name: self._variable(path, name, held) for name in sorted(ranks, key=ranks.__getitem__)}
         used = dict.fromkeys(str(one) for data in held.values() for one in data.sizes)
         coordinates = {}
         for name in used:
@@ -150,7 +153,7 @@ class _Merger:
         self._check_size(path, name, dims, shape)
         empty, dtype = nothing([*arrays.values()])
         values = np.full(shape, empty, dtype)
-        source = np.full(shape, -1, dtype="int8")
+        source = np.full(shape, -1, dtype="int32")
         for number, array in arrays.items():
             place = np.ix_(*(self.places[path, one, number] for one in dims))
             own = array.transpose(*dims).values.astype(dtype)
