@@ -146,7 +146,7 @@ class TestCheck:
         said = [" ".join(line.split()) for line in result.stdout.splitlines()]
         assert "200x40, free, 5 mm, bending, patch solved -> unstable" in said
         assert any(line.startswith("sensitivity/deformation_error") and "+1" in line and line.endswith(
-            "100x20, free, 5 mm, bending, stiffness_ratio 1") for line in said)  # fmt: skip
+            "100x20, free, 5 mm, bending, stiffness ratio 1") for line in said)  # fmt: skip
         assert any(line.startswith("displacement") and "(+1 %)" in line for line in said)
         assert run("diff", FILE, "small").exit_code == 1
 
@@ -246,7 +246,7 @@ class TestRefusals:
         store(tree)
         result = run("accept", "small")
         assert result.exit_code == 1 and not (tmp_path / "config").exists()
-        assert "  100x20, free, mesh_size 0.005, steel, bending, patch, linear: failed, springs gone" in result.stderr
+        assert "  100x20, free, 5 mm, steel, bending, patch, linear: failed, springs gone" in result.stderr
         assert "nothing is accepted; mend these, or accept that they are so with --unsolved" in result.stderr
         result = run("accept", "small", "--unsolved")
         assert result.exit_code == 0 and "springs gone" in result.stderr

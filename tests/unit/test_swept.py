@@ -119,5 +119,5 @@ def test_files_are_compared_alike(tmp_path):
 
     paths = written(swept(*FORCES), tmp_path / "swept.nc"), written(stated(2e3), tmp_path / "stated.nc")
     result = CliRunner().invoke(main, ["diff", *map(str, paths)])
-    assert result.exit_code == 1 and "  force only before: force 1000 N" in result.stdout
+    assert result.exit_code == 1 and "  force only before: 1 kN" in result.stdout
     assert "values that changed" not in result.stdout

@@ -21,7 +21,7 @@ from . import dataset, reading
 from .alignment import axis
 from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
 from .flags import flag_words, is_flagged
-from .text import NUMBER
+from .text import NUMBER, cell_text
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
@@ -139,7 +139,7 @@ def _is_kept(name: str, array: xr.DataArray, data: xr.Dataset) -> bool:
     return array.dims == data["status"].dims and array.dtype.kind == "f" and not measured
 
 
-def unsolved(tree: xr.DataTree) -> list[tuple[str, dict[str, str | float], str, str]]:
+def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
     """Cells of a dataset that are asked for and not solved.
 
     Parameters
@@ -162,10 +162,11 @@ def unsolved(tree: xr.DataTree) -> list[tuple[str, dict[str, str | float], str, 
         for place in np.argwhere(
             (flags != Status.NOT_REQUESTED) & (flags != Status.SOLVED) & np.isin(flags, [*Status])
         ):
-            labels = {str(name): data[name].values[at].item() if name in data.coords else int(at)
+            labels = {str(name): data[name].values[at] if name in data.coords else int(at)
                       for name, at in zip(status.dims, place)}  # fmt: skip
+            units = {name: str(data[name].attrs.get("units", "1")) for name in labels if name in data.coords}
             why = str(messages.values[tuple(place)]) if messages is not None else ""
-            found.append((node.path, labels, str(Status(int(flags[tuple(place)]))), why))
+            found.append((node.path, cell_text(labels, units), str(Status(int(flags[tuple(place)]))), why))
     return found
 
 

@@ -8,10 +8,11 @@ from fnmatch import fnmatchcase
 import numpy as np
 import xarray as xr
 
-from .alignment import Axis, axis, cell_text, number_text
+from .alignment import Axis, axis
 from .comparison import MEASURED
 from .flags import NOT_REQUESTED, flag_words, is_flagged, nothing
 from .swept import with_swept
+from .text import cell_text, number_text
 
 SAME_VALUE = 1e-9
 """Values that differ by less, of the larger one, are those of one scene."""
@@ -202,10 +203,9 @@ class _Merger:
         two = " and ".join(
             f"{_value(value, units, words)} in {self.names[number]}" for number, value in zip(numbers, values)
         )
-        plain = {one: label if isinstance(label, str) else float(label) for one, label in labels.items()}  # type: ignore[arg-type]
-        at = cell_text(plain, {one: self.axes[path, one] for one in plain})
-        if len(plain) == 1:
-            (one,) = plain
+        at = cell_text(labels, {one: self.axes[path, one].units for one in labels})
+        if len(labels) == 1:
+            (one,) = labels
             raise ValueError(
                 f"{one} '{at}' is two things: {_full(path, name)} is {two}; give one of them another label in its study"
             )

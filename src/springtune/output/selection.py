@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..problem.geometry import beam_label
-from ..problem.parameters import SWEPT, shown_order
+from ..problem.parameters import OF_BODIES, SWEPT, shown_order
 
 if TYPE_CHECKING:
     from .dataset import Label
@@ -138,15 +138,15 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     if not chosen:
         return data
     found = data.sel(chosen)
-    own = {name: (("material",) if name.startswith("material") else ("beam",)) for name in BODIES if name in found}
+    own = {
+        name: (("material",) if name.startswith("material") else ("beam",))
+        for name in OF_BODIES.values()
+        if name in found
+    }
     for name, dimensions in own.items():  # what belongs to a body is the same under all loads, but for what is swept
         others = [one for one in found[name].dims if one not in dimensions]
         found[name] = found[name].isel(dict.fromkeys(others, -1), drop=True) if others else found[name]
     return found.reset_coords([name for name in chosen if name in found.coords])
-
-
-BODIES = ("material_young_modulus", "material_poisson_ratio", "beam_thickness")
-"""Variables of bodies that may depend on what is swept."""
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:

@@ -6,19 +6,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..problem.parameters import STATED, SWEPT, UNCHANGED
 from .alignment import SAME_NUMBER
 from .flags import nothing
-
-STATED = {
-    "force": "force",
-    "thickness": "beam_thickness",
-    "young_modulus": "material_young_modulus",
-    "poisson_ratio": "material_poisson_ratio",
-}
-"""Variable that holds a parameter where it is not swept; of a force its size, since the load says the direction."""
-
-UNCHANGED = {"stiffness_scale": 1.0}
-"""What a parameter is where it is not swept, and nothing holds it."""
 
 
 def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
@@ -34,7 +24,7 @@ def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
         The same where nothing is missing; else in memory, each cell at the label that its study states.
     """
     made = [*trees]
-    for name in (*STATED, *UNCHANGED):
+    for name in SWEPT:
         sweeping = [tree for tree in trees if name in tree.dims]
         if not sweeping:
             continue

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...output.dataset import NO_NODE, Group
+from ...problem.parameters import OF_BODIES
 
 if TYPE_CHECKING:
     from ...study.model import Study
@@ -115,13 +116,6 @@ SENSITIVITY = Group(
 OF_PRINT = "paper_"
 """First letters of variables of printed cells, which know no parameters but those of `CELL`."""
 
-OWN = {
-    "material_young_modulus": "young_modulus",
-    "material_poisson_ratio": "poisson_ratio",
-    "beam_thickness": "thickness",
-}
-"""Parameters of bodies that a study may sweep."""
-
 
 def swept(group: Group, study: "Study") -> Group:
     """Group whose variables are over what a study sweeps, each over what it depends on.
@@ -138,8 +132,8 @@ def swept(group: Group, study: "Study") -> Group:
     """
     further: dict[str, list[str]] = {}
     for name, (dimensions, *_) in group.variables.items():
-        if name in OWN:
-            further[name] = [one for one in study.swept if one == OWN[name]]
+        if name in OF_BODIES.values():
+            further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
         elif "load" in dimensions and not name.startswith(OF_PRINT):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
     return group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
