@@ -146,7 +146,7 @@ class TestCheck:
         said = [" ".join(line.split()) for line in result.stdout.splitlines()]
         assert "200x40, free, 5 mm, bending, patch solved -> unstable" in said
         assert any(line.startswith("sensitivity/deformation_error") and "+1" in line and line.endswith(
-            "100x20, free, 5 mm, bending, stiffness_ratio 1") for line in said)  # fmt: skip
+            "100x20, free, 5 mm, bending, stiffness ratio 1") for line in said)  # fmt: skip
         assert any(line.startswith("displacement") and "(+1 %)" in line for line in said)
         assert run("diff", FILE, "small").exit_code == 1
 
@@ -209,6 +209,32 @@ class TestCheck:
         store(tree)
         assert run("accept", "--check").exit_code == 1
 
+    def test_tolerances_of_what_is_not_accepted_any_more_are_dropped(self, here):
+        """Else the file that is written could not be read."""
+        own = "{relative: 1e-06}\n  displacement: {relative: 0.002}\n  deformation_error: {relative: 0.003}\n"
+        edit("{relative: 1e-06}\n", f"{own}  sensitivity/best_stiffness: {{relative: 0.1}}\n")
+        tree = made()
+        tree["sensitivity/best_stiffness"].values[...] = np.nan  # nothing of it is written then
+        store(tree)
+        for arguments in (("--variables", "deformation_error,sensitivity/best_stiffness"), ()):
+            result = run("accept", "small", *arguments)
+            assert result.exit_code == 0, result.output
+            assert run("accept", "--check").exit_code == 0
+            told = lines()[lines().index("tolerances:") : lines().index("groups:")]
+            assert told == ["tolerances:", "  all: {relative: 1e-06}", "  deformation_error: {relative: 0.003}"]
+
+    def test_a_tolerance_of_a_cell_goes_with_its_dimension(self):
+        former = expected.accepted(xr.DataTree(made()["/"].to_dataset().drop_vars("force").expand_dims(force=[1e3])))
+        former["tolerance"] = xr.full_like(former.displacement, 0.25)
+        assert "tolerance" not in expected.with_tolerances_of(expected.accepted(made()), former)
+
+    def test_the_option_for_one_tolerance_leaves_the_other(self, here):
+        edit("{relative: 1e-06}", "{relative: 1e-06, absolute: 2e-09}")
+        assert run("accept", "small", "--relative", "1e-4").exit_code == 0
+        assert "  all: {relative: 0.0001, absolute: 2e-09}" in lines()
+        assert run("accept", "small", "--absolute", "0").exit_code == 0
+        assert "  all: {relative: 0.0001, absolute: 0}" in lines()
+
 
 class TestRefusals:
     def test_scenes_that_are_not_solved_are_listed(self, tmp_path, monkeypatch):
@@ -220,7 +246,7 @@ class TestRefusals:
         store(tree)
         result = run("accept", "small")
         assert result.exit_code == 1 and not (tmp_path / "config").exists()
-        assert "  100x20, free, mesh_size 0.005, steel, bending, patch, linear: failed, springs gone" in result.stderr
+        assert "  100x20, free, 5 mm, steel, bending, patch, linear: failed, springs gone" in result.stderr
         assert "nothing is accepted; mend these, or accept that they are so with --unsolved" in result.stderr
         result = run("accept", "small", "--unsolved")
         assert result.exit_code == 0 and "springs gone" in result.stderr

@@ -515,3 +515,31 @@ def test_a_reference_that_is_lost_is_lost_in_its_own_file(tmp_path):
     for key, file in (("a", "a"), ("b", "i"), ("i", "i")):
         reference.lose(tasks, key, "took too long", "60 s")
         assert key in store.stored(tmp_path / f"{file}.h5", "60 s")
+
+
+def test_fields_of_a_sweep_say_of_which_values_they_are(here):
+    grid = {"load": ["traction", "bending"], "force": ["1 kN", "2 kN"], "thickness": ["1 mm", "2 mm"]}
+    grid |= {"mesh_size": "10 mm"}
+    coarse = grid | {"load": "traction", "mesh_size": "20 mm", "force": "1 kN"}
+    with run(of_grids(here, "said", [grid, coarse], outputs=["deformed", "paraview"])) as tree:
+        fields = tree["fields"].to_dataset(inherit=False).squeeze(drop=True)
+        # Each load has its coarsest mesh, and the last values there.
+        assert fields.shown_force.sel(load=["traction", "bending"]).values.tolist() == [1e3, 2e3]
+        assert fields.shown_thickness.values.tolist() == [2e-3, 2e-3]
+        place = {"beam": "60x20", "mesh_type": "structured", "load": "bending", "mesh_size": 10e-3}
+        network = springtune.field(tree, **place, force=2e3, thickness=2e-3).squeeze()
+        assert (float(network.force), float(network.thickness)) == (2e3, 2e-3)
+        beam = springtune.Beam("60 mm", "20 mm", "2 mm")
+        mesh = springtune.make_mesh(beam, "structured", "10 mm")
+        steel = springtune.Material("210 GPa", 0.3)
+        scene = springtune.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear")
+        result = scene.solve()
+        assert np.allclose(network.displacement_y.values, result.displacements[:, 1], rtol=1e-9, atol=1e-15)
+        assert np.allclose(network.spring_force.values, result.spring_forces, rtol=1e-5, atol=1e-3)
+        with pytest.raises(ValueError, match=r"fields are not kept of force 1000.0; they are of 2000.0"):
+            springtune.field(tree, **place, force=1e3)
+        (panel,) = springtune.plot_deformed(tree, load="bending", kinematics="linear")
+        assert "2\u00a0kN, thickness 2\u00a0mm, mesh 10 mm" in panel.get_title(loc="left").replace("\n", " ")
+        assert not [text for text in panel.texts if "no network" in text.get_text()]
+        pieces = sorted((here / "results/said/paraview/scenes").glob("*.vtu"))
+        assert len(pieces) == 2

@@ -103,6 +103,15 @@ class TestMerge:
         parts = [emptied(whole, definition=name) for name in AXES["definition"]]
         assert not compare(whole, st.merge(parts)).different
 
+    def test_a_value_of_any_dataset_is_held_against_others(self):
+        """Beyond as many as fit eight bits, too."""
+        data = xr.Dataset({"beam_length": ("beam", [1.0], {"units": "m"})})
+        trees = [named(xr.DataTree(data.assign_coords(beam=[f"{n:03}"])), f"{n:03}") for n in range(130)]
+        assert st.merge([*trees, trees[-1]]).sizes["beam"] == 130
+        other = named(trees[-1].copy(deep=True) * 7.0, "other")
+        with pytest.raises(ValueError, match="beam '129' is two things: beam_length is 1000 mm in 129 and 7000 mm in"):
+            st.merge([*trees, other])
+
     def test_last_digits_of_what_is_shared_do_not_matter(self):
         one, other = made(), made()
         other["reference_displacement"].values[...] *= 1 + 1e-12

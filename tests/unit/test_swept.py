@@ -1,5 +1,7 @@
 """Studies of which one sweeps what the other one states once: their scenes are matched by it."""
 
+import itertools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -67,6 +69,20 @@ def test_studies_with_and_without_a_sweep_merge():
     assert "force" not in both.data_vars and both["beam_length"].dims == ("beam",)
 
 
+def test_any_order_of_studies_merges():
+    """The first study that sweeps need not have every group, nor the second."""
+    lacking = xr.DataTree(swept(3e3)["/"].to_dataset())
+    trees = {"a": lacking, "b": swept(*FORCES), "c": stated(4e3)}
+    merged = [st.merge([trees[name] for name in names]) for names in itertools.permutations(trees)]
+    for both in merged:
+        assert both["force"].values.tolist() == [1e3, 2e3, 3e3, 4e3]
+        assert "force" in both["sensitivity/message"].dims and (both["status"] == st.Status.SOLVED).all()
+        assert not compare(merged[0], both).different
+        xr.testing.assert_equal(
+            both["sensitivity/displacement"].sel(force=4e3, drop=True), stated(4e3)["sensitivity/displacement"]
+        )
+
+
 @pytest.mark.parametrize(
     ("name", "variable", "values"),
     [("thickness", "beam_thickness", [1e-3, 2e-3]), ("young_modulus", "material_young_modulus", [2e11, 2e11])],
@@ -103,5 +119,5 @@ def test_files_are_compared_alike(tmp_path):
 
     paths = written(swept(*FORCES), tmp_path / "swept.nc"), written(stated(2e3), tmp_path / "stated.nc")
     result = CliRunner().invoke(main, ["diff", *map(str, paths)])
-    assert result.exit_code == 1 and "  force only before: force 1000 N" in result.stdout
+    assert result.exit_code == 1 and "  force only before: 1 kN" in result.stdout
     assert "values that changed" not in result.stdout

@@ -93,7 +93,9 @@ def _accept(
     if relative is not None or absolute is not None:
         own = expected.tolerances(made)
         before = own.get("", comparison.Tolerance())
-        given = comparison.Tolerance(before.relative if relative is None else relative, absolute)
+        given = comparison.Tolerance(
+            before.relative if relative is None else relative, before.absolute if absolute is None else absolute
+        )
         made = expected.with_tolerances(made, own | {"": given})
     if former is not None:
         found = comparison.compare(former, made, groups=(), own=expected.tolerances(former), most=20)
@@ -126,11 +128,10 @@ def _count(tree: "xr.DataTree") -> str:
     return ", ".join(f"{count} scenes" if path == "/" else f"{count} of {path}" for path, count in counts)
 
 
-def _tell_unsolved(holes: "list[tuple[str, dict[str, str | float], str, str]]") -> None:
+def _tell_unsolved(holes: list[tuple[str, str, str, str]]) -> None:
     """Say which cells are not solved."""
     click.echo(f"{len(holes)} are not solved:", err=True)
-    for group, labels, status, why in holes[:LISTED_UNSOLVED]:
-        place = ", ".join(label if isinstance(label, str) else f"{name} {label:g}" for name, label in labels.items())
+    for group, place, status, why in holes[:LISTED_UNSOLVED]:
         head = "" if group == "/" else f"{group}: "
         click.echo(f"  {head}{place}: {status}{f', {why}' if why else ''}", err=True)
     if len(holes) > LISTED_UNSOLVED:

@@ -2,14 +2,14 @@
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from ..output.text import aligned
+from ..output.text import aligned, cell_text
 from .examples import examples
 from .folders import dataset_path
 
@@ -212,15 +212,13 @@ def _summary(found: "Comparison", sides: Sequence[str]) -> str:
 
 def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> Iterator[list[str]]:
     """Paragraphs on labels, cells, variables and statuses of a group."""
-    from ..output.alignment import cell_text
-
     what = "scenes" if group.name == "/" else f"cells of {group.name}"
     lines = []
     for name, both in group.labels.items():
         for side, own in zip(sides, both):
             shown = own[:most]
             if own:
-                said = ", ".join(cell_text({name: label}, group.axes) for label in shown)
+                said = ", ".join(_place(group, {name: label}) for label in shown)
                 lines.append(
                     f"  {name} only {side}: {said}" + (f", and {len(own) - len(shown)} more" * (len(own) > len(shown)))
                 )
@@ -228,7 +226,7 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
         yield [f"labels of {group.name}", *lines]
     for side, alone in zip(sides, group.cells):
         if alone.count:
-            lines = [f"  {cell_text(_telling(group, labels), group.axes)}" for labels in alone.rows]
+            lines = [f"  {_place(group, _telling(group, labels))}" for labels in alone.rows]
             more = [f"  and {alone.count - len(lines)} more; --all shows them"] if alone.count > len(lines) else []
             yield [f"{what} only {side}: {alone.count}", *lines, *more]
     lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
@@ -239,7 +237,7 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
         if one.changed:
             rows = [
                 [
-                    f"  {cell_text(_telling(group, row.labels | row.point), group.axes) or 'all'}",
+                    f"  {_place(group, _telling(group, row.labels | row.point)) or 'all'}",
                     f"{row.before or 'nothing'} -> {row.after or 'nothing'}",
                 ]
                 for row in one.rows
@@ -248,10 +246,12 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
             yield [f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}", aligned(rows, 0), *more]
 
 
+def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
+    return cell_text(labels, {name: one.units for name, one in group.axes.items()})
+
+
 def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
     """What changed of which variables, and the largest changes."""
-    from ..output.alignment import cell_text
-
     head = ["  variable", "cells", "changed", "largest change"]
     counts = [
         [f"  {_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
@@ -263,7 +263,7 @@ def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str],
     rows = [["  variable", *sides, "change", "at"]]
     for row in changes[:most]:
         group = axes[row.group]
-        at = cell_text(_telling(group, row.labels) | row.point, group.axes)
+        at = _place(group, _telling(group, row.labels) | row.point)
         rows.append(
             [f"  {_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,39 +116,3 @@ def _texts(values: Sequence[np.ndarray]) -> tuple[np.ndarray, tuple[np.ndarray, 
     known: dict[str, int] = {}
     found = [np.array([known.setdefault(str(one), len(known)) for one in own], dtype=int) for own in values]
     return np.array(list(known), dtype=object), tuple(found)
-
-
-def number_text(number: float, units: str) -> str:
-    """A number with its unit, lengths in mm.
-
-    Parameters
-    ----------
-    number : float
-    units : str
-        ``"1"`` where it has none.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
-    ('5 mm', '0.3', '400000 N')
-    """
-    if units == "m":
-        return f"{1e3 * number:.6g} mm"
-    return f"{number:.6g}" if units in ("", "1") else f"{number:.6g} {units}"
-
-
-def cell_text(labels: Mapping[str, str | float], axes: Mapping[str, Axis]) -> str:
-    """Labels of a cell, as people read them: texts as they are, numbers with unit and, where it has none, name."""
-    words = []
-    for name, label in labels.items():
-        if isinstance(label, str):
-            words.append(label)
-            continue
-        units = axes[name].units
-        said = number_text(float(label), units)
-        words.append(said if units == "m" and name == "mesh_size" else f"{name} {said}")
-    return ", ".join(words)

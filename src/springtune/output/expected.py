@@ -21,7 +21,7 @@ from . import dataset, reading
 from .alignment import axis
 from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
 from .flags import flag_words, is_flagged
-from .text import NUMBER
+from .text import NUMBER, cell_text
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
@@ -86,7 +86,7 @@ def accepted(
         )
         if path == "/" or found.data_vars:
             groups[path] = found.drop_attrs(deep=False)
-    if not any(data.data_vars for data in groups.values()):
+    if not any(_known(array).any() for data in groups.values() for array in data.data_vars.values()):
         raise ValueError("there is nothing to accept: the dataset has no scene with a status; name --variables")
     made = xr.DataTree.from_dict(groups)
     made.attrs = {
@@ -139,7 +139,7 @@ def _is_kept(name: str, array: xr.DataArray, data: xr.Dataset) -> bool:
     return array.dims == data["status"].dims and array.dtype.kind == "f" and not measured
 
 
-def unsolved(tree: xr.DataTree) -> list[tuple[str, dict[str, str | float], str, str]]:
+def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
     """Cells of a dataset that are asked for and not solved.
 
     Parameters
@@ -162,10 +162,11 @@ def unsolved(tree: xr.DataTree) -> list[tuple[str, dict[str, str | float], str, 
         for place in np.argwhere(
             (flags != Status.NOT_REQUESTED) & (flags != Status.SOLVED) & np.isin(flags, [*Status])
         ):
-            labels = {str(name): data[name].values[at].item() if name in data.coords else int(at)
+            labels = {str(name): data[name].values[at] if name in data.coords else int(at)
                       for name, at in zip(status.dims, place)}  # fmt: skip
+            units = {name: str(data[name].attrs.get("units", "1")) for name in labels if name in data.coords}
             why = str(messages.values[tuple(place)]) if messages is not None else ""
-            found.append((node.path, labels, str(Status(int(flags[tuple(place)]))), why))
+            found.append((node.path, cell_text(labels, units), str(Status(int(flags[tuple(place)]))), why))
     return found
 
 
@@ -184,7 +185,7 @@ def tolerances(tree: xr.DataTree) -> dict[str, Tolerance]:
 
 
 def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
-    """Expected values with the tolerances of former ones, those of single cells among them.
+    """Expected values with the tolerances of former ones, those of cells among them, as far as they have a value here.
 
     Parameters
     ----------
@@ -194,13 +195,20 @@ def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
     -------
     xarray.DataTree
     """
-    made = tree.copy()
-    made.attrs = tree.attrs | {TOLERANCES: former.attrs.get(TOLERANCES, "{}")}
+    held = {
+        variable_name(node.path, str(name))
+        for node in tree.subtree
+        for name, array in node.data_vars.items()
+        if _known(array).any()
+    }
+    made = with_tolerances(tree, {name: one for name, one in tolerances(former).items() if name in {"", *held}})
     for node in former.subtree:
         if OF_CELLS not in node.data_vars or (node.path != "/" and node.path[1:] not in made.children):
             continue
         here, own = made[node.path].to_dataset(), node.to_dataset()[OF_CELLS]
         names = [str(name) for name in own.dims]
+        if not {*names} <= {*here.sizes}:
+            continue
         axes = [axis(name, [here, node.to_dataset()]).common() for name in names]
         kept = np.full([here.sizes[name] for name in names], np.nan)
         kept[np.ix_(*(one[1] for one in axes))] = own.values[np.ix_(*(one[2] for one in axes))]
@@ -223,11 +231,15 @@ def cells(tree: xr.DataTree) -> dict[str, int]:
         kept = cell_dimensions([data], [tree.to_dataset()])
         there = []
         for array in node.data_vars.values():
-            known = array != 0 if array.dtype.kind in "iu" else array.notnull()
-            there.append(known.any([name for name in array.dims if name not in kept]))
+            there.append(_known(array).any([name for name in array.dims if name not in kept]))
         if there:
             found[node.path] = int(reduce(lambda one, other: one | other, there).sum())
     return found
+
+
+def _known(array: xr.DataArray) -> xr.DataArray:
+    """Where there is something to write."""
+    return array != 0 if array.dtype.kind in "iu" else array.notnull()
 
 
 # -- files -------------------------------------------------------------------------------------------------------------
@@ -296,8 +308,8 @@ def write(path: str | Path, tree: xr.DataTree) -> None:
         return
     if path.suffix != ".yaml":
         raise ValueError(f"{path}: '{path.suffix}' is no form of expected values; give a file ending in .yaml or .nc")
-    arrays = [array.values for node in tree.subtree for array in node.data_vars.values()]
-    count = sum(int((array != 0).sum() if array.dtype.kind in "iu" else (array == array).sum()) for array in arrays)
+    arrays = [array for node in tree.subtree for array in node.data_vars.values()]
+    count = sum(int(_known(array).sum()) for array in arrays)
     if count > MOST_NUMBERS:
         raise ValueError(
             f"{path}: {count} numbers are more than a text to review ({MOST_NUMBERS}); give a file ending in .nc, or "
@@ -326,7 +338,7 @@ def _lines(tree: xr.DataTree) -> Iterator[str]:
     roots = [tree.to_dataset()]
     for node in tree.subtree:
         data = node.to_dataset()
-        if node.to_dataset(inherit=False).data_vars:
+        if any(_known(array).any() for array in node.data_vars.values()):
             yield f"  {node.path}:"
             yield from (
                 f"    {line}" for line in _group_lines(node.path, data[list(node.data_vars)], roots, own, general)

@@ -20,7 +20,8 @@ from ..jobs.atomic import UNFINISHED, replacing, write_bytes, write_text
 from ..problem.quantities import nearest
 from ..units import QUANTITY_KINDS, UnitError, parse
 from . import reading
-from .selection import at, last_swept
+from .selection import at, shown_swept
+from .text import label_text
 
 EXTRA = "install what is missing with `pip install springtune[export]`"
 
@@ -388,6 +389,7 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
     scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
     if not scenes:
         raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")
+    files = _SceneFiles(tree)
     if path.suffix.lower() == ".vtu":
         if len(scenes) > 1:
             several = {name: len({labels[name] for labels in scenes}) for name in scenes[0]}
@@ -396,8 +398,8 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
                 f"{path}: {len(scenes)} scenes, and a .vtu file has one; --select one {choose}, or give a name ending "
                 "in .pvd for all of them"
             )
-        _SceneFiles(tree).write(path, scenes[0])
-        return f"{path}: {', '.join(map(_label_text, scenes[0].values()))}"
+        files.write(path, scenes[0])
+        return f"{path}: {files.named(scenes[0])}"
     if len(scenes) > MOST_PIECES:
         raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
     write_scenes(tree, path, scenes)
@@ -428,8 +430,7 @@ def write_scenes(
     files = _SceneFiles(tree)
     with series(path) as add:
         for number, labels in enumerate(_scenes_of(tree["fields"].to_dataset()) if scenes is None else scenes):
-            name = "_".join(map(_label_text, labels.values())).replace(" ", "")
-            add(float(number), partial(files.write, labels=labels), name)
+            add(float(number), partial(files.write, labels=labels), files.named(labels, "_").replace(" ", ""))
     return pieces_of(path)
 
 
@@ -455,21 +456,21 @@ def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
         yield {str(name): solved[name].values[one].item() for name, one in zip(names, place)}
 
 
-def _label_text(label: str | float) -> str:
-    """A label in words: mesh sizes in mm."""
-    return label if isinstance(label, str) else f"{1e3 * label:.6g} mm"
-
-
 class _SceneFiles:
     """Writes scenes of the group of fields: particles and their displacements, springs as lines, cells."""
 
     def __init__(self, tree: xr.DataTree) -> None:
         self.tree, root = tree, tree.to_dataset()
         # Of what a study sweeps, the values whose fields it keeps.
-        swept = last_swept(root.status != 0)
+        swept = shown_swept(tree["fields"].to_dataset(), root)
         names = [name for name in NUMBERS if name in root]
         self.numbers = at(root[names], swept)[names].assign(swept).load()
         self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
+
+    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+        """A scene of some labels in words."""
+        units = {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels}
+        return between.join(label_text(name, label, units[name]) for name, label in labels.items())
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
         """Write the scene of some labels."""

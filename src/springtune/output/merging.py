@@ -8,10 +8,11 @@ from fnmatch import fnmatchcase
 import numpy as np
 import xarray as xr
 
-from .alignment import Axis, axis, cell_text, number_text
+from .alignment import Axis, axis
 from .comparison import MEASURED
 from .flags import NOT_REQUESTED, flag_words, is_flagged, nothing
 from .swept import with_swept
+from .text import cell_text, number_text
 
 SAME_VALUE = 1e-9
 """Values that differ by less, of the larger one, are those of one scene."""
@@ -109,10 +110,13 @@ class _Merger:
 
     def _group(self, path: str, held: dict[int, xr.Dataset]) -> xr.Dataset:
         first = next(iter(held.values()))
-        names = [str(name) for data in held.values() for name in data.variables if name not in data.dims]
         # What a label means comes first: a beam of two lengths is told, not what follows from it.
-        ranks = {name: max(data[name].ndim for data in held.values() if name in data) for name in names}
-        made = {name: self._variable(path, name, held) for name in sorted(ranks, key=lambda name: ranks[name])}
+        ranks: dict[str, int] = {}
+        for data in held.values():
+            for name, variable in data.variables.items():
+                if name not in data.dims:
+                    ranks[str(name)] = max(variable.ndim, ranks.get(str(name), 0))
+        made = {name: self._variable(path, name, held) for name in sorted(ranks, key=ranks.__getitem__)}
         used = dict.fromkeys(str(one) for data in held.values() for one in data.sizes)
         coordinates = {}
         for name in used:
@@ -150,7 +154,7 @@ class _Merger:
         self._check_size(path, name, dims, shape)
         empty, dtype = nothing([*arrays.values()])
         values = np.full(shape, empty, dtype)
-        source = np.full(shape, -1, dtype="int8")
+        source = np.full(shape, -1, dtype="int32")
         for number, array in arrays.items():
             place = np.ix_(*(self.places[path, one, number] for one in dims))
             own = array.transpose(*dims).values.astype(dtype)
@@ -199,10 +203,9 @@ class _Merger:
         two = " and ".join(
             f"{_value(value, units, words)} in {self.names[number]}" for number, value in zip(numbers, values)
         )
-        plain = {one: label if isinstance(label, str) else float(label) for one, label in labels.items()}  # type: ignore[arg-type]
-        at = cell_text(plain, {one: self.axes[path, one] for one in plain})
-        if len(plain) == 1:
-            (one,) = plain
+        at = cell_text(labels, {one: self.axes[path, one].units for one in labels})
+        if len(labels) == 1:
+            (one,) = labels
             raise ValueError(
                 f"{one} '{at}' is two things: {_full(path, name)} is {two}; give one of them another label in its study"
             )

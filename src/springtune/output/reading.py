@@ -232,7 +232,9 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
         A study's dataset with the group ``/fields``.
     **labels : str or float
         Label by dimension: ``beam``, ``mesh_type`` and ``mesh_size`` [m] where there are several; and of ``material``,
-        ``load``, ``definition`` and ``kinematics`` those that shall not stay dimensions.
+        ``load``, ``definition`` and ``kinematics`` those that shall not stay dimensions. Of what a study sweeps, such
+        as ``force`` [N], fields are of one value for each beam, mesh type, material and load: a coordinate of what is
+        returned; another one is refused.
 
     Returns
     -------
@@ -273,9 +275,14 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
 def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Dataset":
     import numpy as np
 
-    from .selection import choose, group
+    from ..problem.parameters import SWEPT
+    from .selection import OF_FIELDS, choose, group
 
     fields = group(data, "fields")
+    # Of what is swept, fields are of one value each; the values of the scenes are no coordinates of theirs.
+    swept = [name for name in SWEPT if f"{OF_FIELDS}{name}" in fields]
+    asked = {name: labels.pop(name) for name in swept if name in labels}
+    fields = fields.drop_vars(swept, errors="ignore")
     if SPRING_NODES not in fields:
         raise ValueError(
             f"group '/fields' has no '{SPRING_NODES}': it was made by an older springtune; run the study again"
@@ -291,6 +298,13 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
             )
     chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
     found = fields.sel(labels | chosen).load()
+    for name in swept:
+        kept = found[f"{OF_FIELDS}{name}"]
+        known = np.unique(kept.values[np.isfinite(kept.values)]).tolist()
+        if name in asked and known != [asked[name]]:
+            listed = ", ".join(map(repr, known)) or "none"
+            raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
+        found = found.assign_coords({name: kept}).drop_vars(f"{OF_FIELDS}{name}")
     for name, dimension in (("x", "particle"), (SPRING_NODES, "spring"), (CELL_NODES, "cell")):
         there = found[name].notnull().values.reshape(found.sizes[dimension], -1).any(axis=1)
         found = found.isel({dimension: np.flatnonzero(there)})

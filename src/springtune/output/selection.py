@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..problem.geometry import beam_label
-from ..problem.parameters import SWEPT, shown_order
+from ..problem.parameters import OF_BODIES, SWEPT, shown_order
 
 if TYPE_CHECKING:
     from .dataset import Label
@@ -129,22 +129,29 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
     return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
 
 
-def on_coarsest(present: xr.DataArray) -> xr.DataArray:
-    """Cells on the coarsest mesh of each beam and mesh type.
+OF_FIELDS = "shown_"
+"""First letters of the variables of the group of fields that say of which values of what is swept the fields are."""
+
+
+def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Of what a study sweeps, the values that its whole fields are of.
 
     Parameters
     ----------
-    present : xarray.DataArray of bool
-        Cells that the study has.
+    fields : xarray.Dataset
+        Group of fields.
+    root : xarray.Dataset
 
     Returns
     -------
-    xarray.DataArray of bool
-        Whole fields are kept of these, see `springtune.kinds.scenes.shown`.
+    dict of str to xarray.DataArray
+        As `last_swept`, over ``beam, mesh_type, material, load`` as far as these are dimensions.
     """
-    kept = [name for name in ("beam", "mesh_type", "mesh_size") if name in present.dims]
-    there = present.any([name for name in present.dims if name not in kept])
-    return present & (there.mesh_size == there.mesh_size.where(there).max("mesh_size"))
+    names = [name for name in SWEPT if name in root.dims and f"{OF_FIELDS}{name}" in fields]
+    coordinates = [name for name in root.dims if name in SWEPT]
+    # Nothing is kept of what has no value: any will do.
+    values = {name: fields[f"{OF_FIELDS}{name}"].fillna(root[name].values[0]) for name in names}
+    return {name: value.drop_vars(coordinates, errors="ignore") for name, value in values.items()}
 
 
 def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
@@ -165,15 +172,15 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     if not chosen:
         return data
     found = data.sel(chosen)
-    own = {name: (("material",) if name.startswith("material") else ("beam",)) for name in BODIES if name in found}
+    own = {
+        name: (("material",) if name.startswith("material") else ("beam",))
+        for name in OF_BODIES.values()
+        if name in found
+    }
     for name, dimensions in own.items():  # what belongs to a body is the same under all loads, but for what is swept
         others = [one for one in found[name].dims if one not in dimensions]
         found[name] = found[name].isel(dict.fromkeys(others, -1), drop=True) if others else found[name]
     return found.reset_coords([name for name in chosen if name in found.coords])
-
-
-BODIES = ("material_young_modulus", "material_poisson_ratio", "beam_thickness")
-"""Variables of bodies that may depend on what is swept."""
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:

@@ -1,23 +1,14 @@
 """Parameters that one study sweeps and another one states once: dimensions of both, so that scenes can be matched."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from ..problem.parameters import STATED, SWEPT, UNCHANGED
 from .alignment import SAME_NUMBER
 from .flags import nothing
-
-STATED = {
-    "force": "force",
-    "thickness": "beam_thickness",
-    "young_modulus": "material_young_modulus",
-    "poisson_ratio": "material_poisson_ratio",
-}
-"""Variable that holds a parameter where it is not swept; of a force its size, since the load says the direction."""
-
-UNCHANGED = {"stiffness_scale": 1.0}
-"""What a parameter is where it is not swept, and nothing holds it."""
 
 
 def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
@@ -32,17 +23,23 @@ def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
     list of xarray.DataTree
         The same where nothing is missing; else in memory, each cell at the label that its study states.
     """
-    sweeping: dict[str, xr.DataTree] = {}
-    for tree in trees:
-        for name in (*STATED, *UNCHANGED):
-            if name in tree.dims:
-                sweeping.setdefault(name, tree)
     made = [*trees]
-    for name, example in sweeping.items():
+    for name in SWEPT:
+        sweeping = [tree for tree in trees if name in tree.dims]
+        if not sweeping:
+            continue
+        # No study need have all groups: what a parameter matters to is asked of all.
+        over = {
+            (node.path, str(variable))
+            for tree in sweeping
+            for node in tree.subtree
+            for variable, array in node.data_vars.items()
+            if name in array.dims
+        }
         for number, tree in enumerate(made):
             stated = _stated(tree, name)
             if name not in tree.dims and stated is not None:
-                made[number] = _swept(tree, name, stated, example)
+                made[number] = _swept(tree, name, stated, sweeping[0][name].attrs, over)
     return made
 
 
@@ -54,21 +51,26 @@ def _stated(tree: xr.DataTree, name: str) -> xr.DataArray | None:
     return None if found is None else abs(found)
 
 
-def _swept(tree: xr.DataTree, name: str, stated: xr.DataArray, example: xr.DataTree) -> xr.DataTree:
-    """A dataset with one more dimension, that of the example."""
+def _swept(
+    tree: xr.DataTree,
+    name: str,
+    stated: xr.DataArray,
+    attributes: Mapping[Any, Any],
+    over: Collection[tuple[str, str]],
+) -> xr.DataTree:
+    """A dataset with one more dimension, which the variables `over`, of path and name, have."""
     known = np.unique(stated.values[np.isfinite(stated.values)])
     if not len(known):
         return tree
     labels = known[np.concatenate([[True], np.diff(known) > SAME_NUMBER * known[1:]])]
-    axis = xr.DataArray(labels, dims=name, name=name, attrs=dict(example[name].attrs))
+    axis = xr.DataArray(labels, dims=name, name=name, attrs=dict(attributes))
     here = xr.concat([abs(stated - label) <= SAME_NUMBER * label for label in labels], name).assign_coords({name: axis})
     groups = {}
     for node in tree.subtree:
         data = node.to_dataset()
-        like = example if node.path == "/" else example.children.get(node.path[1:])
         found = data.drop_vars(name, errors="ignore")
         for variable in found.data_vars:
-            if like is None or variable not in like.data_vars or name not in like[str(variable)].dims:
+            if (node.path, str(variable)) not in over:
                 continue
             array = found[variable]
             empty, dtype = nothing([array])

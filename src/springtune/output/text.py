@@ -1,7 +1,7 @@
 """Text for a terminal."""
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from typing import SupportsFloat
 
 from ..problem.parameters import SWEPT, with_unit
@@ -29,6 +29,29 @@ def bytes_text(number: float) -> str:
     return f"{number:.3g} GB"
 
 
+def number_text(number: float, unit: str) -> str:
+    """A number with its unit, lengths in mm.
+
+    Parameters
+    ----------
+    number : float
+    unit : str
+        ``"1"`` where it has none.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
+    ('5 mm', '0.3', '400000 N')
+    """
+    if unit == "m":
+        return f"{1e3 * number:.6g} mm"
+    return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
+
+
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
     """A label of a dimension as people read it.
 
@@ -47,15 +70,20 @@ def label_text(dimension: str, label: object, unit: str = "1") -> str:
     --------
     >>> label_text("mesh_size", 0.005, "m"), label_text("load", "shear"), label_text("friction", 0.2)
     ('5 mm', 'shear', 'friction 0.2')
+    >>> label_text("force", 12345.6, "N"), label_text("gap", 0.001, "m")
+    ('12.3456 kN', 'gap 1 mm')
     """
     if isinstance(label, str) or not isinstance(label, SupportsFloat):
         return str(label)
-    value = float(label)
     if dimension in SWEPT:
-        return with_unit(dimension, value)
-    if unit == "m":
-        return f"{1e3 * value:g} mm"
-    return f"{dimension.replace('_', ' ')} {value:g}{'' if unit == '1' else ' ' + unit}"
+        return with_unit(dimension, float(label), digits=6).replace("\u00a0", " ")
+    said = number_text(float(label), unit)
+    return said if dimension == "mesh_size" else f"{dimension.replace('_', ' ')} {said}"
+
+
+def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
+    """Labels of a cell as people read them, by dimension as the units of numbers are."""
+    return ", ".join(label_text(name, label, units.get(name, "1")) for name, label in labels.items())
 
 
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")

@@ -9,6 +9,19 @@ SWEPT = {
 }
 """What each is, and its unit, by its name in a study and in the dataset."""
 
+OF_BODIES = {
+    "thickness": "beam_thickness",
+    "young_modulus": "material_young_modulus",
+    "poisson_ratio": "material_poisson_ratio",
+}
+"""Variable of a dataset that holds a parameter of beams or materials."""
+
+STATED = {"force": "force", **OF_BODIES}
+"""Variable that holds a parameter where it is not swept; of a force its size, since the load says the direction."""
+
+UNCHANGED = {"stiffness_scale": 1.0}
+"""What a parameter is where it is not swept, and no variable holds it."""
+
 MOST_SCENES = 1_000_000
 """Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
 
@@ -33,7 +46,7 @@ def shown_order(name: str, value: float) -> float:
     return -abs(value - 1) if name == "stiffness_scale" else value
 
 
-def with_unit(name: str, value: float) -> str:
+def with_unit(name: str, value: float, digits: int = 4) -> str:
     r"""A value of a swept parameter as it is read, of words that stay on a line.
 
     Parameters
@@ -42,6 +55,7 @@ def with_unit(name: str, value: float) -> str:
         Key of `SWEPT`.
     value : float
         In SI units.
+    digits : int, optional
 
     Returns
     -------
@@ -53,13 +67,13 @@ def with_unit(name: str, value: float) -> str:
     ('400\xa0kN', 'thickness 2\xa0mm', 'nu\xa0=\xa00.3')
     """
     if name == "force":
-        text = f"{value / 1e3:.4g} kN" if abs(value) >= 1e3 else f"{value:.4g} N"
+        text = f"{value / 1e3:.{digits}g} kN" if abs(value) >= 1e3 else f"{value:.{digits}g} N"
     elif name == "thickness":
-        return f"thickness {1e3 * value:.4g}\u00a0mm"
+        return f"thickness {1e3 * value:.{digits}g}\u00a0mm"
     elif name == "young_modulus":
-        text = f"E = {value / 1e9:.4g} GPa" if value >= 1e9 else f"E = {value / 1e6:.4g} MPa"
+        text = f"E = {value / 1e9:.{digits}g} GPa" if value >= 1e9 else f"E = {value / 1e6:.{digits}g} MPa"
     elif name == "poisson_ratio":
-        text = f"nu = {value:.4g}"
+        text = f"nu = {value:.{digits}g}"
     else:
-        return f"stiffness times\u00a0{value:.4g}"
+        return f"stiffness times\u00a0{value:.{digits}g}"
     return text.replace(" ", "\u00a0")

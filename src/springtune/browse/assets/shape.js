@@ -32,6 +32,21 @@ class Shape {
     for (const name of Object.keys(places))
       if (name in group.dims) at[name] = group.place(name, root.label(name, places[name]));
     if (Object.values(at).some((one) => one < 0)) return { words: "There are no displacement fields of this cell." };
+    // Of what a study sweeps, fields are of one value each.
+    const kept = {};
+    for (const name of Object.keys(places)) {
+      const shown = f[`shown_${name}`]?.of(at);
+      if (Number.isFinite(shown)) kept[name] = root.dims[name].labels.findIndex((one) => Math.abs(one - shown) <= 1e-4 * Math.abs(one));
+    }
+    const others = Object.keys(kept).filter((name) => kept[name] >= 0 && kept[name] !== places[name]);
+    if (others.length) {
+      const values = others.map((name) => `${spoken(name)} ${labelWithUnit(root.dims[name], kept[name])}`).join(", ");
+      return {
+        words: `Of what this study sweeps, displacement fields are kept of ${values}.`,
+        button: element("button", { type: "button", text: `Show ${values}`, onclick: () => this.page.choose({
+          ...places, ...Object.fromEntries(others.map((name) => [name, kept[name]])) }) }),
+      };
+    }
     const trimmed = (field, along, where) => {
       const values = field.along(along, where);
       let end = values.length;

@@ -5,6 +5,7 @@ import xarray as xr
 
 from ...jobs import sealed, store
 from ...output.dataset import NO_NODE, Filler
+from ...output.selection import OF_FIELDS
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
 from ...problem.loads import LOADS
@@ -17,7 +18,7 @@ from . import plan, stored_mesh, stored_reference
 from .outputs import pressed
 from .shown import keeps_fields
 from .stored_scene import PACKED, fields_key, unpacked
-from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, swept
+from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, fields_of, swept
 
 COPIED = (
     "displacement",
@@ -336,12 +337,15 @@ def _fields(study, folder, axes):
         "outline_point": max((len(points) for points, _ in outlines.values()), default=1),
     }
     numbers = {name: tuple(range(length)) for name, length in lengths.items()}
-    fields = Filler(FIELDS.empty(axes | numbers))
+    fields = Filler(fields_of(study).empty(axes | numbers))
     fields.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
     for spec, mesh in meshes.items():
         labels = _mesh_labels(spec)
         fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
         fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
+    for scene in scenes:
+        labels = study.labels(scene)
+        fields.put({f"{OF_FIELDS}{name}": labels[name] for name in study.swept}, **labels)
     for one, (points, displacements) in outlines.items():
         moved = one.force * displacements
         beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}

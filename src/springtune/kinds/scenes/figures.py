@@ -6,7 +6,7 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.dataset import NO_NODE, STATUS
-from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, on_coarsest
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
 from ...problem.loads import LOADS
 from ...problem.parameters import with_unit
 from ..base import distinct
@@ -441,8 +441,9 @@ def plot_deformed(
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
     cut = cut.sel(definition=definition)
-    present = on_coarsest(root.status != 0)  # as they are stored
-    values = last_swept(present.sel(material=selection["material"], load=selection["load"]))
+    values = shown_swept(fields, root)
+    chosen = {one: selection[one] for one in ("material", "load")}
+    values = {name: value.sel(chosen) for name, value in values.items()}
     cut = at(cut, values)
     extents = [_extent(fields.sel(beam=name)) for name in beams]
     room = style.COLUMN - 0.42 - 0.08
@@ -482,9 +483,13 @@ def _extent(fields):
 
 
 def _deformed(panel, fields, root, selection, beam):
-    known = np.isfinite(fields.x.values).any(axis=fields.x.dims.index("particle"))
-    fields = fields.isel(mesh_size=np.flatnonzero(known)[-1] if known.any() else 0)
     load = {"material": selection["material"], "load": selection["load"]}
+    # Of the meshes that this beam has, the one that this load is asked for on.
+    for known in (fields.displacement_x.sel(load), fields.x.where(root.status != 0), fields.x):
+        places = np.flatnonzero(known.notnull().any("particle").values)
+        if len(places):
+            break
+    fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
     rest = 1e3 * np.stack([fields.x.values, fields.y.values], axis=1)
     moved = 1e3 * np.stack([fields.displacement_x.sel(load).values, fields.displacement_y.sel(load).values], axis=1)
     outline = 1e3 * np.stack([fields.outline_x.values, fields.outline_y.values], axis=1)

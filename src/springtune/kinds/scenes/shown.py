@@ -28,7 +28,9 @@ def keeps_fields(study: "Study") -> bool:
 
 
 def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[SceneSpec]":
-    """Scenes on the coarsest mesh of each beam and mesh type; of what is swept each beam, material and load shows one.
+    """Scenes that are shown where not all can be.
+
+    Of each beam, mesh type, material and load those on the coarsest mesh; of what is swept one value of each.
 
     Parameters
     ----------
@@ -42,17 +44,12 @@ def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[S
     frozenset of SceneSpec
     """
     names = tuple(swept)
-    coarsest: dict[tuple[str, str], float] = {}
-    for scene in scenes:
-        place = scene.mesh.beam.name, scene.mesh.mesh_type
-        coarsest[place] = max(coarsest.get(place, 0.0), scene.mesh.mesh_size)
-    last: dict[tuple[str, str, str], list[float]] = {}
-    ranked = []
+    ranks: dict[SceneSpec, tuple[tuple[str, ...], list[float]]] = {}
+    last: dict[tuple[str, ...], list[float]] = {}
     for scene in scenes:
         mesh = scene.mesh
-        if mesh.mesh_size == coarsest[mesh.beam.name, mesh.mesh_type]:
-            body = mesh.beam.name, scene.material.name, scene.load
-            rank = [shown_order(name, swept_value(scene, mesh.beam, name)) for name in names]
-            last[body] = max(last.get(body, rank), rank)
-            ranked.append((scene, body, rank))
-    return frozenset(scene for scene, body, rank in ranked if rank == last[body])
+        body = mesh.beam.name, mesh.mesh_type, scene.material.name, scene.load
+        rank = [mesh.mesh_size, *(shown_order(name, swept_value(scene, mesh.beam, name)) for name in names)]
+        ranks[scene] = body, rank
+        last[body] = max(last.get(body, rank), rank)
+    return frozenset(scene for scene, (body, rank) in ranks.items() if rank == last[body])

@@ -1,10 +1,13 @@
 """Variables of scenes, curves and references: the root of a dataset and its groups."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...output.dataset import NO_NODE, Group
+from ...output.selection import OF_FIELDS
+from ...problem.parameters import OF_BODIES, SWEPT
 
 if TYPE_CHECKING:
     from ...study.model import Study
@@ -115,13 +118,6 @@ SENSITIVITY = Group(
 OF_PRINT = "paper_"
 """First letters of variables of printed cells, which know no parameters but those of `CELL`."""
 
-OWN = {
-    "material_young_modulus": "young_modulus",
-    "material_poisson_ratio": "poisson_ratio",
-    "beam_thickness": "thickness",
-}
-"""Parameters of bodies that a study may sweep."""
-
 
 def swept(group: Group, study: "Study") -> Group:
     """Group whose variables are over what a study sweeps, each over what it depends on.
@@ -138,11 +134,30 @@ def swept(group: Group, study: "Study") -> Group:
     """
     further: dict[str, list[str]] = {}
     for name, (dimensions, *_) in group.variables.items():
-        if name in OWN:
-            further[name] = [one for one in study.swept if one == OWN[name]]
+        if name in OF_BODIES.values():
+            further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
         elif "load" in dimensions and not name.startswith(OF_PRINT):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
     return group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
+
+
+def fields_of(study: "Study") -> Group:
+    """Group of whole fields of a study: of what it sweeps they are of one value each, which the group says.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    Group
+    """
+    place = "beam", "mesh_type", "material", "load"
+    said = {}
+    for name in study.swept:
+        words, unit = SWEPT[name]
+        said[f"{OF_FIELDS}{name}"] = place, unit, f"{words}, of the fields", np.nan
+    return replace(FIELDS, variables=FIELDS.variables | said)
 
 
 FURTHER = (*REFERENCE, "reference")
