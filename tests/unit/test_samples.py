@@ -13,7 +13,7 @@ from scipy import stats
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import kinds, load_study
-from springtune.kinds.samples import designs, stage
+from springtune.kinds.samples import collect, designs, stage
 from springtune.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.kinds.samples.indices import main_effect, sobol_indices
 from springtune.kinds.samples.names import DESIGNS, blocks
@@ -350,6 +350,17 @@ class TestRuns:
         assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
+    def test_particles_are_those_of_the_mesh_type_whatever_was_solved_before(self, tmp_path):
+        types = ("structured", "right", "structured")
+        first, _, third = (
+            networks(tmp_path, ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {name}"))[1][0] for name in types
+        )
+        assert (first["particles"] > 0).all()
+        assert (third["particles"] == first["particles"]).all()
+        sample = load_study(tmp_path / "study.yaml").parts["samples"]
+        _, results = collect._stored(sample, tmp_path / "samples")
+        assert all((found["particles"] == first["particles"]).all() for found in results.values())
+
     def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
         tree, _ = run(("size: 16", "size: 64\n  design: latin-hypercube"))
         assert "sobol" not in tree and "role" not in tree["samples"].coords
@@ -403,11 +414,7 @@ class TestFailures:
         study = load_study(tmp_path / "study.yaml")
         content = sampling().content(study, tmp_path, [(0, 8)])
         block = content["blocks"][0]["key"]
-        stage.lose(content, f"{block} 0 mesh", "not done within 1 s", "limits A")
-
-        class Limited(Spent):
-            limits = "limits A"
-
+        stage.lose(content, f"{block} 0 {content['meshed']}", "not done within 1 s", "limits A")
         stage.run(content, Limited())
         path = tmp_path / "samples" / f"{block}.h5"
         keys = list(content["results"])
@@ -420,6 +427,67 @@ class TestFailures:
         assert not set(keys) & store.stored(path, "limits B")
         stage.run(content, Spent())
         assert (store.read(path, keys, ("status",))[keys[0]]["status"] == Status.SOLVED).all()
+
+    def test_what_was_lost_of_one_mesh_type_is_tried_of_another(self, tmp_path):
+        """Names of lost networks say all that these depend on, the code among it."""
+        names = []
+        for kinematics in ("linear", "nonlinear"):
+            for mesh_type in ("structured", "right"):
+                how = ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {mesh_type}\n  kinematics: {kinematics}")
+                spent = Noting()
+                content, results = networks(tmp_path, how, spent=spent)
+                assert [found["messages"] for found in results] == [{}] * len(results)
+                # As if each network had been lost; meshes are the same of both kinematics.
+                names.append({name for name in spent.names if name.split()[2] != content["meshed"]})
+                for name in names[-1]:
+                    stage.lose(content, name, "not done within 1 s", "")
+        assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
+
+    def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
+        """One row of cells at nu = 0 is a mechanism with area energies, and where it is lies in the last digits."""
+        how = (
+            ("size: 16", "size: 8\n  design: sobol"),
+            ("definition: lattice\n  p", "definition: patch-area\n  p"),
+            (f"mesh_size: {SIZES}", "relative_mesh_size: 1"),
+            ("height: {from: 20 mm, to: 40 mm}", "height: 40 mm"),
+            (RATIOS, "0"),
+        )
+        spent = Spent()
+        _, results = networks(tmp_path, *how, spent=spent)
+        assert not spent.broken
+        status = results[0]["status"]
+        assert set(np.flatnonzero(status != Status.SOLVED)) == set(map(int, results[0]["messages"]))
+        assert 0 < len(results[0]["messages"]) < 8
+
+
+class Limited(Spent):
+    """Tasks within limits of these words."""
+
+    limits = "limits A"
+
+
+class Noting(Spent):
+    """Notes the names of its tasks."""
+
+    def __init__(self):
+        super().__init__()
+        self.names = []
+
+    def attempt(self, key, function, hole):
+        self.names.append(key)
+        return super().attempt(key, function, hole)
+
+
+def networks(folder, *replaced, spent=None):
+    """Content of the networks of a sample of one load and definition, and the results of these."""
+    (folder / "study.yaml").write_text(study_text(*replaced))
+    study = load_study(folder / "study.yaml")
+    sample = study.parts["samples"]
+    content = sampling().content(study, folder, blocks(sample.design, sample.size))
+    stage.run(content, spent or Spent())
+    fields = ("displacement", "status", "particles")
+    found = [store.read(path, [*content["results"]], fields) for path in map(Path, sampling().products(content))]
+    return content, [block[key] for block in found for key in content["results"]]
 
 
 def sampling():

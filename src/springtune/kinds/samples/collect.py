@@ -30,7 +30,8 @@ def groups(study, folder):
     drawn, results = _stored(sample, folder / "samples")
     axes = study.axes | {"sample": tuple(range(sample.rows))}
     data = SAMPLES.empty(axes)
-    data["particles"].values[:] = drawn["particles"]
+    # A network without a mesh has none; that of another definition, solved within other limits, may have one.
+    data["particles"].values[:] = np.max([found["particles"] for found in results.values()], axis=0)
     scenes = _Scenes(sample, study.axes, drawn, data)
     scenes.solved(results)
     scenes.referred(folder / "samples")
@@ -46,7 +47,7 @@ def groups(study, folder):
 
 
 def _stored(sample, folder):
-    """Parameters of all rows, and results by key: displacement, status and messages by row."""
+    """Parameters of all rows, and results by key: displacement, status, particles and messages by row."""
     keys = {plan.result_key(sample, load, name) for load in sample.loads for name in plan.definitions(sample)}
     fields = [*PARAMETERS, "particles", "displacement", "status"]
     parts, messages, before = {DRAWN: []} | {key: [] for key in keys}, {key: {} for key in keys}, 0
@@ -62,8 +63,9 @@ def _stored(sample, folder):
     def joined(key, names):
         return {name: np.concatenate([part[name] for part in parts[key]]) for name in names}
 
-    drawn = joined(DRAWN, [*dict.fromkeys([*sample.parameters, "mesh_size"]), "particles"])
-    return drawn, {key: joined(key, ("displacement", "status")) | {"messages": messages[key]} for key in keys}
+    drawn = joined(DRAWN, dict.fromkeys([*sample.parameters, "mesh_size"]))
+    arrays = ("displacement", "status", "particles")
+    return drawn, {key: joined(key, arrays) | {"messages": messages[key]} for key in keys}
 
 
 class _Scenes:

@@ -36,7 +36,7 @@ def reference_key(sample, kind):
 
 
 def block_key(sample, first, last):
-    """Key of the parameters of some base samples, and stem of the file of their results."""
+    """Key of the parameters of some base samples, and stem of the file of their results on meshes of any type."""
     return hash_of(sample.design, sample.seed, sample.parameters, first, last, stage_key("kinds.samples.designs"))
 
 
@@ -105,6 +105,7 @@ def _content(study, folder, members):
         "parameters": sample.parameters,
         "mesh_type": sample.mesh_type,
         "kinematics": sample.kinematics,
+        "meshed": hash_of(stage_key("kinds.samples.stage"), mesh_type_key(sample.mesh_type)),
         "results": results,
         "blocks": [{"key": block_key(sample, *ends), "first": ends[0], "last": ends[1]} for ends in members],
     }
