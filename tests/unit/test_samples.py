@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from springtune.campaign.orphans import orphans
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import kinds, load_study
@@ -360,6 +361,14 @@ class TestRuns:
         sample = load_study(tmp_path / "study.yaml").parts["samples"]
         _, results = collect._stored(sample, tmp_path / "samples")
         assert all((found["particles"] == first["particles"]).all() for found in results.values())
+
+    def test_files_of_samples_that_nothing_asks_for_are_found(self, tmp_path):
+        (tmp_path / "study.yaml").write_text(study_text())
+        study = load_study(tmp_path / "study.yaml")
+        stage.lose({"folder": tmp_path / "samples"}, "old 0 mesh", "not done within 1 s", "")
+        asked = sampling().products(sampling().content(study, tmp_path, [(0, 8)]))
+        stage.lose({"folder": tmp_path / "samples"}, f"{asked[0].stem} 0 mesh", "not done within 1 s", "")
+        assert orphans(study, tmp_path) == [tmp_path / "samples" / "old.h5"]
 
     def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
         tree, _ = run(("size: 16", "size: 64\n  design: latin-hypercube"))
