@@ -2,6 +2,7 @@
 
 import contextlib
 import shutil
+import tracemalloc
 from math import prod
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from springtune.campaign.orphans import orphans
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import kinds, load_study
-from springtune.kinds.samples import collect, designs, stage
+from springtune.kinds.samples import collect, designs, indices, stage
 from springtune.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.kinds.samples.indices import main_effect, sobol_indices
 from springtune.kinds.samples.names import DESIGNS, blocks
@@ -229,6 +230,18 @@ class TestIndices:
         assert (again.first_band == wide.first_band).all()
         ratio = np.diff(wide.total_band, axis=0) / np.diff(narrow.total_band, axis=0)
         assert ((ratio > 2.5) & (ratio < 6)).all()  # 4 but for chance
+
+    def test_bands_need_little_memory_and_are_the_same(self, monkeypatch):
+        values = self.saltelli(self.ishigami, 1 << 14, 3)
+        tracemalloc.start()
+        found = sobol_indices(*values)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert most < 64e6  # all bootstrap samples at once are 131 MB, and as many more as floats
+        monkeypatch.setattr(indices, "DRAWN_TOGETHER", 1 << 62)
+        once = sobol_indices(*values)
+        np.testing.assert_allclose(found.first_band, once.first_band, rtol=1e-12)
+        np.testing.assert_allclose(found.total_band, once.total_band, rtol=1e-12)
 
     @pytest.mark.parametrize("size", [1e-300, 1e300])
     def test_values_of_any_size(self, size):
