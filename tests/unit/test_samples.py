@@ -15,14 +15,16 @@ from springtune.campaign.orphans import orphans
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import kinds, load_study
-from springtune.kinds.samples import collect, designs, indices, stage
+from springtune.kinds.samples import designs, interpolate, stage
 from springtune.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.kinds.samples.indices import main_effect, sobol_indices
-from springtune.kinds.samples.names import DESIGNS, blocks
+from springtune.kinds.samples.names import DESIGNS, MOST_SOLVED, blocks
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
+from springtune.reference.similarity import unit_scales
+from springtune.reference.small_strain import solve_unit
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 from springtune.study.messages import StudyError
@@ -231,17 +233,13 @@ class TestIndices:
         ratio = np.diff(wide.total_band, axis=0) / np.diff(narrow.total_band, axis=0)
         assert ((ratio > 2.5) & (ratio < 6)).all()  # 4 but for chance
 
-    def test_bands_need_little_memory_and_are_the_same(self, monkeypatch):
+    def test_bands_need_little_memory(self):
         values = self.saltelli(self.ishigami, 1 << 14, 3)
         tracemalloc.start()
-        found = sobol_indices(*values)
+        sobol_indices(*values)
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert most < 64e6  # all bootstrap samples at once are 131 MB, and as many more as floats
-        monkeypatch.setattr(indices, "DRAWN_TOGETHER", 1 << 62)
-        once = sobol_indices(*values)
-        np.testing.assert_allclose(found.first_band, once.first_band, rtol=1e-12)
-        np.testing.assert_allclose(found.total_band, once.total_band, rtol=1e-12)
 
     @pytest.mark.parametrize("size", [1e-300, 1e300])
     def test_values_of_any_size(self, size):
@@ -380,9 +378,6 @@ class TestRuns:
         )
         assert (first["particles"] > 0).all()
         assert (third["particles"] == first["particles"]).all()
-        sample = load_study(tmp_path / "study.yaml").parts["samples"]
-        _, results = collect._stored(sample, tmp_path / "samples")
-        assert all((found["particles"] == first["particles"]).all() for found in results.values())
 
     def test_files_of_samples_that_nothing_asks_for_are_found(self, tmp_path):
         (tmp_path / "study.yaml").write_text(study_text())
@@ -489,6 +484,64 @@ class TestFailures:
         status = results[0]["status"]
         assert set(np.flatnonzero(status != Status.SOLVED)) == set(map(int, results[0]["messages"]))
         assert 0 < len(results[0]["messages"]) < 8
+
+
+class TestReferences:
+    """Where aspect ratios and Poisson's ratios have no interpolant within the tolerance of references."""
+
+    PLAIN = ("size: 16", "size: 8\n  design: sobol")
+
+    @staticmethod
+    def without(folder, *replaced):
+        """Store what a build that is not certified stores; the task and the file."""
+        (folder / "study.yaml").write_text(study_text(*replaced))
+        study = load_study(folder / "study.yaml")
+        stage = next(one for kind in kinds() for one in kind.stages if one.name == "interpolate")
+        content = stage.content(study, folder / "samples_of", [LOADS["traction"].kind])
+        (path,) = stage.products(content)
+        store.add(path, {path.stem: {"message": "no interpolant", "seconds": 0.0, "asked": 0}})
+        return content, path
+
+    def collected(self, folder, monkeypatch, *replaced):
+        """Group ``/samples`` of one without an interpolant, and the summary."""
+        _, path = self.without(folder, *replaced)
+        monkeypatch.chdir(folder)
+        (folder / "references").mkdir()
+        shutil.copy(path, "references")
+        tree, campaign = run(*replaced)
+        data = tree["samples"].to_dataset().sel(load="traction", definition="lattice")
+        return data, (campaign.folder / "summary.txt").read_text()
+
+    def test_those_of_a_small_sample_are_solved_one_by_one(self, tmp_path, monkeypatch):
+        data, summary = self.collected(tmp_path, monkeypatch, self.PLAIN)
+        assert (data.reference_error_estimate <= 1e-4).all() and (data.reference_applies == 1).all()
+        assert data.deformation_error.notnull().all() and data.reference_message.item() == ""
+        one = data.isel(sample=5)
+        kind = LOADS["traction"].kind
+        alone = solve_unit(float(one.length / one.height), float(one.poisson_ratio), kind)
+        _, scale = unit_scales(one, one, kind)
+        assert float(one.reference_displacement) == pytest.approx(float(one.force * scale) * alone.displacement)
+        assert "without a reference" not in summary
+
+    def test_those_of_a_large_one_are_holes_that_the_summary_tells_of(self, tmp_path, monkeypatch):
+        """Of one network: all that varies is the force."""
+        fixed = ((LENGTHS, "80 mm"), ("{from: 20 mm, to: 40 mm}", "40 mm"), (SIZES, "20 mm"), (RATIOS, "0.3"))
+        size = ("size: 16", f"size: {2 * MOST_SOLVED}\n  design: sobol")
+        data, summary = self.collected(tmp_path, monkeypatch, *fixed, size)
+        assert data.deformation_error.isnull().all() and (data.reference_applies == 0).all()
+        assert "no interpolant; up to 1024 points they would be solved one by one" in data.reference_message.item()
+        assert "samples without a reference, and so without an error: 2048 of 2048\n" in summary
+        assert data.reference_message.item() in summary
+
+    def test_one_reference_beyond_its_limits_is_a_hole_of_its_points(self, tmp_path):
+        content, path = self.without(tmp_path, self.PLAIN)
+        spent = Noting()
+        interpolate.run(content, spent)
+        assert len(spent.names) == 8
+        before = store.read(path, store.stored(path))
+        interpolate.lose(content, spent.names[3], "not done within 1 s", "")
+        after = store.read(path, store.stored(path))
+        assert [key for key in after if after[key] != before[key]] == [spent.names[3]]
 
 
 class Limited(Spent):
