@@ -2,6 +2,7 @@
 
 import contextlib
 import shutil
+import tracemalloc
 from math import prod
 from pathlib import Path
 
@@ -10,17 +11,20 @@ import pytest
 import xarray as xr
 from scipy import stats
 
+from springtune.campaign.orphans import orphans
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import kinds, load_study
-from springtune.kinds.samples import designs, stage
+from springtune.kinds.samples import designs, interpolate, stage
 from springtune.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.kinds.samples.indices import main_effect, sobol_indices
-from springtune.kinds.samples.names import DESIGNS, blocks
+from springtune.kinds.samples.names import DESIGNS, MOST_SOLVED, blocks
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
+from springtune.reference.similarity import unit_scales
+from springtune.reference.small_strain import solve_unit
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 from springtune.study.messages import StudyError
@@ -137,6 +141,15 @@ class TestDesigns:
         for name, values in together.items():
             assert np.concatenate([part[name] for part in parts]).tobytes() == values.tobytes()
 
+    def test_tasks_of_a_hypercube_share_its_points(self, monkeypatch):
+        """Drawn from its first point for each of 262 tasks, a sample of 2^17 took minutes."""
+        drawn = []
+        default_rng = np.random.default_rng
+        monkeypatch.setattr(np.random, "default_rng", lambda seed: drawn.append(seed) or default_rng(seed))
+        for ends in blocks("latin-hypercube", 4096)[-4:]:
+            designs.draw("latin-hypercube", 77, self.PARAMETERS, *ends)
+        assert len(drawn) == len(set(map(tuple, drawn))) == 13  # once for each doubling
+
     @pytest.mark.parametrize("design", DESIGNS)
     def test_tasks_of_half_the_size_are_the_first_ones(self, design):
         for size in (8, 64, 512, 4096):
@@ -219,6 +232,14 @@ class TestIndices:
         assert (again.first_band == wide.first_band).all()
         ratio = np.diff(wide.total_band, axis=0) / np.diff(narrow.total_band, axis=0)
         assert ((ratio > 2.5) & (ratio < 6)).all()  # 4 but for chance
+
+    def test_bands_need_little_memory(self):
+        values = self.saltelli(self.ishigami, 1 << 14, 3)
+        tracemalloc.start()
+        sobol_indices(*values)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert most < 64e6  # all bootstrap samples at once are 131 MB, and as many more as floats
 
     @pytest.mark.parametrize("size", [1e-300, 1e300])
     def test_values_of_any_size(self, size):
@@ -350,6 +371,22 @@ class TestRuns:
         assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
+    def test_particles_are_those_of_the_mesh_type_whatever_was_solved_before(self, tmp_path):
+        types = ("structured", "right", "structured")
+        first, _, third = (
+            networks(tmp_path, ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {name}"))[1][0] for name in types
+        )
+        assert (first["particles"] > 0).all()
+        assert (third["particles"] == first["particles"]).all()
+
+    def test_files_of_samples_that_nothing_asks_for_are_found(self, tmp_path):
+        (tmp_path / "study.yaml").write_text(study_text())
+        study = load_study(tmp_path / "study.yaml")
+        stage.lose({"folder": tmp_path / "samples"}, "old 0 mesh", "not done within 1 s", "")
+        asked = sampling().products(sampling().content(study, tmp_path, [(0, 8)]))
+        stage.lose({"folder": tmp_path / "samples"}, f"{asked[0].stem} 0 mesh", "not done within 1 s", "")
+        assert orphans(study, tmp_path) == [tmp_path / "samples" / "old.h5"]
+
     def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
         tree, _ = run(("size: 16", "size: 64\n  design: latin-hypercube"))
         assert "sobol" not in tree and "role" not in tree["samples"].coords
@@ -403,11 +440,7 @@ class TestFailures:
         study = load_study(tmp_path / "study.yaml")
         content = sampling().content(study, tmp_path, [(0, 8)])
         block = content["blocks"][0]["key"]
-        stage.lose(content, f"{block} 0 mesh", "not done within 1 s", "limits A")
-
-        class Limited(Spent):
-            limits = "limits A"
-
+        stage.lose(content, f"{block} 0 {content['meshed']}", "not done within 1 s", "limits A")
         stage.run(content, Limited())
         path = tmp_path / "samples" / f"{block}.h5"
         keys = list(content["results"])
@@ -420,6 +453,125 @@ class TestFailures:
         assert not set(keys) & store.stored(path, "limits B")
         stage.run(content, Spent())
         assert (store.read(path, keys, ("status",))[keys[0]]["status"] == Status.SOLVED).all()
+
+    def test_what_was_lost_of_one_mesh_type_is_tried_of_another(self, tmp_path):
+        """Names of lost networks say all that these depend on, the code among it."""
+        names = []
+        for kinematics in ("linear", "nonlinear"):
+            for mesh_type in ("structured", "right"):
+                how = ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {mesh_type}\n  kinematics: {kinematics}")
+                spent = Noting()
+                content, results = networks(tmp_path, how, spent=spent)
+                assert [found["messages"] for found in results] == [{}] * len(results)
+                # As if each network had been lost; meshes are the same of both kinematics.
+                names.append({name for name in spent.names if name.split()[2] != content["meshed"]})
+                for name in names[-1]:
+                    stage.lose(content, name, "not done within 1 s", "")
+        assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
+
+    def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
+        """One row of cells at nu = 0 is a mechanism with area energies, and where it is lies in the last digits."""
+        how = (
+            ("size: 16", "size: 8\n  design: sobol"),
+            ("definition: lattice\n  p", "definition: patch-area\n  p"),
+            (f"mesh_size: {SIZES}", "relative_mesh_size: 1"),
+            ("height: {from: 20 mm, to: 40 mm}", "height: 40 mm"),
+            (RATIOS, "0"),
+        )
+        spent = Spent()
+        _, results = networks(tmp_path, *how, spent=spent)
+        assert not spent.broken
+        status = results[0]["status"]
+        assert set(np.flatnonzero(status != Status.SOLVED)) == set(map(int, results[0]["messages"]))
+        assert 0 < len(results[0]["messages"]) < 8
+
+
+class TestReferences:
+    """Where aspect ratios and Poisson's ratios have no interpolant within the tolerance of references."""
+
+    PLAIN = ("size: 16", "size: 8\n  design: sobol")
+
+    @staticmethod
+    def without(folder, *replaced):
+        """Store what a build that is not certified stores; the task and the file."""
+        (folder / "study.yaml").write_text(study_text(*replaced))
+        study = load_study(folder / "study.yaml")
+        stage = next(one for kind in kinds() for one in kind.stages if one.name == "interpolate")
+        content = stage.content(study, folder / "samples_of", [LOADS["traction"].kind])
+        (path,) = stage.products(content)
+        store.add(path, {path.stem: {"message": "no interpolant", "seconds": 0.0, "asked": 0}})
+        return content, path
+
+    def collected(self, folder, monkeypatch, *replaced):
+        """Group ``/samples`` of one without an interpolant, and the summary."""
+        _, path = self.without(folder, *replaced)
+        monkeypatch.chdir(folder)
+        (folder / "references").mkdir()
+        shutil.copy(path, "references")
+        tree, campaign = run(*replaced)
+        data = tree["samples"].to_dataset().sel(load="traction", definition="lattice")
+        return data, (campaign.folder / "summary.txt").read_text()
+
+    def test_those_of_a_small_sample_are_solved_one_by_one(self, tmp_path, monkeypatch):
+        data, summary = self.collected(tmp_path, monkeypatch, self.PLAIN)
+        assert (data.reference_error_estimate <= 1e-4).all() and (data.reference_applies == 1).all()
+        assert data.deformation_error.notnull().all() and data.reference_message.item() == ""
+        one = data.isel(sample=5)
+        kind = LOADS["traction"].kind
+        alone = solve_unit(float(one.length / one.height), float(one.poisson_ratio), kind)
+        _, scale = unit_scales(one, one, kind)
+        assert float(one.reference_displacement) == pytest.approx(float(one.force * scale) * alone.displacement)
+        assert "without a reference" not in summary
+
+    def test_those_of_a_large_one_are_holes_that_the_summary_tells_of(self, tmp_path, monkeypatch):
+        """Of one network: all that varies is the force."""
+        fixed = ((LENGTHS, "80 mm"), ("{from: 20 mm, to: 40 mm}", "40 mm"), (SIZES, "20 mm"), (RATIOS, "0.3"))
+        size = ("size: 16", f"size: {2 * MOST_SOLVED}\n  design: sobol")
+        data, summary = self.collected(tmp_path, monkeypatch, *fixed, size)
+        assert data.deformation_error.isnull().all() and (data.reference_applies == 0).all()
+        assert "no interpolant; up to 1024 points they would be solved one by one" in data.reference_message.item()
+        assert "samples without a reference, and so without an error: 2048 of 2048\n" in summary
+        assert data.reference_message.item() in summary
+
+    def test_one_reference_beyond_its_limits_is_a_hole_of_its_points(self, tmp_path):
+        content, path = self.without(tmp_path, self.PLAIN)
+        spent = Noting()
+        interpolate.run(content, spent)
+        assert len(spent.names) == 8
+        before = store.read(path, store.stored(path))
+        interpolate.lose(content, spent.names[3], "not done within 1 s", "")
+        after = store.read(path, store.stored(path))
+        assert [key for key in after if after[key] != before[key]] == [spent.names[3]]
+
+
+class Limited(Spent):
+    """Tasks within limits of these words."""
+
+    limits = "limits A"
+
+
+class Noting(Spent):
+    """Notes the names of its tasks."""
+
+    def __init__(self):
+        super().__init__()
+        self.names = []
+
+    def attempt(self, key, function, hole):
+        self.names.append(key)
+        return super().attempt(key, function, hole)
+
+
+def networks(folder, *replaced, spent=None):
+    """Content of the networks of a sample of one load and definition, and the results of these."""
+    (folder / "study.yaml").write_text(study_text(*replaced))
+    study = load_study(folder / "study.yaml")
+    sample = study.parts["samples"]
+    content = sampling().content(study, folder, blocks(sample.design, sample.size))
+    stage.run(content, spent or Spent())
+    fields = ("displacement", "status", "particles")
+    found = [store.read(path, [*content["results"]], fields) for path in map(Path, sampling().products(content))]
+    return content, [block[key] for block in found for key in content["results"]]
 
 
 def sampling():

@@ -28,7 +28,7 @@ OUTPUT_FILES = {
 
 STORED, STORES = (
     ".h5",
-    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement"},
+    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement", "samples"},
 )
 """Ending of what stages store, see `springtune.jobs.store`, and the folders where they do."""
 

@@ -39,6 +39,10 @@ SCENES = "/"
 """Group of the scenes."""
 
 
+REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
+"""What a group has whose scenes are compared with references of small strain."""
+
+
 def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
     """What became of a study's cells.
 
@@ -56,7 +60,10 @@ def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
     """
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
-    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES]), *_unreferenced(groups[SCENES])]
+    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES])]
+    for name, data in groups.items():
+        if REFERRED <= set(data):
+            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
     holes = [(what, found, lost) for what, found, lost in states if lost]
     for what, found, lost in holes:
         for status, cells in lost.items():
@@ -149,7 +156,7 @@ def _worst(root: "xr.Dataset") -> Iterator[str]:
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
 
 
-def _unreferenced(root: "xr.Dataset") -> Iterator[str]:
+def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
     """References that are missing or do not apply, each with the scenes that have no error of their own for it."""
     requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
     for scenes, what in (
@@ -165,7 +172,7 @@ def _unreferenced(root: "xr.Dataset") -> Iterator[str]:
         few = few.transpose(*root.reference_message.dims)
         messages = root.reference_message.values
         cells = [(_labels(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
-        yield from ("", f"scenes {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
+        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
 
 
 def ending(study: "Study", plan: Plan, since: float) -> str:

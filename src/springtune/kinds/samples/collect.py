@@ -12,11 +12,12 @@ from ...reference.limits import beyond_linear
 from ...reference.similarity import unit_scales
 from ...springs import DEFINITIONS
 from ...springs.lattice import COEFFICIENT
+from ..scenes import stored_interpolant
 from . import plan
 from .designs import roles
 from .indices import LEVEL, RESAMPLES, main_effect, sobol_indices
-from .interpolate import read as read_reference
-from .names import DROP, PARAMETERS, QUANTITIES, SOBOL_INDICES, blocks
+from .interpolate import problem_key
+from .names import DROP, MOST_SOLVED, PARAMETERS, QUANTITIES, SOBOL_INDICES, blocks
 from .stage import DRAWN
 from .variables import EFFECTS, SAMPLES, SOBOL
 
@@ -30,7 +31,8 @@ def groups(study, folder):
     drawn, results = _stored(sample, folder / "samples")
     axes = study.axes | {"sample": tuple(range(sample.rows))}
     data = SAMPLES.empty(axes)
-    data["particles"].values[:] = drawn["particles"]
+    # A network without a mesh has none; that of another definition, solved within other limits, may have one.
+    data["particles"].values[:] = np.max([found["particles"] for found in results.values()], axis=0)
     scenes = _Scenes(sample, study.axes, drawn, data)
     scenes.solved(results)
     scenes.referred(folder / "samples")
@@ -46,7 +48,7 @@ def groups(study, folder):
 
 
 def _stored(sample, folder):
-    """Parameters of all rows, and results by key: displacement, status and messages by row."""
+    """Parameters of all rows, and results by key: displacement, status, particles and messages by row."""
     keys = {plan.result_key(sample, load, name) for load in sample.loads for name in plan.definitions(sample)}
     fields = [*PARAMETERS, "particles", "displacement", "status"]
     parts, messages, before = {DRAWN: []} | {key: [] for key in keys}, {key: {} for key in keys}, 0
@@ -62,8 +64,9 @@ def _stored(sample, folder):
     def joined(key, names):
         return {name: np.concatenate([part[name] for part in parts[key]]) for name in names}
 
-    drawn = joined(DRAWN, [*dict.fromkeys([*sample.parameters, "mesh_size"]), "particles"])
-    return drawn, {key: joined(key, ("displacement", "status")) | {"messages": messages[key]} for key in keys}
+    drawn = joined(DRAWN, dict.fromkeys([*sample.parameters, "mesh_size"]))
+    arrays = ("displacement", "status", "particles")
+    return drawn, {key: joined(key, arrays) | {"messages": messages[key]} for key in keys}
 
 
 class _Scenes:
@@ -108,22 +111,34 @@ class _Scenes:
         aspects = self.drawn["length"] / self.drawn["height"]
         for load, i in self.loads.items():
             kind = LOADS[load].kind
-            interpolant, why = read_reference(folder, plan.reference_key(self.sample, kind), kind)
-            if interpolant is None:
-                self.of["reference_message"][i] = why
-                continue
-            answers = interpolant.evaluate(aspects, self.drawn["poisson_ratio"])
+            answers, self.of["reference_message"][i] = self._answers(folder, kind, aspects)
             length, scale = unit_scales(body, body, kind)
             self.of["reference_displacement"][:, i] = self.forces[load] * scale * answers.displacement
             self.of["reference_error_estimate"][:, i] = answers.error_estimate
             if self.sample.kinematics == "linear":
-                self.of["reference_applies"][:, i] = 1
+                self.of["reference_applies"][:, i] = np.isfinite(answers.displacement)
                 continue
             per_force = np.abs(self.forces[load]) * scale / length
             pairs = zip((per_force * answers.rotation).tolist(), (per_force * answers.strain).tolist())
-            self.of["reference_applies"][:, i] = [not beyond_linear(*pair) for pair in pairs]
+            self.of["reference_applies"][:, i] = [
+                np.isfinite(pair).all() and not beyond_linear(*pair) for pair in pairs
+            ]
         wanted = self.of["reference_displacement"][:, :, None]
         self.of["deformation_error"][:] = deformation_error(self.of["displacement"], wanted)
+
+    def _answers(self, folder, kind, aspects):
+        """Answers of the unit problem of each row, and why there are none of some."""
+        key, ratios = plan.reference_key(self.sample, kind), self.drawn["poisson_ratio"]
+        interpolant, alone, _, why = stored_interpolant.read(folder, key)
+        if interpolant:
+            return interpolant.evaluate(aspects, ratios), ""
+        if self.sample.rows > MOST_SOLVED:
+            why += f"; up to {MOST_SOLVED} points they would be solved one by one"
+        rows = [alone.get(problem_key(key, *pair), {"message": why}) for pair in zip(aspects, ratios)]
+        names = stored_interpolant.ANSWERS
+        answers = SimpleNamespace(**{name: np.array([row.get(name, np.nan) for row in rows]) for name in names})
+        reasons = [row["message"] for row in rows if row["message"]]
+        return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""
 
     def fitted(self, results):
         """Put the uniform stiffness without an error: that of the uniform network times how much it is too soft."""

@@ -4,6 +4,7 @@ All are extendable: the first half of a sample of twice the size is the sample, 
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from .names import FIRST_ROLES, SOBOL_INDICES, rows_each
 
 
-def points(design: str, size: int, dimensions: int, seed: int) -> np.ndarray:
+def points(design: str, size: int, dimensions: int, seed: int, first: int = 0, last: int | None = None) -> np.ndarray:
     """Points of the unit cube.
 
     Parameters
@@ -22,10 +23,12 @@ def points(design: str, size: int, dimensions: int, seed: int) -> np.ndarray:
         How many: a power of two.
     dimensions : int
     seed : int
+    first, last : int, optional
+        First of them to return, and that after the last one.
 
     Returns
     -------
-    ndarray of float, shape (size, dimensions)
+    ndarray of float, shape (last - first, dimensions)
 
     Notes
     -----
@@ -41,13 +44,16 @@ def points(design: str, size: int, dimensions: int, seed: int) -> np.ndarray:
     (True, True)
     """
     if design == "latin-hypercube":
-        return _latin_hypercube(size, dimensions, seed)
+        return _latin_hypercube(size, dimensions, seed)[first:last].copy()
     from scipy.stats import qmc  # here: it costs half a second
 
     engine = qmc.Sobol(dimensions, scramble=True, seed=np.random.default_rng(seed))
-    return np.asarray(engine.random(size))
+    if first:
+        engine.fast_forward(first)
+    return np.asarray(engine.random((size if last is None else last) - first))
 
 
+@lru_cache(maxsize=1)  # all tasks of a sample ask for parts of the same points
 def _latin_hypercube(size: int, dimensions: int, seed: int) -> np.ndarray:
     found = np.random.default_rng([seed, 0]).random((1, dimensions))
     while len(found) < size:
@@ -156,7 +162,7 @@ def draw(
     names = varied(parameters)
     count, pair = len(names), design == SOBOL_INDICES
     size = 1 << (last - 1).bit_length()  # a power of two
-    shares = points(design, size, count * (2 if pair else 1), seed)[first:last]
+    shares = points(design, size, count * (2 if pair else 1), seed, first, last)
     rows = rows_each(design, count)
     table = np.repeat(shares[:, None, :count], rows, axis=1)
     if pair:

@@ -12,6 +12,9 @@ LEVEL = 0.95
 
 BOOTSTRAP_SEED = 0
 
+DRAWN_TOGETHER = 1 << 21
+"""Most numbers of base samples, of all bootstrap samples that are drawn together: 16 MB of them."""
+
 NEGLIGIBLE = 1e-12
 """Standard deviation over the largest value up to which a quantity does not vary: what varies is rounding."""
 
@@ -87,8 +90,12 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     terms = np.concatenate([at_b * (at_ab - at_a), 0.5 * (at_a - at_ab) ** 2, [(at_a + at_b) / 2],
                             [(at_a**2 + at_b**2) / 2]])  # fmt: skip
     random = np.random.default_rng(BOOTSTRAP_SEED)
-    drawn = np.stack([np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in range(RESAMPLES)])
-    means = np.concatenate([terms.mean(axis=1)[None], drawn @ terms.T / rows])
+    parts, together = [terms.mean(axis=1)[None]], max(1, DRAWN_TOGETHER // rows)
+    for begin in range(0, RESAMPLES, together):
+        resamples = range(begin, min(begin + together, RESAMPLES))
+        drawn = [np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in resamples]
+        parts.append(np.array(drawn, dtype=float) @ terms.T / rows)
+    means = np.concatenate(parts)
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
     ends = np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
     return Indices(found[0, :count], found[0, count:], ends[:, :count], ends[:, count:], rows)

@@ -1,15 +1,15 @@
-"""Stage `interpolate`: the references of all beams of a sample, as one function of aspect and Poisson's ratio."""
+"""Stage `interpolate`: the references of all beams of a sample, as one function of aspect and Poisson's ratio.
 
-import time
-from collections.abc import Mapping
-from functools import partial
+Where no such function is good enough the references of a small sample are solved one by one.
+"""
+
 from pathlib import Path
 from typing import Any
 
 from ...jobs import store
 from ...jobs.spent import Spent
-from ...problem.loads import LOAD_KINDS, LoadKind
-from ...reference.interpolant import Interpolant, NotCertifiedError
+from ..scenes import stored_interpolant
+from .designs import draw
 
 
 def run(tasks: dict[str, Any], spent: Spent) -> None:
@@ -18,49 +18,39 @@ def run(tasks: dict[str, Any], spent: Spent) -> None:
     Parameters
     ----------
     tasks : dict
-        ``folder`` and ``references``, each with ``key``, ``kind`` (of load, by name), ``aspect_range`` and
-        ``nu_range``.
+        ``folder``; ``references``, each with ``key``, ``kind`` (of load, by name) and ``box`` (of aspect ratios and
+        Poisson's ratios); and ``sample`` where references may be solved one by one: ``design, seed, parameters,
+        first, last`` as `springtune.kinds.samples.designs.draw` takes them.
     spent : Spent
         What tasks cost is added to it.
     """
-    for path, task in store.missing(tasks["folder"], tasks["references"], spent.limits):
-        begin = time.perf_counter()
-        result = spent.attempt(task["key"], partial(_built, task), _hole)
-        if result is not None:
-            store.add(path, {task["key"]: result})
-            spent.add("interpolant", 0, time.perf_counter() - begin)
+    pairs = set()
+    if tasks["sample"]:
+        drawn = draw(**tasks["sample"])
+        pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
+    for task in tasks["references"]:
+        problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
+        path = Path(tasks["folder"]) / f"{task['key']}.h5"
+        stored_interpolant.make(path, task | {"problems": problems}, spent)
 
 
 def lose(tasks: dict[str, Any], key: str, why: str, limits: str) -> None:
-    """Store that an interpolant is beyond its limits; parameters as of other stages."""
-    store.lose(tasks["folder"], key, _hole(why), limits)
+    """Store that a reference or an interpolant is beyond its limits; parameters as of other stages."""
+    path = Path(tasks["folder"]) / f"{key.partition(' ')[0]}.h5"
+    store.add(path, {key: stored_interpolant.hole(why) | {store.LIMITS: limits}})
 
 
-def _hole(why: str) -> dict[str, Any]:
-    return {"message": why}
-
-
-def _built(task: Mapping[str, Any]) -> dict[str, Any]:
-    try:
-        found = Interpolant.build(LOAD_KINDS[task["kind"]], task["aspect_range"], task["nu_range"])
-    except NotCertifiedError as error:
-        return _hole(str(error))
-    return found.arrays() | {"message": ""}
-
-
-def read(folder: str | Path, key: str, kind: LoadKind) -> tuple[Interpolant | None, str]:
-    """Interpolant of a stored result, and why there is none.
+def problem_key(reference: str, aspect_ratio: float, nu: float) -> str:
+    """Key of a reference that is solved by itself, in the file of the interpolant that it lacks.
 
     Parameters
     ----------
-    folder : str or Path
-    key : str
-    kind : LoadKind
+    reference : str
+        Key of the interpolant.
+    aspect_ratio, nu : float
 
     Returns
     -------
-    Interpolant or None
     str
     """
-    found = store.read_one(folder, key, ("values", "aspect_range", "nu_range"))
-    return (None if found["message"] else Interpolant.from_arrays(kind, found)), found["message"]
+    return f"{reference} {float(aspect_ratio)!r} {float(nu)!r}"

@@ -297,7 +297,7 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=lambda study: ["sobol"] if _has_indices(study) else [],
-    costs={"sampled": (0.05, 6e-4), "interpolant": (4.0, 0.0)},
+    costs={"sampled": (0.05, 6e-4)},
 )
 
 

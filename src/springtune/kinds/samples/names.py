@@ -47,6 +47,9 @@ SMALLEST_SIZE = 8
 BASE_ROWS = 64
 """Base samples of a task, at most; a task of a design of indices has some hundred rows of them."""
 
+MOST_SOLVED = 1024
+"""Rows of a sample, at most, whose references are solved one by one where they cannot be interpolated."""
+
 PLAIN_ROWS = 512
 """Rows of a task, at most, where a base sample is one row."""
 

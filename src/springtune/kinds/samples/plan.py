@@ -7,7 +7,8 @@ from ...jobs.hashing import hash_of
 from ...jobs.keys import definition_key, mesh_type_key, stage_key
 from ...problem.loads import LOADS
 from ..base import Stage
-from .names import blocks, rows_each
+from ..scenes.interpolated import expected_solves
+from .names import MOST_SOLVED, blocks, rows_each
 
 UNIFORM = "uniform"
 """Definition whose networks tell the best uniform stiffness."""
@@ -32,11 +33,12 @@ def reference_box(sample):
 
 def reference_key(sample, kind):
     """Key of the references of a kind of load, as one function."""
-    return hash_of(kind.name, reference_box(sample), stage_key("kinds.samples.interpolate"))
+    code = stage_key("kinds.samples.interpolate", without=("kinds.samples.designs",))
+    return hash_of(kind.name, reference_box(sample), code)
 
 
 def block_key(sample, first, last):
-    """Key of the parameters of some base samples, and stem of the file of their results."""
+    """Key of the parameters of some base samples, and stem of the file of their results on meshes of any type."""
     return hash_of(sample.design, sample.seed, sample.parameters, first, last, stage_key("kinds.samples.designs"))
 
 
@@ -57,19 +59,22 @@ def result_key(sample, load, definition):
 
 def _reference_members(study, costs):
     sample = study.parts["samples"]
-    kinds = load_kinds(sample) if sample else ()
-    return {kind.name: (costs.of("interpolant"), kind) for kind in kinds}
+    if not sample:
+        return {}
+    seconds = costs.of("interpolant", expected_solves(reference_box(sample)))
+    return {kind.name: (seconds, kind) for kind in load_kinds(sample)}
 
 
 def _references(study, folder, kinds):
     sample = study.parts["samples"]
-    aspect_range, nu_range = reference_box(sample)
+    box, drawn = reference_box(sample), None
+    if sample.rows <= MOST_SOLVED:
+        drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
+        drawn |= {"first": 0, "last": sample.size}
     return {
         "folder": str(folder / "samples"),
-        "references": [
-            {"key": reference_key(sample, kind), "kind": kind.name, "aspect_range": aspect_range, "nu_range": nu_range}
-            for kind in kinds
-        ],
+        "references": [{"key": reference_key(sample, kind), "kind": kind.name, "box": box} for kind in kinds],
+        "sample": drawn,
     }
 
 
@@ -105,6 +110,7 @@ def _content(study, folder, members):
         "parameters": sample.parameters,
         "mesh_type": sample.mesh_type,
         "kinematics": sample.kinematics,
+        "meshed": hash_of(stage_key("kinds.samples.stage"), mesh_type_key(sample.mesh_type)),
         "results": results,
         "blocks": [{"key": block_key(sample, *ends), "first": ends[0], "last": ends[1]} for ends in members],
     }

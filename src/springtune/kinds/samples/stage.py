@@ -40,8 +40,9 @@ def run(tasks, spent):
     ----------
     tasks : dict
         ``folder``, ``design, seed, parameters`` (see `springtune.kinds.samples.designs.draw`), ``mesh_type,
-        kinematics``, ``results``: by key ``kind`` (of load, by name), ``definition`` and for nonlinear kinematics
-        ``sign`` and ``follower``; and ``blocks``, each with ``key`` and ``first`` and ``last`` base sample.
+        kinematics``, ``meshed``, the key of what meshes depend on besides their box, ``results``: by key ``kind`` (of
+        load, by name), ``definition`` and for nonlinear kinematics ``sign`` and ``follower``; and ``blocks``, each with
+        ``key`` and ``first`` and ``last`` base sample.
     spent : Spent
         What tasks cost is added to it.
     """
@@ -53,7 +54,8 @@ def run(tasks, spent):
         if missing or DRAWN not in present:
             lost = {name for name in present if name.startswith(LOST_NETWORK)}
             reasons = store.read(path, lost) if lost else {}
-            waiting.append(_Block(tasks, block, path, missing, {name: reasons[name]["message"] for name in lost}))
+            reasons = {name: reasons[name]["message"] for name in lost}
+            waiting.append(_Block(tasks, block, path, missing, DRAWN not in present, reasons))
     count = TOGETHER[tasks["kinematics"]]
     for begin in range(0, len(waiting), count):
         _solve_together(tasks, waiting[begin : begin + count], spent)
@@ -84,12 +86,14 @@ class _Block:
         File of its results.
     missing : dict
         Results that are not stored.
+    new : bool
+        Whether the parameters are not stored, either.
     lost : dict of str to str
         Networks that went beyond limits before, and what became of them.
     """
 
-    def __init__(self, tasks, block, path, missing, lost):
-        self.key, self.path, self.missing, self.lost = block["key"], path, missing, lost
+    def __init__(self, tasks, block, path, missing, new, lost):
+        self.key, self.path, self.missing, self.new, self.lost = block["key"], path, missing, new, lost
         self.drawn = draw(tasks["design"], tasks["seed"], tasks["parameters"], block["first"], block["last"])
         rows = len(self.drawn["length"])
         self.particles = np.zeros(rows, dtype=np.int64)
@@ -117,12 +121,13 @@ class _Block:
 
     def results(self):
         """What to store."""
-        found = {DRAWN: {**self.drawn, "particles": self.particles}}
+        found = {DRAWN: self.drawn} if self.new else {}
         for key in self.missing:
             found[key] = {
                 "displacement": self.displacement[key],
                 "status": self.status[key],
                 "messages": self.messages[key],
+                "particles": self.particles,  # of the mesh type, which parameters say nothing of
             }
             if self.limited[key]:
                 found[key][store.LIMITS] = self.limited[key]
@@ -154,7 +159,7 @@ def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
         return spent.attempt(key, function, _hole)
 
     # One network at a time: what the one before has left, the next one's symbolic factor is.
-    sheet = attempt("mesh", lambda: Sheet(MESH_TYPES[tasks["mesh_type"]](*box), 1.0, networks=1, like=like))
+    sheet = attempt(tasks["meshed"], lambda: Sheet(MESH_TYPES[tasks["mesh_type"]](*box), 1.0, networks=1, like=like))
     if not isinstance(sheet, Sheet):
         for key in block.missing if sheet else ():
             block.keep(key, rows, 1.0, sheet)
@@ -165,13 +170,17 @@ def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
     # What deforms a network of E t = 1 as the row's force does the row's.
     loads = drawn["force"][rows] / (drawn["young_modulus"][rows] * drawn["thickness"][rows])
     for key, scene in block.missing.items():
-        if scene["definition"] not in scaling:
-            scaling[scene["definition"]] = _objection(sheet, scene, drawn, rows[0])
-        if scaling[scene["definition"]]:
-            block.keep(key, rows, 1.0, _hole(scaling[scene["definition"]]))
+        definition = scene["definition"]
+        if definition not in scaling:
+            objection = attempt(f"{key} scales", partial(_objection, sheet, scene, drawn, rows[0]))
+            # A sample without an answer objects to nothing: the next one is asked.
+            if isinstance(objection, str):
+                scaling[definition] = objection
+        if scaling.get(definition):
+            block.keep(key, rows, 1.0, _hole(scaling[definition]))
             continue
         for ratio in np.unique(ratios):
-            alike, name = ratios == ratio, f"{scene['kind']} {scene['definition']} {ratio!r}"
+            alike, name = ratios == ratio, f"{key} {float(ratio)!r}"
             if linear:
                 found = attempt(name, partial(_solved, sheet, scene, ratio, 1.0, "linear"))
                 if found:
@@ -179,7 +188,7 @@ def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
                 continue
             for load in np.unique(loads[alike]):
                 solved = partial(_solved, sheet, scene, ratio, scene["sign"] * load, "nonlinear", scene["follower"])
-                found = attempt(f"{name} {load!r}", solved)
+                found = attempt(f"{name} {float(load)!r}", solved)
                 if found:
                     block.keep(key, rows[alike & (loads == load)], 1.0, found)
     return sheet
@@ -190,13 +199,17 @@ def _hole(why, **limits):
 
 
 def _objection(sheet, scene, drawn, row):
-    """Why answers of a definition do not scale as samples make use of; empty where they do, on the mesh of a row."""
+    """Why answers of a definition do not scale as samples make use of; empty where they do, on the mesh of a row.
+
+    None where there is no answer: that is said scene by scene.
+    """
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
     own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
     answers = [_solved(sheet, scene, ratio, load, "linear"), _solved(own, scene, ratio, 1.0, "linear", modulus=modulus)]
     unit, answer = (one["displacement"] for one in answers)
-    # What has no answer says so scene by scene.
-    if not np.isfinite([unit, answer]).all() or abs(unit - answer) <= SCALES * abs(answer):
+    if not np.isfinite([unit, answer]).all():
+        return None
+    if abs(unit - answer) <= SCALES * abs(answer):
         return ""
     return (
         f"{scene['definition']}: answers are not in proportion to force over Young's modulus and thickness, as those "

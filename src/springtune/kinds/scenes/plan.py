@@ -98,7 +98,7 @@ def solved_reference(beam, material, load):
     kind.
     """
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant"))
+    code = stage_key("kinds.scenes.reference", without=("reference.finite_strain", "kinds.scenes.stored_interpolant"))
     key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 

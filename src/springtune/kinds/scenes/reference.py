@@ -12,9 +12,7 @@ from ...problem.geometry import Beam
 from ...problem.loads import LOAD_KINDS
 from ...problem.materials import Material
 from ...reference.small_strain import ReferenceNotConvergedError, solve_unit
-
-REFERENCE_TOLERANCE = 1e-4
-"""Largest error estimate of an interpolant that stands for references that are solved by themselves [1]: theirs."""
+from . import stored_interpolant
 
 
 def run(tasks, spent):
@@ -41,7 +39,7 @@ def run(tasks, spent):
             store.add(path, {task["key"]: result})
             spent.add(kind, 0, result["seconds"])
     for task in tasks.get("interpolants", ()):
-        _interpolant(Path(tasks["folder"]) / f"{task['key']}.h5", task, spent)
+        stored_interpolant.make(Path(tasks["folder"]) / f"{task['key']}.h5", task, spent)
 
 
 def lose(tasks, key, why, limits):
@@ -74,46 +72,6 @@ def _unit(task):
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
-
-
-def _interpolant(path, task, spent):
-    """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it."""
-    if task["key"] not in store.stored(path, spent.limits):
-        begin = time.perf_counter()
-        result = spent.attempt(task["key"], partial(_built, task), _hole)
-        if result is None:
-            return
-        result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
-        store.add(path, {task["key"]: result})
-        spent.add("interpolant", result.get("solves", 0), result["seconds"])
-    known = store.stored(path, spent.limits)
-    if "solves" in store.read(path, [task["key"]])[task["key"]]:
-        return
-    missing = [key for key in task["problems"] if key not in known]
-    # Those that share elements follow each other.
-    with store.Keeper(path) as keeper:
-        for key in sorted(missing, key=task["problems"].get):
-            begin = time.perf_counter()
-            problem = {"problem": (*task["problems"][key], task["kind"])}
-            result = spent.attempt(key, partial(_unit, problem), _hole)
-            if result is None:
-                continue
-            scalars = {name: value for name, value in result.items() if name not in ("x", "y", "displacements")}
-            keeper[key] = scalars | {"seconds": time.perf_counter() - begin}
-            spent.add("interpolant", 1, time.perf_counter() - begin, 0)
-
-
-def _built(task):
-    """An interpolant, within its own tolerance or within that of references; else why there is none."""
-    # Here, since few studies need it.
-    from ...reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError
-
-    for tolerance in (TOLERANCE, REFERENCE_TOLERANCE):
-        try:
-            return Interpolant.build(LOAD_KINDS[task["kind"]], *task["box"], tolerance).arrays() | {"message": ""}
-        except NotCertifiedError as error:
-            why = str(error)
-    return {"message": why}
 
 
 def _finite(task):

@@ -1,16 +1,9 @@
 """Stored references: solutions of unit problems, read at the size of a beam and for a force of 1 N."""
 
-from functools import lru_cache
-from pathlib import Path
-
 from ...jobs import store
-from ...problem.loads import LOAD_KINDS
+from . import stored_interpolant
 
 SCALED = ("displacement", "mean_displacement", "displacements")
-
-
-INTERPOLANT = "interpolant"
-"""What a reference names that is interpolated."""
 
 
 def read(folder, reference, fields=()):
@@ -33,7 +26,7 @@ def read(folder, reference, fields=()):
         What the stage `reference` stored [m, rad, 1], for 1 N; of a reference that did not converge ``message`` and
         ``seconds`` alone. One that is interpolated has no arrays, and ``solves``, the number of solutions behind it.
     """
-    found = _interpolated(folder, reference) if INTERPOLANT in reference else _solved(folder, reference, fields)
+    found = _interpolated(folder, reference) if "interpolant" in reference else _solved(folder, reference, fields)
     scales = dict.fromkeys(SCALED, reference["displacement"]) | dict.fromkeys("xy", reference["length"])
     scales |= dict.fromkeys(("rotation", "strain"), reference["displacement"] / reference["length"])
     return {name: value * scales[name] if name in scales else value for name, value in found.items()}
@@ -45,26 +38,9 @@ def _solved(folder, reference, fields):
 
 def _interpolated(folder, reference):
     """Reference by an interpolant, or solved by itself where there is none."""
-    path = Path(folder) / f"{reference[INTERPOLANT]}.h5"
-    state = path.stat() if path.exists() else None
-    when = (state.st_size, state.st_mtime_ns) if state else None
-    interpolant, results, seconds, why = _opened(path, reference[INTERPOLANT], when)
+    interpolant, results, seconds, why = stored_interpolant.read(folder, reference["interpolant"])
     if interpolant is None:
         return results.get(reference["key"], {"message": why, "seconds": 0.0})
     found = interpolant.evaluate(*reference["problem"])
-    names = ("displacement", "mean_displacement", "rotation", "strain", "error_estimate")
-    values = {name: float(getattr(found, name)) for name in names}
+    values = {name: float(getattr(found, name)) for name in stored_interpolant.ANSWERS}
     return values | {"message": "", "seconds": seconds, "solves": interpolant.solves}
-
-
-@lru_cache(maxsize=8)
-def _opened(path, key, state):
-    """Interpolant of a file in its state, results of unit problems that were solved by themselves, and notes."""
-    arrays = ("aspect_range", "nu_range", "values")
-    results = store.read(path, {key} | (store.stored(path) if state else set()), arrays)
-    known = results.pop(key)
-    if "solves" not in known:
-        return None, results, 0.0, known["message"]
-    from ...reference.interpolant import Interpolant  # here: few studies need it
-
-    return Interpolant.from_arrays(LOAD_KINDS[known["kind"]], known), results, known["seconds"] / known["asked"], ""
