@@ -1,10 +1,16 @@
 """Scenes of a study for ParaView: a collection of those whose fields its dataset has, and a file for each of them."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 from ...output.export import write_scenes
 from .outputs import COLLECTION
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def write(tree, folder):
+
+def write(tree: "xr.DataTree", folder: Path) -> list[Path]:
     """Write the collection and its files.
 
     Parameters
