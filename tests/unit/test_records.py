@@ -166,6 +166,12 @@ class TestRecords:
         record.write_bytes(flipped(record.read_bytes(), 200, 1))
         assert records.fault(record, "digest", products) == f"{record} is damaged"
 
+    def test_what_a_job_made_besides_counts_too(self, made):
+        record, products = made
+        assert records.fault(record, "digest", products[:1]) == ""
+        products[1].unlink()
+        assert records.fault(record, "digest", products[:1]) == f"{products[1]} is missing"
+
     def test_what_could_not_be_made_is_not_missing(self, tmp_path):
         record, never = tmp_path / "done.json", tmp_path / "never.vtu"
         records.write(record, "digest", [never])

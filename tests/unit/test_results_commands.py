@@ -16,11 +16,12 @@ import xarray as xr
 from click.testing import CliRunner
 
 import springtune as st
-from springtune.campaign import locks
+from springtune.campaign import locks, present
 from springtune.campaign.orphans import orphans
 from springtune.cli import main
 from springtune.jobs import sealed
 from springtune.kinds import load_study
+from springtune.kinds.scenes import paraview
 from springtune.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
 from springtune.output import dataset
 
@@ -222,12 +223,43 @@ class TestExport:
         run("export", fields, "--to", fields / "all.pvd", "--force", "--select", "definition=patch")
         assert os.listdir(fields / "all") == [Path(names[1]).name]
 
+    def test_a_scene_has_the_numbers_of_the_force_whose_fields_are_kept(self, fields):
+        """Where a study sweeps the force, which then is a dimension by the name that springs' forces once had."""
+        with st.open(fields) as tree:
+            tree.load()
+        root = tree.to_dataset().drop_vars("force")
+        weaker = xr.DataArray([0.5, 0.0], {"force": [1e3, 2e3]}, "force")
+        root["deformation_error"] = root.deformation_error - weaker
+        root["status"] = root.status.where(root.deformation_error.isnull(), 1)
+        dataset.write(
+            fields / "dataset.nc", {"/": root, "/fields": tree["fields"].to_dataset(inherit=False)}, tree.attrs
+        )
+        assert run("export", fields, "--to", fields / "net.vtu", "--select", "definition=lattice").exit_code == 0
+        net = meshio.read(fields / "net.vtu")
+        assert net.cell_data["force"][0].tolist() == [4, 5, 6]
+        assert net.field_data["deformation_error"] == [0.125] and net.field_data["force_of_the_load"] == [2e3]
+
+    def test_the_output_of_a_study_is_the_same_collection(self, fields):
+        made = present.run(fields / "dataset.nc", fields, "paraview")
+        names = [f"scenes/200x40_free_5mm_steel_bending_{definition}_linear.vtu" for definition in ("lattice", "patch")]
+        assert made == [fields / "paraview" / name for name in ("scenes.pvd", *names)]
+        run("export", fields, "--to", fields / "scenes.pvd")
+        for name in ("scenes.pvd", *names):
+            assert (fields / name).read_bytes() == (fields / "paraview" / name).read_bytes()
+
+    def test_where_nothing_is_solved_the_collection_is_empty(self, fields):
+        with st.open(fields) as tree:
+            tree.load()
+        tree["fields"]["displacement_x"].values[...] = np.nan
+        assert paraview.write(tree, fields / "none") == [Path("scenes.pvd")]
+        assert [path.name for path in (fields / "none").iterdir()] == ["scenes.pvd"]
+
     def test_what_paraview_does_not_get(self, path, fields):
         before = sorted(os.listdir(fields))
         refused(run("export", fields, "--to", fields / "net.vtu"), "2 scenes", "--select one definition", ".pvd")
         refused(run("export", fields, "--to", fields / "net.vtu", "--select", "load=traction"), "no solved scene")
         refused(run("export", fields, "--to", fields / "net.pvd", "--group", "moduli"), "leave --group")
-        refused(run("export", path, "--to", fields / "net.pvd"), "no group '/fields'; add 'deformed'")
+        refused(run("export", path, "--to", fields / "net.pvd"), "no group '/fields'; add 'deformed' or 'paraview'")
         assert sorted(os.listdir(fields)) == before
 
     def test_one_network_is_written_as_a_mesh(self, tmp_path):
@@ -290,7 +322,10 @@ class TestField:
             st.field(tree, beam="200x40", mesh_type="free", mesh_size=5e-3, load="none")
         with pytest.raises(ValueError, match="no dimension 'particle' to choose of|no dimension 'loads'"):
             st.field(tree, loads="none")
-        with st.open(path) as without, pytest.raises(ValueError, match="no group '/fields'; add 'deformed'"):
+        with (
+            st.open(path) as without,
+            pytest.raises(ValueError, match="no group '/fields'; add 'deformed' or 'paraview'"),
+        ):
             st.field(without)
 
 
@@ -317,7 +352,8 @@ class TestClean:
                  "tables/index.html", "notes/mine.txt", "notes/mine.h5",
                  "tasks/bundles.json", "tasks/mesh_0.json", "done/mesh_0.json", "logs/snakemake.log"]  # fmt: skip
         stale = ["meshes/20x10_right_2.5mm.vtu", "meshes/20x10_right_2.5mm.json", "solutions/20x10_right_2.5mm.h5",
-                 "figures/size_right_m_bending.png", "tables/table_9.csv", "references/0123456789.h5",
+                 "figures/size_right_m_bending.png", "paraview/scenes.pvd",
+                 "paraview/scenes/20x10.vtu", "tables/table_9.csv", "references/0123456789.h5",
                  "moduli/patch.h5", "tasks/solve_7.json", "logs/solve_7.log", "dataset.nc.99999999.unfinished",
                  "meshes/20x10_right_5mm.vtu.99999999.unfinished"]  # fmt: skip
         for name in files + stale:
@@ -340,14 +376,14 @@ class TestClean:
         for given in ([], ["config/two.yaml"], ["results/two"]):
             result = run("clean", *given)
             assert result.exit_code == 0, result.stderr
-            assert "results/two: 11 files, 1.1 kB" in result.stdout
+            assert "results/two: 13 files, 1.3 kB" in result.stdout
             assert "  solutions/20x10_right_2.5mm.h5  100 B" in result.stdout
         assert self.there() == before
 
     def test_removes_it_on_request_and_nothing_else(self, left):
         before = self.there()
         result = run("clean", "config/two.yaml", "--remove")
-        assert result.exit_code == 0 and "removed 11 files, 1.1 kB" in result.stdout
+        assert result.exit_code == 0 and "removed 13 files, 1.3 kB" in result.stdout
         assert self.there() == before - left
         assert not Path("results/two/moduli").exists() and Path("results/two/meshes").exists()
         assert "results/two: nothing to remove" in run("clean", "results/two").stdout

@@ -318,7 +318,7 @@ def _places(folder: Path) -> str:
     """Results that are there, those first that are looked at first."""
     files = ("paper.pdf", "index.html", "dataset.nc", "tables/index.html")
     names = [name for name in files if (folder / name).exists()]
-    names += [f"{name}/" for name in ("figures", "tables", "meshes") if (folder / name).is_dir()]
+    names += [f"{name}/" for name in ("figures", "tables", "paraview", "meshes") if (folder / name).is_dir()]
     if "tables/index.html" in names:
         names.remove("tables/")
     return f"{folder}: {', '.join(names)}"

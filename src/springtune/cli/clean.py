@@ -54,7 +54,7 @@ def clean(study: Path | None, remove: bool) -> None:
     for folder, paths in found.items():
         for path in paths:
             path.unlink(missing_ok=True)
-        for parent in {path.parent for path in paths} - {folder}:
+        for parent in sorted({path.parent for path in paths} - {folder}, reverse=True):  # what is deeper comes first
             if not any(parent.iterdir()):
                 parent.rmdir()
     click.echo(f"removed {count} files, {bytes_text(total)}")

@@ -155,6 +155,9 @@ def series(path: str | Path) -> Iterator[Add]:
         raise
     for old in set(before) - set(finished):
         old.unlink(missing_ok=True)
+    if not finished:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def pieces_of(path: str | Path) -> list[Path]:
