@@ -152,6 +152,38 @@ class TestExport:
         assert {row["best_stiffness [N/m]"] for row in rows} == {"170000000.0"}
         assert list(rows[0])[-2:] == ["displacement [m]", "best_stiffness [N/m]"]
 
+    @pytest.mark.parametrize("ending", ["csv", "parquet"])
+    def test_parameters_come_along(self, tmp_path, ending):
+        """Those of samples and refinements are coordinates besides the dimensions, not variables."""
+        error = xr.DataArray([[0.1, 0.2], [0.3, np.nan]], dims=("sample", "load"), coords={"load": ["a", "b"]})
+        height = xr.DataArray([0.02, 0.03], dims="sample", attrs={"units": "m"})
+        group = xr.Dataset(
+            {"error": error, "count": ("sample", [1, 2])}, {"height": height, "role": ("load", ["x", "y"])}
+        )
+        tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "0"}), "/samples": group})
+        tree.to_netcdf(tmp_path / "all.nc")
+
+        def rows(*choice):
+            import pyarrow.parquet
+
+            target = tmp_path / f"one.{ending}"
+            result = run("export", tmp_path / "all.nc", "--group", "samples", "--to", target, "--force", *choice)
+            assert result.exit_code == 0, result.stderr
+            if ending == "parquet":
+                return pyarrow.parquet.read_table(target).to_pylist()
+            return list(csv.DictReader(target.read_text().replace(" [m]", "").splitlines()))
+
+        found = rows()
+        assert list(found[0]) == ["sample", "load", "height", "role", "error", "count"]
+        assert [[float(row[name]) for name in ("height", "error")] for row in found] == [
+            [0.02, 0.1], [0.02, 0.2], [0.03, 0.3],
+        ]  # fmt: skip
+        assert [row["role"] for row in found] == ["x", "y", "x"]
+        assert list(rows("--variables", "error")[0]) == ["sample", "load", "height", "role", "error"]
+        # Of fewer dimensions, those that these have; and one that is asked for is there once.
+        assert list(rows("--variables", "count")[0]) == ["sample", "height", "count"]
+        assert list(rows("--variables", "count,height")[0]) == ["sample", "count", "height"]
+
     def test_parquet_has_units_with_its_columns(self, path, tmp_path):
         import pyarrow.parquet
 

@@ -72,8 +72,9 @@ def table(
     Returns
     -------
     list of Column
-        Flags as words. Cells are those of `status`, where there is one, and rows those that are requested; elsewhere
-        the cells of the variables chosen, and rows those that have a value.
+        Dimensions first, then the coordinates that the cells have besides, such as the parameters of samples, then
+        variables; flags as words. Cells are those of `status`, where there is one, and rows those that are requested;
+        elsewhere the cells of the variables chosen, and rows those that have a value.
 
     Raises
     ------
@@ -93,8 +94,8 @@ def table(
     """
     data = _selected(_group(tree, group), selection or {})
     for name in variables:
-        if name not in data.data_vars:
-            known = nearest(name, sorted(map(str, data.data_vars)))
+        if name not in data.variables or name in data.dims:
+            known = nearest(name, sorted(str(known) for known in data.variables if known not in data.dims))
             raise ValueError(f"variable '{name}': group '{group}' has none of that name; {known}")
     status = data.get("status")
     if variables:
@@ -110,7 +111,9 @@ def table(
         labels = data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[name]))
         columns.append(_column(name, labels, labels.values[place]))
     rows = dict(zip(dimensions, places))
-    for array in chosen:
+    named = {array.name for array in chosen} | set(data.dims)
+    besides = [array for name, array in data.coords.items() if name not in named and set(array.dims) <= set(dimensions)]
+    for array in (*besides, *chosen):
         values = array.values[tuple(rows[str(name)] for name in array.dims)]
         columns.append(_column(str(array.name), array, np.broadcast_to(values, len(places[0]) if places else 1)))
     return columns
