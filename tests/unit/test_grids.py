@@ -198,6 +198,29 @@ class TestCombinations:
         monkeypatch.setenv(MOST_SCENES_VARIABLE, "many")
         assert f"{MOST_SCENES_VARIABLE}: 'many' is not a number of scenes" in refusal()
 
+    def test_what_no_dataset_holds_is_refused_before_it_is_made(self, refusal, monkeypatch):
+        """Whatever number of scenes is allowed."""
+        monkeypatch.setenv(MOST_SCENES_VARIABLE, "1e9")
+        many = {"from": "2 mm", "to": "5 mm", "points": "2000"}
+        message = refusal(mesh_size=many, thickness=many)
+        assert (
+            "4000000 cells of all labels together (2000 mesh_size x 2000 thickness); a dataset has at most" in message
+        )
+        monkeypatch.setenv(MOST_SCENES_VARIABLE, "")  # as if it were not there
+        assert "4000000 scenes" in refusal(mesh_size=many, thickness=many)
+
+    def test_labels_that_are_found_by_one_number_are_one(self, refusal):
+        message = refusal(force=["1 N", "1.0000000001 N"])
+        assert "grids: force has 1.0 and 1.0000000001, which are one label; write them alike" in message
+
+    def test_a_stated_stiffness_is_near_that_of_every_modulus(self, load):
+        stated = "definitions: {paper: {stiffness: [{mesh_type: structured, material: steel, value: 800 N/m}]}}\ngrids:"
+        moduli = {"definition": "paper", "young_modulus": ["1 MPa", "1 GPa"]}
+        with pytest.raises(
+            StudyError, match=r"'800 N/m' cannot be meant: .* 1 mm thick and of 1e\+09 Pa, is 8.66e\+05"
+        ):
+            load(HEAD.replace("grids:", stated), **moduli)
+
 
 class TestRows:
     ROWS = "# measured\nbeam, mesh_size [mm], force\nlong, 5, 1 kN\n\nlong, 10, 2 kN\nshort, 5, 2 kN\n"
@@ -221,6 +244,7 @@ class TestRows:
             ("beam,mesh_size,farce\nlong,5 mm,1 N\n", "rows.csv:1: unknown column 'farce'; did you mean 'force'"),
             ("beam,beam\nlong,long\n", "rows.csv:1: a second column 'beam'"),
             ("beam,mesh_size,force\n", "rows.csv: no rows"),
+            ("beam,mesh_size\nlong,5 mm,1 N\n", "rows.csv:2: 3 values in 2 columns; give one for each"),
             ("", "rows.csv: no rows"),
             ("beam,material\nlong,steel\n", "grids.one.material: 'rows.csv' has a column 'material', too; remove one"),
         ],

@@ -10,7 +10,7 @@ from springtune.campaign.plan import plan
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import kinds, load_study
-from springtune.kinds.scenes import stored_reference
+from springtune.kinds.scenes import any_reference
 from springtune.kinds.scenes.interpolated import box_of, expected_solves, interpolants
 from springtune.kinds.scenes.plan import reference_of, solved_reference
 from springtune.kinds.scenes.summary import summary
@@ -133,14 +133,14 @@ def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     path = tmp_path / "references" / f"{task['key']}.h5"
     path.parent.mkdir(parents=True)
     store.add(path, {task["key"]: {"message": "no interpolant", "seconds": 1.0, "asked": MANY}})
-    before = stored_reference.read(path.parent, references(study)[0])
+    before = any_reference.read(path.parent, references(study)[0])
     assert before == {"message": "no interpolant", "seconds": 0.0}
     run(study, tmp_path, "reference")
-    found = [stored_reference.read(path.parent, one) for one in references(study)]
+    found = [any_reference.read(path.parent, one) for one in references(study)]
     assert all(one["error_estimate"] <= 1e-4 and "solves" not in one for one in found)
     few = load({0: lengths(MANY)[0]})
     run(few, tmp_path / "few", "reference")
-    alone = stored_reference.read(tmp_path / "few" / "references", references(few)[0])
+    alone = any_reference.read(tmp_path / "few" / "references", references(few)[0])
     assert {name: value for name, value in found[0].items() if name != "seconds"} == {
         name: value for name, value in alone.items() if name != "seconds"
     }
@@ -151,4 +151,4 @@ def test_one_that_is_beyond_its_limits_is_a_hole(load, tmp_path):
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
     (task,) = job.content["interpolants"]
     import_module(f"springtune.{job.stage.module}").lose(job.content, task["key"], "too slow", "at most 1 s")
-    assert stored_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"
+    assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"

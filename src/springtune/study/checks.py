@@ -13,8 +13,8 @@ from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from ..problem.quantities import nearest
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
-from .combinations import check_groups, count
-from .config import PLAUSIBLE, StatedStiffness, StudyConfig
+from .combinations import SAME_VALUE, check_groups, count, values_of
+from .config import GRID_PARAMETERS, PLAUSIBLE, StatedStiffness, StudyConfig
 from .messages import Key, Problems
 from .model import Grid, MeshSpec, Reference, SceneSpec
 
@@ -92,7 +92,7 @@ def most_scenes() -> int:
     ValueError
         If the environment gives something else than a whole number above zero.
     """
-    text = os.environ.get(MOST_SCENES_VARIABLE, str(MOST_SCENES))
+    text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
     try:
         found = int(float(text))
     except (ValueError, OverflowError):
@@ -126,6 +126,19 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
             )
             return
         before += number
+    _check_labels(config, problems)
+
+
+def _check_labels(config: StudyConfig, problems: Problems) -> None:
+    """How large the dataset becomes, as far as lists tell before they are expanded."""
+    if any(grid.exclude for grid in config.grids.values()):
+        return  # which may leave labels out
+    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in LABELLED}
+    check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
+
+
+LABELLED = tuple(name for name in GRID_PARAMETERS if name != "pressure")
+"""Parameters of grids that are dimensions, or may be."""
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
@@ -165,6 +178,15 @@ def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, p
         of = f"{config.sensitivity.points} on each of {once} curves"
         most = f"give at most {MOST_CURVE_POINTS}, or set sensitivity: false in grids that need no curves"
         problems.add(("sensitivity", "points"), f"{_counted(points)} points, {of}; {most}")
+
+
+def check_numbers(lists: dict[str, set[Any]], problems: Problems) -> None:
+    """Numbers that are labels must differ by more than what they are found by."""
+    for name, values in lists.items():
+        numbers = sorted(value for value in values if isinstance(value, float))
+        for one, other in zip(numbers, numbers[1:]):
+            if other - one <= SAME_VALUE * other:
+                problems.add(("grids",), f"{name} has {one!r} and {other!r}, which are one label; write them alike")
 
 
 def _counted(count: int) -> str:
@@ -243,13 +265,13 @@ def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Seque
     """Parameters of the definitions against what the grids need of them."""
     _check_kinds(grids, problems)
     stated = {(row.mesh_type, row.material): row.value for row in stated_rows(config)}
-    thicknesses: dict[tuple[str, str], dict[float, None]] = {}
+    sheets: dict[tuple[str, str], dict[tuple[float, float], None]] = {}  # thickness and Young's modulus
     for grid in grids:
         lacking = set()
         for scene in grid.scenes:
             pair = (scene.mesh.mesh_type, scene.material.name)
             if scene.definition == "paper":
-                thicknesses.setdefault(pair, {})[scene.mesh.beam.thickness] = None
+                sheets.setdefault(pair, {})[scene.mesh.beam.thickness, scene.material.young_modulus] = None
                 if pair not in stated and pair not in lacking:
                     lacking.add(pair)
                     example = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
@@ -263,17 +285,18 @@ def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Seque
                 ("grids", grid.name, "definition"),
                 "'calibrated' needs to know on what; add definitions.calibrated with a beam and a load",
             )
-    every = {beam.thickness: None for beam in config.beams.values()}
     for number, row in enumerate(stated_rows(config)):
         modulus = config.materials[row.material].young_modulus
-        for thickness in thicknesses.get((row.mesh_type, row.material), every):
+        every = {(beam.thickness, modulus): None for beam in config.beams.values()}
+        for thickness, modulus in sheets.get((row.mesh_type, row.material), every):
             expected = COEFFICIENT * modulus * thickness
             if not expected / PLAUSIBLE <= row.value <= expected * PLAUSIBLE:
                 written = content["definitions"]["paper"]["stiffness"][number]["value"]
+                other = "" if modulus == config.materials[row.material].young_modulus else f" and of {modulus:.4g} Pa"
                 problems.add(
                     ("definitions", "paper", "stiffness", number, "value"),
-                    f"'{written}' cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick, is "
-                    f"{expected:.4g} N/m; give a stiffness near that, in N/m",
+                    f"'{written}' cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick"
+                    f"{other}, is {expected:.4g} N/m; give a stiffness near that, in N/m",
                 )
                 break
 

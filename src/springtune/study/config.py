@@ -280,7 +280,9 @@ class GridConfig(Section):
     def _one_force(self) -> Self:
         if (self.force is None) == (self.pressure is None):
             both = "both 'force' and 'pressure'; remove one"
-            missing = "'force' is missing; give a force such as '400 kN', or one for each beam"
+            pressed = all(LOADS[load].kind.pressed for load in self.load)
+            remedy = "one for each beam" + (", or 'pressure'" if pressed else "")
+            missing = f"'force' is missing; give a force such as '400 kN', or {remedy}"
             raise refuse(missing if self.force is None else both, *(() if self.force is None else ("pressure",)))
         for load in self.load if self.pressure is not None else ():
             if not LOADS[load].kind.pressed:

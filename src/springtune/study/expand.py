@@ -14,7 +14,7 @@ from ..problem.materials import Material
 from ..problem.parameters import SWEPT
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
-from .checks import check_cells, check_files, mesh_type_names, stated_rows
+from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
 from .combinations import Combination, combinations
 from .config import StudyConfig
 from .fields import RANGE_DIGITS
@@ -270,7 +270,7 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
     for (mesh_type, material), members in groups.items():
         for what, unit, values in (
             ("forces", "N", {abs(force) for _, _, _, force in members}),
-            ("thicknesses", "m", {mesh.beam.thickness for mesh, _, _, _ in members}),
+            ("thicknesses", "mm", {1e3 * mesh.beam.thickness for mesh, _, _, _ in members}),
         ):
             if len(values) > 1 and any((mesh_type, material) == one[:2] for one in needed):
                 listed = ", ".join(f"{value:g} {unit}" for value in sorted(values))
@@ -315,6 +315,7 @@ def build(
     problems.stop()
     names = swept(config)
     used = _used(meshes, scenes, references, names)
+    check_numbers(used, problems)
     check_cells(config, used, bool(curves), problems)
     problems.stop()
     parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}

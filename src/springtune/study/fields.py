@@ -272,7 +272,8 @@ class Values(OneOrMore):
             raise refuse(f"{show(given['points'])} instead of {_COUNT.words}", "points")
         first, last = handler([given["from"], given["to"]])
         if not first < last:
-            raise refuse(f"{show(given['from'])} is not below 'to', {show(given['to'])}; exchange them", "from")
+            remedy = "exchange them" if last < first else "give that one value, or a larger 'to'"
+            raise refuse(f"{show(given['from'])} is not below 'to', {show(given['to'])}; {remedy}", "from")
         if spacing != SPACINGS[0] and not first > 0:
             raise refuse(f"{show(given['from'])} has no logarithm; give a number above zero, or linear spacing", "from")
         return spaced(first, last, points, spacing)

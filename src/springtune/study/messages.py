@@ -85,6 +85,11 @@ class Problems:
         """
         self._places[path] = place
 
+    @property
+    def nothing(self) -> bool:
+        """Whether nothing was found."""
+        return not self._found
+
     def stop(self) -> None:
         """Raise if anything was found.
 

@@ -76,7 +76,7 @@ def _columns(grid: str, path: Path, problems: Problems) -> dict[str, list[tuple[
                     own.add((), f"nothing in column '{name}'; give a value", line)
                 columns[name].append((f"{cell.strip()} {unit}".strip(), line))
     count = max(map(len, columns.values()), default=0)
-    if not count:
+    if not count and own.nothing:
         own.add((), "no rows; give a line of parameters such as beam,mesh_size,force and a line for each combination")
     if count > MOST_LISTED:
         own.add((), f"{count} rows; give at most {MOST_LISTED}, or split the file and the grid into several")

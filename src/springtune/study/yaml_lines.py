@@ -102,9 +102,11 @@ def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         line = f":{mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "unreadable"
-        raise StudyError(
-            f"{file}{line}: not YAML: {problem}; check colons, brackets and indentation of this line and the one above"
-        ) from None
+        remedy = "check colons, brackets and indentation of this line and the one above"
+        lines_of_text = text.splitlines()
+        if mark and mark.line < len(lines_of_text) and "\t" in lines_of_text[mark.line]:
+            remedy = "write spaces in place of the tab in this line"
+        raise StudyError(f"{file}{line}: not YAML: {problem}; {remedy}") from None
     except RecursionError:
         raise StudyError(f"{file}: {_TOO_DEEP}") from None
 

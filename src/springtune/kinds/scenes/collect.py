@@ -14,7 +14,7 @@ from ...reference.field import interpolate, outline
 from ...reference.limits import objection
 from ...springs.lattice import predicted_stiffness
 from ...study.model import Reference
-from . import plan, stored_mesh, stored_reference
+from . import any_reference, plan, stored_mesh
 from .outputs import pressed
 from .shown import keeps_fields
 from .stored_scene import PACKED, fields_key, unpacked
@@ -157,7 +157,7 @@ def _references(study, folder, root):
 
 def _reference(study, folder, one, fields=()):
     reference = plan.reference_of(study, one.beam, one.material, one.load)
-    return stored_reference.read(folder / "references", reference, fields)
+    return any_reference.read(folder / "references", reference, fields)
 
 
 def _scenes(study, folder, root, block, fields, objections):
@@ -196,7 +196,7 @@ def _scenes(study, folder, root, block, fields, objections):
 def _at_particles(study, folder, scene, fields):
     """Displacements of the reference of a scene where its particles are at rest [m]; nothing without a reference."""
     reference = plan.reference_of(study, scene.mesh.beam, scene.material, scene.load)
-    found = stored_reference.read(folder / "references", reference, ["x", "y", "displacements"])
+    found = any_reference.read(folder / "references", reference, ["x", "y", "displacements"])
     if "x" not in found:
         return {}
     places = fields[["x", "y"]].sel(_mesh_labels(scene.mesh))

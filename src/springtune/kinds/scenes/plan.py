@@ -75,7 +75,7 @@ def stem(mesh):
 
 
 def reference_of(study, beam, material, load):
-    """Reference of a beam, material and load, as `springtune.kinds.scenes.stored_reference.read` takes it."""
+    """Reference of a beam, material and load, as `springtune.kinds.scenes.any_reference.read` takes it."""
     solved = solved_reference(beam, material, load)
     name = LOADS[load].kind.name
     box, problems = interpolants(study).get(name, (None, {}))

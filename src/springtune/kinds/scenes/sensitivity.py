@@ -19,8 +19,8 @@ from ...problem.status import Status
 from ...reference.limits import objection
 from ...scene.curve import ending, follow, meeting
 from ...scene.sheet import Sheet
+from . import any_reference as references
 from . import stored_mesh
-from . import stored_reference as references
 
 
 def run(tasks, spent):
@@ -31,7 +31,7 @@ def run(tasks, spent):
     tasks : dict
         ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name`` and
         ``curves``, and each of these with ``key, kind, force, kinematics, stiffnesses, reference`` (see
-        `springtune.kinds.scenes.stored_reference.read`).
+        `springtune.kinds.scenes.any_reference.read`).
     spent : Spent
         What tasks cost is added to it.
     """
