@@ -1,11 +1,20 @@
 """What a study asks for, before anything runs."""
 
+from math import prod
+
 from ...output.text import aligned
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem
 from ...springs import DEFINITIONS
 from ...study.model import SceneSpec, Study
 from .interpolated import expected_solves, interpolants
+
+
+SCENE_DIMENSIONS = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
+"""Dimensions of every dataset."""
+
+SPARSE = 50
+"""So many cells to a scene are worth a word."""
 
 
 def summary(study: Study, further: list[list[object]]) -> str:
@@ -24,12 +33,14 @@ def summary(study: Study, further: list[list[object]]) -> str:
     solutions = _solutions(study)
     networks = _networks(study)
     requested = sum(len(grid.scenes) for grid in study.grids)
+    # Sheets of several thicknesses share a mesh.
+    meshes = len({(one.beam.length, one.beam.height, one.mesh_type, one.mesh_size, one.file) for one in study.meshes})
     users = len(study.scenes) + len(study.curves)
     repeated = requested - len(study.scenes)
     again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
-        ["meshes", len(study.meshes), f"each serves {users / len(study.meshes):.3g} scenes and curves on average"],
+        ["meshes", meshes, f"each serves {users / meshes:.3g} scenes and curves on average"],
         [
             "references",
             len(study.references),
@@ -38,6 +49,9 @@ def summary(study: Study, further: list[list[object]]) -> str:
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
         ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]
+    cells = prod(len(study.axes[name]) for name in (*SCENE_DIMENSIONS, *study.swept))
+    if cells > SPARSE * len(study.scenes):
+        rows.append(["cells", cells, "of all labels together, each held by the dataset: fewer in studies of their own"])
     rows += further
     if study.printed:
         rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
