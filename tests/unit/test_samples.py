@@ -469,6 +469,24 @@ class TestFailures:
                     stage.lose(content, name, "not done within 1 s", "")
         assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
 
+    def test_what_is_solved_before_a_network_is_lost_is_not_solved_again(self, tmp_path):
+        """A process that ends has stored what it had solved, and what follows has the same numbers."""
+        how = ("size: 16", "size: 16\n  design: sobol")
+        _, whole = networks(tmp_path / "whole", how)
+        first = Noting(most=21)
+        with pytest.raises(SystemExit):
+            networks(tmp_path, how, spent=first, kept_back=0.0)
+        second = Noting()
+        content, results = networks(tmp_path, how, spent=second)
+        again = set(first.names[:-1]) & set(second.names)
+        assert len(again) <= 2  # of the mesh that was under way
+        assert len(first.names) == 21
+        for one, other in zip(whole, results, strict=True):
+            for name in ("displacement", "status", "particles"):
+                assert one[name].tobytes() == other[name].tobytes()
+        asked = {path.name for path in sampling().products(content)}
+        assert {path.name for path in (tmp_path / "samples").iterdir()} == asked
+
     def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
         """One row of cells at nu = 0 is a mechanism with area energies, and where it is lies in the last digits."""
         how = (
@@ -551,24 +569,27 @@ class Limited(Spent):
 
 
 class Noting(Spent):
-    """Notes the names of its tasks."""
+    """Notes the names of its tasks, and ends the process at one of them, as limits do."""
 
-    def __init__(self):
+    def __init__(self, most=None):
         super().__init__()
-        self.names = []
+        self.names, self.most = [], most
 
     def attempt(self, key, function, hole):
         self.names.append(key)
+        if len(self.names) == self.most:
+            raise SystemExit
         return super().attempt(key, function, hole)
 
 
-def networks(folder, *replaced, spent=None):
+def networks(folder, *replaced, spent=None, **options):
     """Content of the networks of a sample of one load and definition, and the results of these."""
+    folder.mkdir(exist_ok=True)
     (folder / "study.yaml").write_text(study_text(*replaced))
     study = load_study(folder / "study.yaml")
     sample = study.parts["samples"]
     content = sampling().content(study, folder, blocks(sample.design, sample.size))
-    stage.run(content, spent or Spent())
+    stage.run(content, spent or Spent(), **options)
     fields = ("displacement", "status", "particles")
     found = [store.read(path, [*content["results"]], fields) for path in map(Path, sampling().products(content))]
     return content, [block[key] for block in found for key in content["results"]]
