@@ -393,6 +393,19 @@ class TestRuns:
         assert tree["samples"].sizes["sample"] == 64
         assert tree["effects"].main_effect.sel(quantity="deformation_error", load="traction").notnull().all()
 
+    def test_parameters_that_grids_sweep_too_can_be_selected(self, here):
+        """A coordinate of points must not have the name of a dimension of the grids."""
+        swept = ("force: 1 kN", "force: [1 kN, 2 kN]\n    young_modulus: [1 GPa, 2 GPa]")
+        tree, _ = run(("size: 16", "size: 8\n  design: sobol"), swept)
+        data = tree["samples"].to_dataset()
+        assert data.sample_force.dims == data.sample_young_modulus.dims == data.thickness.dims == ("sample",)
+        assert data.force.dims == ("force",)
+        one = data.sel(load="traction", definition="lattice").isel(sample=3)
+        assert float(one.deformation_error) == data.deformation_error.values[3].item()
+        assert float(one.sample_force) == data.sample_force.values[3]
+        mean = data.mean("sample").deformation_error.sel(load="traction", definition="lattice")
+        assert float(mean) == pytest.approx(data.deformation_error.values.mean())
+
     def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
         one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
         box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
