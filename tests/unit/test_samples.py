@@ -393,6 +393,19 @@ class TestRuns:
         assert tree["samples"].sizes["sample"] == 64
         assert tree["effects"].main_effect.sel(quantity="deformation_error", load="traction").notnull().all()
 
+    def test_parameters_that_grids_sweep_too_can_be_selected(self, here):
+        """A coordinate of points must not have the name of a dimension of the grids."""
+        swept = ("force: 1 kN", "force: [1 kN, 2 kN]\n    young_modulus: [1 GPa, 2 GPa]")
+        tree, _ = run(("size: 16", "size: 8\n  design: sobol"), swept)
+        data = tree["samples"].to_dataset()
+        assert data.sample_force.dims == data.sample_young_modulus.dims == data.thickness.dims == ("sample",)
+        assert data.force.dims == ("force",)
+        one = data.sel(load="traction", definition="lattice").isel(sample=3)
+        assert float(one.deformation_error) == data.deformation_error.values[3].item()
+        assert float(one.sample_force) == data.sample_force.values[3]
+        mean = data.mean("sample").deformation_error.sel(load="traction", definition="lattice")
+        assert float(mean) == pytest.approx(data.deformation_error.values.mean())
+
     def test_best_stiffness_is_where_the_uniform_network_meets_the_reference(self, linear):
         one = linear["samples"].to_dataset().isel(sample=3).sel(load="traction")
         box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
@@ -468,6 +481,24 @@ class TestFailures:
                 for name in names[-1]:
                     stage.lose(content, name, "not done within 1 s", "")
         assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
+
+    def test_what_is_solved_before_a_network_is_lost_is_not_solved_again(self, tmp_path):
+        """A process that ends has stored what it had solved, and what follows has the same numbers."""
+        how = ("size: 16", "size: 16\n  design: sobol")
+        _, whole = networks(tmp_path / "whole", how)
+        first = Noting(most=21)
+        with pytest.raises(SystemExit):
+            networks(tmp_path, how, spent=first, kept_back=0.0)
+        second = Noting()
+        content, results = networks(tmp_path, how, spent=second)
+        again = set(first.names[:-1]) & set(second.names)
+        assert len(again) <= 2  # of the mesh that was under way
+        assert len(first.names) == 21
+        for one, other in zip(whole, results, strict=True):
+            for name in ("displacement", "status", "particles"):
+                assert one[name].tobytes() == other[name].tobytes()
+        asked = {path.name for path in sampling().products(content)}
+        assert {path.name for path in (tmp_path / "samples").iterdir()} == asked
 
     def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
         """One row of cells at nu = 0 is a mechanism with area energies, and where it is lies in the last digits."""
@@ -551,24 +582,27 @@ class Limited(Spent):
 
 
 class Noting(Spent):
-    """Notes the names of its tasks."""
+    """Notes the names of its tasks, and ends the process at one of them, as limits do."""
 
-    def __init__(self):
+    def __init__(self, most=None):
         super().__init__()
-        self.names = []
+        self.names, self.most = [], most
 
     def attempt(self, key, function, hole):
         self.names.append(key)
+        if len(self.names) == self.most:
+            raise SystemExit
         return super().attempt(key, function, hole)
 
 
-def networks(folder, *replaced, spent=None):
+def networks(folder, *replaced, spent=None, **options):
     """Content of the networks of a sample of one load and definition, and the results of these."""
+    folder.mkdir(exist_ok=True)
     (folder / "study.yaml").write_text(study_text(*replaced))
     study = load_study(folder / "study.yaml")
     sample = study.parts["samples"]
     content = sampling().content(study, folder, blocks(sample.design, sample.size))
-    stage.run(content, spent or Spent())
+    stage.run(content, spent or Spent(), **options)
     fields = ("displacement", "status", "particles")
     found = [store.read(path, [*content["results"]], fields) for path in map(Path, sampling().products(content))]
     return content, [block[key] for block in found for key in content["results"]]

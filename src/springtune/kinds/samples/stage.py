@@ -27,13 +27,16 @@ LOST_NETWORK = "lost "
 """Beginning of the names of networks that went beyond the limits."""
 
 TOGETHER = {"linear": 32, "nonlinear": 4}
-"""Tasks whose meshes are sorted together: of more of them more share cells, and more is lost if the machine fails."""
+"""Tasks whose meshes are sorted together: of more of them more share cells."""
+
+PART = "_part"
+"""End of the stem of the file of a task that is not done yet."""
 
 SCALES = 1e-7
 """Largest relative difference of an answer that was scaled from one that was not: they differ by rounding alone."""
 
 
-def run(tasks, spent):
+def run(tasks, spent, kept_back=store.KEPT_BACK):
     """Solve the scenes of a bundle that are not stored yet.
 
     Parameters
@@ -45,6 +48,8 @@ def run(tasks, spent):
         ``key`` and ``first`` and ``last`` base sample.
     spent : Spent
         What tasks cost is added to it.
+    kept_back : float, optional
+        Seconds for which results are in memory alone: those are lost if a network goes beyond its limits.
     """
     waiting = []
     for block in tasks["blocks"]:
@@ -56,9 +61,10 @@ def run(tasks, spent):
             reasons = store.read(path, lost) if lost else {}
             reasons = {name: reasons[name]["message"] for name in lost}
             waiting.append(_Block(tasks, block, path, missing, DRAWN not in present, reasons))
+            waiting[-1].take_up(spent.limits)
     count = TOGETHER[tasks["kinematics"]]
     for begin in range(0, len(waiting), count):
-        _solve_together(tasks, waiting[begin : begin + count], spent)
+        _solve_together(tasks, waiting[begin : begin + count], spent, kept_back)
 
 
 def lose(tasks, key, why, limits):
@@ -101,14 +107,40 @@ class _Block:
         self.status = {key: np.full(rows, Status.FAILED, dtype=np.int8) for key in missing}
         self.messages = {key: {} for key in missing}
         self.limited = dict.fromkeys(missing, "")
-        self.seconds = 0.0
+        self.done = np.zeros(rows, dtype=bool)
+        self.part, self.kept, self.solved, self.seconds = path.with_stem(f"{path.stem}{PART}"), True, 0, 0.0
+
+    def take_up(self, limits):
+        """Go on where a process that ended before the block was done had got to, within the same limits."""
+        if not set(self.missing) <= store.stored(self.part, limits):
+            return
+        found = store.read(self.part, self.missing, ("displacement", "status", "particles", "done"))
+        for key, result in found.items():
+            self.displacement[key], self.status[key] = result["displacement"], result["status"]
+            self.messages[key], self.limited[key] = result["messages"], result["limited"]
+            self.particles = result["particles"]
+        self.done = np.all([result["done"] for result in found.values()], axis=0)
+
+    def keep_part(self):
+        """Store what is known of a block that is not done."""
+        if not self.kept:
+            results = {key: one for key, one in self.results().items() if key != DRAWN}
+            more = {key: {"done": self.done, "limited": self.limited[key]} for key in results}
+            store.add(self.part, {key: one | more[key] for key, one in results.items()})
+            self.kept = True
+
+    def keep_whole(self):
+        """Store the results of a block."""
+        store.add(self.path, self.results())
+        self.part.unlink(missing_ok=True)
 
     def meshes(self):
-        """Rows of each distinct mesh, by its length, height and mesh size [m]."""
+        """Rows of each distinct mesh that are not done, by its length, height and mesh size [m]."""
         found = {}
         boxes = zip(*(self.drawn[name].tolist() for name in ("length", "height", "mesh_size")))
         for row, box in enumerate(boxes):
-            found.setdefault(box, []).append(row)
+            if not self.done[row]:
+                found.setdefault(box, []).append(row)
         return found
 
     def keep(self, key, rows, scale, result):
@@ -134,19 +166,26 @@ class _Block:
         return found
 
 
-def _solve_together(tasks, blocks, spent):
+def _solve_together(tasks, blocks, spent, kept_back):
     """Solve blocks: mesh after mesh, those of as many cells after each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
-    like, scaling = None, {}
+    like, scaling, since = None, {}, time.perf_counter()
     for box, block, rows in meshes:
         begin = time.process_time()  # which a busy machine does not change: bundles are made by it
         like = _solve_mesh(tasks, block, box, np.array(rows), like, scaling, spent) or like
         block.seconds += time.process_time() - begin
+        if spent.broken:
+            continue
+        block.done[rows], block.kept, block.solved = True, False, block.solved + len(rows)
+        if time.perf_counter() > since + kept_back:
+            for one in blocks:
+                one.keep_part()
+            since = time.perf_counter()
     for block in blocks:
         if not spent.broken:
-            store.add(block.path, block.results())
-            spent.add("sampled", len(block.particles) * len(block.missing), block.seconds)
+            block.keep_whole()
+            spent.add("sampled", block.solved * len(block.missing), block.seconds)
 
 
 def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
