@@ -138,8 +138,13 @@ def refinement():
     data = variables(labels, **named, crossing_change=crossing)
     data["tolerance"] = "refinement", [0.01, 0.02]
     data["parameter"] = "refinement", np.array(["mesh_size", "thickness"], dtype=object)
+    scenes = [
+        "100x20, structured mesh, steel, traction 10 kN, nonlinear",
+        "200x40, free mesh 5 mm, rubber, bending 1 N, linear",
+    ]
+    data["scene"] = "refinement", np.array(scenes, dtype=object)
     data["spacing"] = "refinement", np.array(["logarithmic", "linear"], dtype=object)
-    data["values"] = ("refinement", "definition"), np.array([[4, 3], [4, 4]])
+    data["value_count"] = ("refinement", "definition"), np.array([[4, 3], [4, 4]])
     data["crossing_level"] = xr.zeros_like(data.crossing_change)
     data["status"] = xr.ones_like(data.deformation_error, dtype=np.int8)
     data["reference_applies"] = xr.ones_like(data.status)

@@ -27,6 +27,8 @@ class Plot:
         ``"lines"``, ``"points"`` or ``"map"``.
     along : str
         Dimension whose points a line joins, where `x` is a variable.
+    ascending : bool
+        Whether a line joins them in the order of `x`.
     log : str
         Logarithmic axes: ``"x"``, ``"y"`` or ``"xy"``. What is along a logarithmic axis is shown without its sign.
     equal : bool
@@ -43,6 +45,7 @@ class Plot:
     by: str = ""
     shows: Literal["lines", "points", "map"] = "lines"
     along: str = ""
+    ascending: bool = False
     log: Literal["", "x", "y", "xy"] = ""
     equal: bool = False
     beside: tuple[tuple[str, str, str], ...] = ()

@@ -41,7 +41,8 @@ class Explorer {
   possible(plot) {
     const { fields, dims } = this.group;
     const known = (name) => !name || name in fields || name in dims;
-    return plot.value in fields && known(plot.x) && (!plot.by || plot.by in dims) && !this.bare(fields[plot.value]);
+    return plot.value in fields && known(plot.x) && (!plot.by || plot.by in dims) && !this.bare(fields[plot.value])
+      && !(plot.x in fields && this.bare(fields[plot.x]));
   }
 
   bare(field) {
@@ -53,7 +54,7 @@ class Explorer {
     const plot = this.plots[number_];
     this.plot = { ...plot, number: number_ };
     const field = this.group.fields[plot.value];
-    this.chosen = this.fullest(field);
+    this.chosen = this.fullest(field, this.group.fields[plot.x]);
     for (const [name, label] of Object.entries(plot.selection || {})) {
       const place = name in this.group.dims ? this.group.place(name, label) : -1;
       if (place >= 0) this.chosen[name] = place;
@@ -74,13 +75,18 @@ class Explorer {
     this.render();
   }
 
-  // Places of the first value that is there, so that a view does not begin empty.
-  fullest(field) {
+  // Places of the first value that is there, and has a number to stand over, so that a view does not begin empty.
+  fullest(field, over = null) {
     const values = field.unpacked();
+    const places = (flat) => Object.fromEntries(field.dims.map((name) => [name, Math.floor(flat / field.strides[name]) % this.group.dims[name].size]));
     let flat = 0;
+    if (over && !field.place && field.type === "float" && over.dims.every((name) => field.dims.includes(name))) {
+      const both = values.findIndex((one, i) => !Number.isNaN(one) && Number.isFinite(over.of(places(i))));
+      if (both >= 0) return places(both);
+    }
     if (field.place) flat = Math.max(0, field.place.findIndex((one) => one >= 0)) * field.points;
     else flat = Math.max(0, values.findIndex((one) => field.isText ? one >= 0 : field.type === "float" ? !Number.isNaN(one) : one !== 0));
-    return Object.fromEntries(field.dims.map((name) => [name, Math.floor(flat / field.strides[name]) % this.group.dims[name].size]));
+    return places(flat);
   }
 
   dimsOf(plot) {
@@ -170,14 +176,17 @@ class Explorer {
     let hidden = 0;
     for (const i of lines) {
       const places = i === null ? this.chosen : { ...this.chosen, [plot.by]: i };
-      const y = field.along(along, places).map((one) => (logy ? Math.abs(one) : one) * yScale);
-      if (!y.some(Number.isFinite)) continue;
+      let y = field.along(along, places).map((one) => (logy ? Math.abs(one) : one) * yScale), x = xs(places);
+      if (!y.some((one, j) => Number.isFinite(one) && Number.isFinite(x[j]))) continue;
       if (series.length >= MOST_LINES) {
         hidden++;
         continue;
       }
-      const x = xs(places);
-      const words = status?.dims.includes(along) ? status.along(along, places).map((one) => status.meaning(one)) : null;
+      let words = status?.dims.includes(along) ? status.along(along, places).map((one) => status.meaning(one)) : null;
+      if (plot.ascending && xField) {
+        const order = x.map((_, j) => j).filter((j) => Number.isFinite(x[j])).sort((a, b) => x[a] - x[b]);
+        [x, y, words] = [x, y, words].map((own) => own && order.map((j) => own[j]));
+      }
       series.push({
         name: i === null ? "" : labelWithUnit(dims[plot.by], i), x, y, look: look(i ?? 0),
         hollow: words?.map((one) => one !== "solved"), size: sizes > 60 ? 3 : 6,

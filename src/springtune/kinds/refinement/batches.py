@@ -117,7 +117,7 @@ def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple
     Returns
     -------
     places : list of float
-        Ascending, from 0 to 1.
+        From 0 to 1, in the order of their addition: those of a smaller ``rule.most`` come first.
     batches : list of int
         Batch that each came in, from 0.
     errors : list of float
@@ -127,7 +127,7 @@ def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple
     >>> rule = Rule(0.0, 1.0, 3, False, 10.0, 0.1, 100)
     >>> places, batches, errors = refine(rule, lambda values: [value - 0.3 for value in values])
     >>> places, batches
-    ([0.0, 0.25, 0.3125, 0.375, 0.5, 1.0], [0, 1, 3, 2, 0, 0])
+    ([0.0, 0.5, 1.0, 0.25, 0.375, 0.3125], [0, 0, 0, 1, 2, 3])
     """
     known: dict[float, tuple[int, float]] = {}
     wanted, batch = [step / (rule.points - 1) for step in range(rule.points)], 0
@@ -135,8 +135,7 @@ def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple
         errors = solve([rule.value(place) for place in wanted])
         known |= {place: (batch, float(error)) for place, error in zip(wanted, errors)}
         wanted, batch = _halved(rule, known)[: rule.most - len(known)], batch + 1
-    places = sorted(known)
-    return places, [known[place][0] for place in places], [known[place][1] for place in places]
+    return list(known), [batch for batch, _ in known.values()], [error for _, error in known.values()]
 
 
 def _halved(rule: Rule, known: dict[float, tuple[int, float]]) -> list[float]:
@@ -175,7 +174,8 @@ def crossings(rule: Rule, places: Sequence[float], errors: Sequence[float]) -> l
     [(0.0, 0.5, 1.0), (0.5, 1.5, 1.0)]
     """
     found = []
-    for low, high, one, other in zip(places, places[1:], errors, errors[1:]):
+    known = sorted(zip(places, errors))
+    for (low, one), (high, other) in zip(known, known[1:]):
         for level in rule.levels:
             if _crosses(one, other, level):
                 share = (level - one) / (other - one)

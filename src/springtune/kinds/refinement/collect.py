@@ -6,7 +6,7 @@ from ...jobs import store
 from ...output.dataset import Filler
 from . import plan
 from .batches import crossings, refine, value_key
-from .names import SPACINGS
+from .names import SPACINGS, VARIED
 from .variables import COORDINATES, refinement_group
 
 OF_A_VALUE = (
@@ -52,11 +52,21 @@ def _read(one, path):
     return places, batches, results, crossings(one.rule, places, errors)
 
 
+def _scene(one):
+    """What a refinement does not vary, in words."""
+    said = {"mesh_size": f"{one.mesh_type} mesh", "force": one.load}
+    for name, given in (("mesh_size", one.mesh_size), ("force", abs(one.force))):
+        if name != one.parameter:
+            unit, size = VARIED[name].scale(given)
+            said[name] += f" {given / size:.6g} {unit}"
+    return ", ".join((one.beam.name, said["mesh_size"], one.material.name, said["force"], one.kinematics))
+
+
 def _put(one, places, batches, results, where, data):
     labels = {"refinement": one.name, "definition": one.definition}
     about = {"parameter": one.parameter, "tolerance": one.rule.tolerance, "spacing": SPACINGS[one.rule.logarithmic]}
-    data.put(about, refinement=one.name)
-    data.put({"values": len(places), "halved": max(batches)}, **labels)
+    data.put(about | {"scene": _scene(one)}, refinement=one.name)
+    data.put({"value_count": len(places), "halved": max(batches)}, **labels)
     for point, (place, batch) in enumerate(zip(places, batches)):
         value = one.rule.value(place)
         result = results[value]

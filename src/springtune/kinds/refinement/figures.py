@@ -63,22 +63,30 @@ def plot_refinement(data, ax=None, *, refinement=None):
         choose(data.status != 0, refinement=refinement)
         data = data.sel(refinement=[refinement])
     names = data.refinement.values.tolist()
-    figure, axes, flat, height = style.multiples(ax, len(names), min(2, len(names)), 2.35)
-    place = {"left": 0.6, "right": 0.1, "bottom": 0.58, "top": 0.3, "across": 0.14, "down": 0.9}
+    figure, axes, flat, height = style.multiples(ax, len(names), min(2, len(names)), 2.6)
+    place = {"left": 0.6, "right": 0.1, "bottom": 0.58, "top": 0.55, "across": 0.14, "down": 1.15}
     style.arrange(figure, axes, **place)
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
-    for panel, name in zip(flat, names):
-        panel.set_title(name)
+    for panel in flat:
         if panel.get_xscale() == "log":
             style.plain(panel, "x")
     labels.settle(figure, axes, place)
-    for panel, (found, said) in zip(flat, ends):
-        labels.note(panel, labels.wrapped(said, panel.get_window_extent().width / panel.figure.dpi))
+    for panel, name, (found, said) in zip(flat, names, ends):
+        room = panel.get_window_extent().width / panel.figure.dpi
+        labels.note(panel, labels.wrapped(said, room))
+        _entitle(panel, name, labels.wrapped(str(data.scene.sel(refinement=name).item()), room))
         if found:
             labels.name_lines(panel, found)
         else:
             labels.say(panel, "No value has an error: see status and message.")
     return flat
+
+
+def _entitle(panel, name, scene):
+    """Name of a refinement, and below it in smaller letters what is not varied."""
+    panel.annotate(scene, (0, 1), xycoords="axes fraction", xytext=(0, 3), textcoords="offset points",
+                   va="bottom", ha="left", fontsize=labels.SMALL, color="0.25")  # fmt: skip
+    panel.set_title(name, pad=4 + 1.3 * labels.SMALL * labels.lines_of(scene))
 
 
 def _panel(panel, data):
@@ -89,16 +97,21 @@ def _panel(panel, data):
     panel.axhspan(-tolerance, tolerance, color="0.92", zorder=0)
     panel.axhline(0, color="0.45", linewidth=0.8)
     values = data[f"refined_{parameter}"].values
-    name, size = known.scale(values[np.isfinite(values)].max(initial=0.0))
+    logarithmic = str(data.spacing.item()) == SPACINGS[1]
+    there = values[np.isfinite(values)]
+    # Of decades, the unit is that of those in the middle: ticks at both ends are short then.
+    middle = np.sqrt(there.min() * there.max()) if logarithmic and there.size else there.max(initial=0.0)
+    name, size = known.scale(middle)
     unit = f" [{name}]" if name else ""
     panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
-    if str(data.spacing.item()) == SPACINGS[1]:
+    if logarithmic:
         panel.set_xscale("log")
     ends, number, hollow = [], 0, False
     for definition in data.definition.values.tolist():
         cell = data.sel(definition=definition)
-        if not int(cell["values"]):
+        if not cell.value_count:
             continue
+        cell = cell.isel(point=np.argsort(cell[f"refined_{parameter}"].values, kind="stable"))
         x, y = cell[f"refined_{parameter}"].values / size, 100 * cell.deformation_error.values
         there, look = np.isfinite(x) & np.isfinite(y), style.line(number)
         number += 1

@@ -46,8 +46,8 @@ def _read_share(value: str) -> float:
         share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
     except ValueError:
         raise refuse(f"{show(value)} is not a share; give one such as '1 %'") from None
-    if not 0 < share <= 1:
-        raise refuse(f"{show(value)} is out of range; give a share above 0 %, of at most 100 %, such as '1 %'")
+    if not 0 < share < 1:  # a plain 1 is meant as 1 %, as likely as not
+        raise refuse(f"{show(value)} is out of range; give a share above 0 % and below 100 %, such as '1 %'")
     return share
 
 

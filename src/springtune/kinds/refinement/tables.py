@@ -41,8 +41,10 @@ def _cells(data):
     for name in data.refinement.values.tolist():
         for definition in data.definition.values.tolist():
             cell = data.sel(refinement=name, definition=definition)
-            if int(cell["values"]):
+            if cell.value_count:
                 parameter = str(cell.parameter.item())
+                # NaN, where there is no value, comes last.
+                cell = cell.isel(point=np.argsort(cell[f"refined_{parameter}"].values, kind="stable"))
                 labels = {"refinement": name, "definition": definition, "parameter": parameter}
                 yield cell, labels | {"unit": VARIED[parameter].unit}
 
@@ -50,7 +52,7 @@ def _cells(data):
 def _values(data):
     rows = []
     for cell, labels in _cells(data):
-        for point in range(int(cell["values"])):
+        for point in range(int(cell.value_count)):
             one = cell.isel(point=point)
             row = labels | {"value": float(one[f"refined_{labels['parameter']}"]), "batch": int(one.batch)}
             row |= {name: float(one[name]) for name in VALUE_COLUMNS}

@@ -36,9 +36,10 @@ def refinement_group(parameters: Collection[str]) -> Group:
         "/refinement",
         {
             "parameter": (OF_ONE, "1", "what is varied", ""),
+            "scene": (OF_ONE, "1", "the scene of which it is varied: beam, mesh, material, load and kinematics", ""),
             "spacing": (OF_ONE, "1", "whether values or their logarithms are evenly spaced", ""),
             "tolerance": (OF_ONE, "1", "size of the error that matters", np.nan),
-            "values": (("refinement", "definition"), "1", "number of values", 0),
+            "value_count": (("refinement", "definition"), "1", "number of values", 0),
             "halved": (("refinement", "definition"), "1", "batches after the first one", 0),
             **values,
             "batch": (VALUE, "1", "batch that the value came in, from 0; -1 where there is no value", -1),
@@ -56,7 +57,7 @@ def refinement_group(parameters: Collection[str]) -> Group:
         },
         dimensions={
             "refinement": "refinement, by name",
-            "point": "number of a value, ascending",
+            "point": "number of a value, in the order of their addition",
             "crossing": "number of a crossing, ascending",
         },
     )

@@ -9,8 +9,15 @@ VIEWS = (
         "Refinement",
         "The deformation error over a parameter, with more values where it changes its sign or crosses the tolerance.",
         tuple(
-            Plot(f"error over {known.meaning}", "deformation_error", f"refined_{name}", "definition", along="point")
+            Plot(
+                f"error over {known.meaning}",
+                "deformation_error",
+                f"refined_{name}",
+                "definition",
+                along="point",
+                ascending=True,
+            )
             for name, known in VARIED.items()
-        ),
+        ),  # fmt: skip
     ),
 )
