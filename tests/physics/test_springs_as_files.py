@@ -488,6 +488,17 @@ class TestFiles:
             with pytest.raises(ValueError, match=r"'\.stl' is no format of springs; give a name ending in \.csv"):
                 do(tmp_path / "net.stl")
 
+    def test_a_folder_is_not_made(self, tmp_path):
+        scene, path = scene_of("lattice"), tmp_path / "none/net"
+        writers = {".csv": net_of(scene).write, ".json": scene.springs.write, ".xml": net_of(scene).write}
+        writers |= {".vtu": scene.solve().write, ".pvd": scene.solve().write}
+        for ending, do in writers.items():
+            with pytest.raises(ValueError, match=r"folder .*none does not exist; make it first"):
+                do(path.with_suffix(ending))
+        with pytest.raises(ValueError, match=r"folder .*none does not exist; make it first"):
+            scene.write_motion(path.with_suffix(".pvd"), scene.motion(), "central-difference", 1e-7, 10)
+        assert not list(tmp_path.iterdir())
+
     def test_energies_of_ones_own_are_refused(self, tmp_path):
         class Own(AreaEnergy):
             pass
@@ -547,6 +558,7 @@ class TestCommand:
         "density": (("--density", "3"), "--density: '3' has no unit"),
         "size": (("--size", "1e-9 mm"), "--size: '1e-9 mm'"),
         "mesh": (("--mesh", "none.msh"), "--mesh: 'none.msh' is neither a mesh type nor a file"),
+        "no folder": (("--out", "none/net.csv"), "none/net.csv: folder none does not exist; make it first"),
         "not a folder": (("--out", "file/net.csv"), "--out: file/net.csv: "),
         "a folder": (("--out", "folder.json"), "--out: folder.json: Is a directory"),
         "a folder for tables": (("--out", "folder.csv"), "--out: folder.csv: Is a directory"),

@@ -503,6 +503,7 @@ class TestPredictAMesh:
             (("--size", "5 mm", "--loads", "follower-pressure"), "--loads: 'follower-pressure' cannot be predicted; "),
             (("--size", "5 mm", "--loads", ","), "--loads: none; give some of traction, compression, bending, shear"),
             (("--size", "5 mm", "--write", "net.txt"), "net.txt"),
+            (("--size", "5 mm", "--write", "none/net.csv"), "none/net.csv: folder none does not exist; make it first"),
             (("--size", "5 mm", "--density", "7850"), "--density: '7850' has no unit; give a density such as"),
         ],
     )

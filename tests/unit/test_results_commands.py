@@ -286,6 +286,12 @@ class TestExport:
         assert paraview.write(tree, fields / "none") == [Path("scenes.pvd")]
         assert [path.name for path in (fields / "none").iterdir()] == ["scenes.pvd"]
 
+    @pytest.mark.parametrize("ending", ["csv", "parquet", "zarr", "nc", "vtu", "pvd"])
+    def test_a_folder_is_not_made(self, fields, ending):
+        target = fields / f"none/data.{ending}"
+        refused(run("export", fields, "--to", target), f"folder {target.parent} does not exist; make it first")
+        assert not target.parent.exists()
+
     def test_what_paraview_does_not_get(self, path, fields):
         before = sorted(os.listdir(fields))
         refused(run("export", fields, "--to", fields / "net.vtu"), "2 scenes", "--select one definition", ".pvd")
@@ -326,7 +332,7 @@ class TestExport:
             (("--to", "x.csv", "--select", "bean=a"), ("--select bean: no dimension", "did you mean 'beam'?")),
             (("--to", "x.csv", "--select", "beam"), ("'beam' is no dimension=label",)),
             (("--to", "x.zarr", "--variables", "status"), ("Zarr takes the whole dataset",)),
-            (("--to", "nowhere/deeper/x.csv", "--group", "none"), ("group 'none'",)),
+            (("--to", "nowhere/deeper/x.csv"), ("folder nowhere/deeper does not exist; make it first",)),
         ],
     )
     def test_refusals_name_what_there_is_and_leave_nothing(self, path, tmp_path, monkeypatch, arguments, said):

@@ -261,6 +261,25 @@ def test_tables_and_figures_are_there(run, tree):
             assert (results / f"figures/{stem}.{ending}").stat().st_size > 5000
 
 
+def test_paraview_has_the_scenes_whose_fields_are_kept(run, tree):
+    """Numbers of one are those of the same scene, solved by the library."""
+    folder = run.folder / "results/quick/paraview"
+    pieces = re.findall(r'file="(.*?)"', (folder / "scenes.pvd").read_text())
+    assert len(pieces) == int(tree["fields"].displacement_x.isel(particle=0).notnull().sum())
+    assert sorted(pieces) == sorted(path.relative_to(folder).as_posix() for path in folder.glob("*/*"))
+    grid = meshio.read(folder / "scenes/100x20_structured_5mm_steel_traction_lattice_nonlinear.vtu")
+    beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
+    result = st.Scene(
+        beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "20 kN", definition="lattice"
+    ).solve()
+    assert np.allclose(grid.point_data["displacement"][:, :2], result.displacements, rtol=0, atol=1e-12)
+    assert np.allclose(grid.cell_data["stiffness"][0], result.stiffness, rtol=1e-6)  # stored with seven digits
+    assert np.allclose(grid.cell_data["force"][0], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
+    assert grid.field_data["deformation_error"] == pytest.approx(result.error, rel=1e-9)
+    error = result.displacements - result.reference().at(result.scene.mesh.points)
+    assert np.allclose(grid.point_data["error"][:, :2], error, rtol=0, atol=1e-12)
+
+
 def test_snippets_of_the_docs_run(run, tree, repository, monkeypatch):
     snippets = re.findall(r"```python\n(.*?)```", (repository / "docs/dataset.md").read_text(), re.DOTALL)
     monkeypatch.chdir(run.folder)

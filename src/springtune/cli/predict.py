@@ -79,13 +79,13 @@ def predict(
     strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
     """
-    from ..handover.formats import check_ending
+    from ..handover.formats import check_target
     from ..prediction import CASES, check_beam
     from ..springs import DefinitionError
 
     try:
         if target is not None:
-            check_ending(target)
+            check_target(target)
         sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
         check_beam(sheet)
         cases = CASES if loads is None else _asked_loads(loads)

@@ -98,11 +98,11 @@ def springs(
     The file says what its numbers are: definition, formula and source, and how far off the network is under traction,
     bending, shear and the load that is given, solved on this very mesh.
     """
-    from ..handover.formats import check_ending
+    from ..handover.formats import check_target
     from ..springs import DefinitionError
 
     try:
-        check_ending(target)
+        check_target(target)
         sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
         made = is_made(mesh_type)
         edge = asked_size(sheet, mesh_type, size) if made else None

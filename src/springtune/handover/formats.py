@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jobs.atomic import replacing, write_text
+from ..jobs.atomic import check_folder, replacing, write_text
 from ..mesh.formats import LONGEST_SAID
 from .mujoco import mjcf
 from .paraview import comment_of, write_vtu
@@ -74,11 +74,12 @@ def write(path: str | Path, content: Content) -> list[Path]:
     Raises
     ------
     ValueError
-        If the ending is another one.
+        If the ending is another one, or the folder is not there.
     OSError
         If the file cannot be written.
     """
     path = Path(path)
+    check_target(path)
     return _format_of(path).write(path, content)
 
 
@@ -118,8 +119,8 @@ def read(path: str | Path) -> Content:
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 
-def check_ending(path: str | Path) -> None:
-    """Refuse a name whose ending is no format of a net.
+def check_target(path: str | Path) -> None:
+    """Refuse a name whose ending is no format of a net, or whose folder is not there.
 
     Parameters
     ----------
@@ -130,6 +131,7 @@ def check_ending(path: str | Path) -> None:
     ValueError
     """
     _format_of(Path(path))
+    check_folder(path)
 
 
 def _checked(content: Content) -> Content:

@@ -265,7 +265,7 @@ class SpringNet:
         Raises
         ------
         ValueError
-            If the name has another ending.
+            If the name has another ending, or its folder is not there.
         """
         return write(path, content_of(self))
 

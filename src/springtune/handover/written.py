@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..jobs.atomic import check_folder
 from ..mechanics.dynamics import Motion, Run
 from ..mechanics.integrators import BackwardEuler
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..scene.single import Result, Scene
 from ..springs import Springs
-from .formats import check_ending, write_vtu_with
+from .formats import check_target, write_vtu_with
 from .net import NOT_COMPUTED, SpringNet, content_of
 from .paraview import MOST_PIECES, pieces_of, series
 
@@ -36,7 +37,7 @@ def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: A
     list of Path
         What was written.
     """
-    check_ending(path)
+    check_target(path)
     return SpringNet.from_scene(scene, springs=springs, **options).write(path)
 
 
@@ -58,13 +59,15 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
     Raises
     ------
     ValueError
-        If the name has another ending, there is no equilibrium to write, or none at a step of the path.
+        If the name has another ending, its folder is not there, there is no equilibrium to write, or none at a step of
+        the path.
     """
     path, scene = Path(path), result.scene
     if path.suffix.lower() not in (".vtu", ".pvd"):
         raise ValueError(
             f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu, or, for its path, .pvd"
         )
+    check_folder(path)
     if not np.isfinite(result.displacement):
         raise ValueError(f"there is no equilibrium to write: {result.message}")
     if path.suffix.lower() == ".vtu":
@@ -113,11 +116,13 @@ def write_motion(
     Raises
     ------
     ValueError
-        If the name does not end in ``.pvd``, a number is out of its range, or the motion came to nothing.
+        If the name does not end in ``.pvd``, its folder is not there, a number is out of its range, or the motion came
+        to nothing.
     """
     path = Path(path)
     if path.suffix.lower() != ".pvd":
         raise ValueError(f"{path}: '{path.suffix}' is no format of a motion; give a name ending in .pvd")
+    check_folder(path)
     if not 1 <= frames <= MOST_PIECES:
         raise ValueError(f"frames: {frames!r} is not from 1 to {MOST_PIECES}; give the number of files")
     if not (isinstance(steps, int) and steps >= 1):

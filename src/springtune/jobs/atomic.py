@@ -46,6 +46,30 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
         raise
 
 
+def check_folder(path: str | Path) -> None:
+    """Refuse a file whose folder is not there: who misspells one is not to get another.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a file that a user names.
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> check_folder("nowhere/net.csv")
+    Traceback (most recent call last):
+    ...
+    ValueError: nowhere/net.csv: folder nowhere does not exist; make it first
+    """
+    folder = Path(path).parent
+    if not folder.exists():
+        raise ValueError(f"{path}: folder {folder} does not exist; make it first")
+
+
 def remove_unfinished(folder: str | Path, below: bool = True) -> None:
     """Remove what writers that were killed have left in a folder; what a process that lives is writing stays.
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from ..jobs.atomic import UNFINISHED, replacing, write_bytes, write_text
+from ..jobs.atomic import UNFINISHED, check_folder, replacing, write_bytes, write_text
 from ..problem.quantities import nearest
 from ..units import QUANTITY_KINDS, UnitError, parse
 from . import reading
@@ -325,12 +325,14 @@ def export(
     Raises
     ------
     ValueError
-        As of `table`, and if the format is unknown, the file is there or what writes it is not installed.
+        As of `table`, and if the format is unknown, the file is there, its folder is not, or what writes it is not
+        installed.
     """
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in EXPORTS:
         raise ValueError(f"{path}: '{ending}' is no format to export to; give a file ending in {', '.join(EXPORTS)}")
+    check_folder(path)
     if path.exists() and not force:
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
     if ending == ".nc":

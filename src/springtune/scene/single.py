@@ -334,8 +334,8 @@ class Scene:
         Raises
         ------
         ValueError
-            If the name has another ending, a number is out of its range, or the motion diverged; nothing is written
-            then.
+            If the name has another ending, its folder is not there, a number is out of its range, or the motion
+            diverged; nothing is written then.
 
         Examples
         --------
@@ -414,7 +414,7 @@ class SceneSprings(Springs):
         Raises
         ------
         ValueError
-            If the name has another ending.
+            If the name has another ending, or its folder is not there.
         """
         from .writing import writer
 
@@ -544,7 +544,7 @@ class Result:
         Raises
         ------
         ValueError
-            If the name has another ending, or there is no equilibrium.
+            If the name has another ending, its folder is not there, or there is no equilibrium.
 
         Examples
         --------
