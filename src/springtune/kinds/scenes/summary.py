@@ -9,7 +9,6 @@ from ...springs import DEFINITIONS
 from ...study.model import SceneSpec, Study
 from .interpolated import expected_solves, interpolants
 
-
 SCENE_DIMENSIONS = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
 """Dimensions of every dataset."""
 
