@@ -282,6 +282,10 @@ class TestSwept:
             load(head, **grid, thickness=["1 mm", "2 mm"])
         assert load(head, **grid, force={"long": "1 N", "short": ["1 N", "2 N"]}).swept == ("force",)
 
+    def test_moduli_are_those_of_the_swept_ratios(self, load):
+        study = load(poisson_ratio=["0.1", "0.2"], moduli="true")
+        assert [one.poisson_ratio for one in study.parts["moduli"].measurements] == [0.1, 0.2]
+
     def test_printed_cells_are_not_swept(self, load, tmp_path):
         (tmp_path / "printed.csv").write_text("")
         with pytest.raises(StudyError, match="printed: printed cells know no force, which grids sweep"):
