@@ -126,7 +126,7 @@ def _of_the_paper(data):
     if "displacement_x" not in data:
         return data
     return data.assign(
-        x=data.x.where(data.mesh_size == data.mesh_size.max()), force=data.spring_nodes.isel(spring_end=0)
+        x=data.x.where(data.mesh_size == data.mesh_size.max()), spring_force=data.spring_nodes.isel(spring_end=0)
     )
 
 
