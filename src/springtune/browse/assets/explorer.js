@@ -80,10 +80,9 @@ class Explorer {
     const values = field.unpacked();
     const places = (flat) => Object.fromEntries(field.dims.map((name) => [name, Math.floor(flat / field.strides[name]) % this.group.dims[name].size]));
     let flat = 0;
-    if (over && !field.place && field.type === "float" && over.dims.every((name) => field.dims.includes(name))) {
-      const both = values.findIndex((one, i) => !Number.isNaN(one) && Number.isFinite(over.of(places(i))));
-      if (both >= 0) return places(both);
-    }
+    if (over && field.type === "float" && over.dims.every((name) => field.dims.includes(name)))
+      for (let i = 0; i < field.size; i++)
+        if (!Number.isNaN(field.valueAt(i)) && Number.isFinite(over.of(places(i)))) return places(i);
     if (field.place) flat = Math.max(0, field.place.findIndex((one) => one >= 0)) * field.points;
     else flat = Math.max(0, values.findIndex((one) => field.isText ? one >= 0 : field.type === "float" ? !Number.isNaN(one) : one !== 0));
     return places(flat);
