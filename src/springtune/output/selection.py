@@ -133,6 +133,21 @@ OF_FIELDS = "shown_"
 """First letters of the variables of the group of fields that say of which values of what is swept the fields are."""
 
 
+def unswept(root: xr.Dataset) -> xr.Dataset:
+    """Root of a dataset without what the study sweeps: each beam, material and load at its last values.
+
+    Parameters
+    ----------
+    root : xarray.Dataset
+
+    Returns
+    -------
+    xarray.Dataset
+        As of a study that sweeps nothing; see `last_swept`.
+    """
+    return at(root, last_swept(root.status != 0))
+
+
 def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
     """Of what a study sweeps, the values that its whole fields are of.
 

@@ -5,7 +5,7 @@ from matplotlib.ticker import NullLocator
 
 from ...output import labels, style
 from ...output.dataset import STATUS, most_requested
-from ...output.selection import choose, group, labelled_beam, labels_of
+from ...output.selection import choose, group, labelled_beam, labels_of, unswept
 from .outputs import figures
 
 FLOOR = 1e-5
@@ -30,7 +30,7 @@ def definitions(tree):
     tuple
         Stem, function that plots, and selection.
     """
-    root = group(tree, "/")
+    root = unswept(group(tree, "/"))
     for stem, selection in figures(root["load"].values.tolist(), root.mesh_type.values.tolist()).items():
         if "load" in selection:
             yield stem, plot_definitions_size, _main(root, ("beam", "kinematics", "material"), selection)
@@ -181,7 +181,7 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
     >>> axes[0].figure.get_suptitle()
     '200x40 mm, steel, traction: error of the displacement field in L2, fitted rate in brackets'
     """
-    root = group(data, "/")
+    root = unswept(group(data, "/"))
     chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
     root = root.sel(chosen)
     error = root.field_error
@@ -285,7 +285,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     >>> [tick.get_text() for tick in axes[0].get_xticklabels()]
     ['traction', 'compression', 'pressure']
     """
-    root = group(data, "/")
+    root = unswept(group(data, "/"))
     chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)
     root = root.sel(chosen)
     solved = root.status == 1

@@ -9,6 +9,7 @@ import xarray as xr
 
 from ...jobs.atomic import write_text
 from ...output.dataset import STATUS, most_requested
+from ...output.selection import unswept
 from ..scenes.variables import SCENE
 from .outputs import TABLES
 from .variables import PATCH
@@ -32,7 +33,8 @@ def write(tree, folder):
         Names of the files written.
     """
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
-    texts = (_csv(root, SCENE, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
+    scene = (*SCENE, *(str(name) for name in root.status.dims if name not in SCENE))  # what is swept, too
+    texts = (_csv(root, scene, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
     for name, text in zip(TABLES, texts):
         write_text(Path(folder) / name, text)
     return list(TABLES)
@@ -132,7 +134,7 @@ def decision(tree: xr.DataTree) -> str:
 
     Every figure is a cell of the dataset, or the range, median or largest one of cells that the table names.
     """
-    root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
+    root, moduli = unswept(tree.to_dataset()), tree["moduli"].to_dataset()
     advice = _advice(root)
     parts = ["### In short", "", *advice, ""] if advice else []
     for mesh_type in TABLE_MESH_TYPES:
