@@ -608,17 +608,16 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     chosen = choose(asked.sel(load=[load]), beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
     figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 3.0))
     size = 1e3 * chosen["mesh_size"]
-    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']} {size:g} mm, {chosen['material']}"
-    place = {"left": 0.45, "right": 0.06, "top": 0.62, "across": 0.55, "title": title}
-    style.arrange(figure, axes, bottom=0.4, **place)
-    (left, right), here = axes[0], root.sel(chosen)
+    here = root.sel(chosen)
     values = last_swept(here.status != 0)
+    words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
+    words += swept_words({name: value.sel(load=load) for name, value in values.items()})
+    place = {"left": 0.45, "right": 0.06, "top": 0.62, "across": 0.55, "title": ", ".join(words)}
+    style.arrange(figure, axes, bottom=0.4, **place)
+    left, right = axes[0]
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
-    here, curves, faces = (
-        at(here, values),
-        curves if curves is None else at(curves, values),
-        at(faces.sel(chosen), values),
-    )
+    here, faces = at(here, values), at(faces.sel(chosen), values)
+    curves = None if curves is None else at(curves, values)
     drawn = [_stiffness(left, curves, here), _profile(right, faces, here, load)]
     under = labels.LINE * max(labels.lines_of(said) for _, said, _ in drawn)
     if ax is None:
