@@ -513,12 +513,12 @@ def test_a_load_without_equilibrium_is_written_and_says_so(tmp_path):
 
 
 def test_the_command_says_of_an_equilibrium_that_there_is_none_or_that_it_is_far(tmp_path):
-    asked = "--beam 60x20 --size 5_mm --material rubber --density 1000_kg/m^3 --definition lattice"
+    asked = "--beam 60x5 --size 5_mm --material rubber --density 1000_kg/m^3 --definition lattice"
     words = [word.replace("_", " ") for word in asked.split()]
     for ending in (".xml", ".xpbd.json", ".scn"):
         loads = {"compression": "100 N", "traction": "1 N"}
         said = []
-        for load, force in (*loads.items(), ("traction", "60 N")):
+        for load, force in (*loads.items(), ("traction", "8 N")):
             options = ["--load", load, "--force", force, "--out", str(tmp_path / f"net{ending}")]
             done = CliRunner().invoke(main, ["springs", *words, *options])
             assert done.exit_code == 0, done.output
