@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.handover.net import SpringNet
-from springtune.handover.simulation import STEP_SHARE
+from springtune.handover.simulation import STEP_SHARE, EquilibriumWarning
 from springtune.springs import DEFINITIONS
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
@@ -502,11 +502,31 @@ def test_a_load_without_equilibrium_is_written_and_says_so(tmp_path):
     one = st.Scene(
         column, st.make_mesh(column, "structured", "2 mm"), STEEL, "compression", "2 kN", definition="lattice"
     )
-    text = written(one, tmp_path, ".xml")
+    with pytest.warns(EquilibriumWarning, match="no equilibrium was found, so the file has none: .*; give a smaller"):
+        text = written(one, tmp_path, ".xml")
     assert str(one.solve().status) == "unstable"
     assert mujoco.MjModel.from_xml_string(text).nkey == 0 and "No equilibrium was found" in text
-    assert json.loads(written(one, tmp_path, ".xpbd.json"))["displacements"] is None
-    assert 'name="predicted"' not in written(one, tmp_path, ".scn")
+    with pytest.warns(EquilibriumWarning):
+        assert json.loads(written(one, tmp_path, ".xpbd.json"))["displacements"] is None
+    with pytest.warns(EquilibriumWarning):
+        assert 'name="predicted"' not in written(one, tmp_path, ".scn")
+
+
+def test_the_command_says_of_an_equilibrium_that_there_is_none_or_that_it_is_far(tmp_path):
+    asked = "--beam 60x5 --size 5_mm --material rubber --density 1000_kg/m^3 --definition lattice"
+    words = [word.replace("_", " ") for word in asked.split()]
+    for ending in (".xml", ".xpbd.json", ".scn"):
+        loads = {"compression": "100 N", "traction": "1 N"}
+        said = []
+        for load, force in (*loads.items(), ("traction", "8 N")):
+            options = ["--load", load, "--force", force, "--out", str(tmp_path / f"net{ending}")]
+            done = CliRunner().invoke(main, ["springs", *words, *options])
+            assert done.exit_code == 0, done.output
+            said.append([line for line in done.stdout.splitlines() if "equilibrium" in line])
+        none, near, far = said
+        assert len(none) == 1 and none[0].startswith("no equilibrium was found, so the file has none: ")
+        assert not near
+        assert len(far) == 1 and "m away from rest, further than the beam is long (0.06 m)" in far[0]
 
 
 def test_two_commands_bring_springs_into_mujoco(tmp_path):
@@ -518,5 +538,5 @@ def test_two_commands_bring_springs_into_mujoco(tmp_path):
     model = mujoco.MjModel.from_xml_path(str(out))
     assert model.nkey == 1 and model.nu == 1
     done = CliRunner().invoke(main, ["springs", *words, "--definition", "area", "--out", str(tmp_path / "area.xml")])
-    assert done.exit_code == 1 and done.output.startswith("--definition 'area': has energies of areas")
+    assert done.exit_code == 2 and done.output.startswith("--definition 'area': has energies of areas")
     assert not (tmp_path / "area.xml").exists()

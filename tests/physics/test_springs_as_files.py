@@ -547,6 +547,11 @@ class TestCommand:
 
     REFUSED = {
         "unknown ending": (("--out", "net.stl"), "'.stl' is no format of springs; give a name ending in .csv"),
+        "an ending alone": (
+            ("--out", ".csv"),
+            "--out: '.csv' is an ending alone; give a name before it",
+        ),
+        "constants beside a material": (("--young", "3 GPa"), "--young: '3 GPa' is beside --material steel, which has"),
         "no stiffness": (("--definition", "paper"), "--stiffness: definition 'paper' needs a uniform one; give"),
         "stiffness for none": (("--stiffness", "3 N/m"), "--stiffness: '3 N/m' is not used"),
         "triangles": (("--definition", "baudet"), "--definition 'baudet': needs rectangles"),
@@ -575,7 +580,9 @@ class TestCommand:
         for name in ("folder.json", "folder.csv"):
             (tmp_path / name).mkdir()
         result = self.run(*self.STEEL, "--out", "net.csv", *options)
-        assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1, result.output
+        # What cannot be written is no mistake in how the command was called.
+        code = 1 if said.startswith("--out: f") else 2
+        assert result.exit_code == code and len(result.stderr.splitlines()) == 1, result.output
         assert result.stderr.startswith(said) or said in result.stderr
         assert sorted(os.listdir()) == ["file", "folder.csv", "folder.json"]
         assert not os.listdir("folder.json") and not os.listdir("folder.csv")

@@ -259,8 +259,8 @@ class TestRefusals:
         [
             (("accept",), 2, "name the results to accept: springtune accept results/mine"),
             (("accept", "none"), 1, "none: there is no such dataset; run the study"),
-            (("accept", "small", "--variables", "displacment"), 1, "there is none; did you mean 'displacement'?"),
-            (("accept", "small", "--variables", "message"), 1, "--variables message: is a text; only numbers"),
+            (("accept", "small", "--variables", "displacment"), 2, "there is none; did you mean 'displacement'?"),
+            (("accept", "small", "--variables", "message"), 2, "--variables message: is a text; only numbers"),
             (("accept", "small", "--relative", "x"), 2, "'x' is no tolerance"),
             (("accept", "small", "--to", "kept.csv"), 1, "kept.csv: '.csv' is no form of expected values"),
             (("accept", "empty"), 1, "there is nothing to accept"),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -19,6 +20,7 @@ from springtune import prediction
 from springtune.cli import COMMANDS, main
 from springtune.cli.recommendation import prediction_json, prediction_text
 from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
+from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
@@ -251,6 +253,7 @@ ABOUT = {"particles": 105, "springs": 268}
 
 class TestPredict:
     STEEL = ("--beam", "100x20", "--material", "steel")
+    OWN = ("--beam", "100x20", "--size", "5 mm")
 
     def test_recommends_with_numbers(self):
         result = run("predict", *self.STEEL, "--size", "5 mm")
@@ -324,13 +327,13 @@ class TestPredict:
 
     @pytest.mark.parametrize("mesh_type", ["structured", "free", "right"])
     def test_absurd_sizes_are_refused_before_a_mesh_is_made(self, mesh_type):
-        for size in ("1e-9 mm", "0.005 mm"):  # 2,000 mm2 over 1e7 particles: .0141 mm, rows of triangles .0152
+        for size in ("1e-9 mm", "0.005 mm"):  # 2,000 mm2 over 5e6 particles: .02 mm, rows of triangles .0215
             result = run("predict", *self.STEEL, "--mesh", mesh_type, "--size", size)
-            assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
+            assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1
             assert f"--size: '{size}' makes some " in result.stderr
-            assert "of beam '100x20', more than can be meshed (1e+07); give at least 0.01" in result.stderr
+            assert "of beam '100x20', more than can be meshed (5,000,000); give at least 0.02" in result.stderr
         slender = run("predict", "--beam", "1e4x1", "--material", "steel", "--mesh", mesh_type, "--size", "1e-3 mm")
-        assert "of beam '1e4x1', more than can be meshed (1e+07); give at least 0.0" in slender.stderr
+        assert "of beam '1e4x1', more than can be meshed (5,000,000); give at least 0.0" in slender.stderr
 
     def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
         write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
@@ -351,13 +354,19 @@ class TestPredict:
             ((*STEEL, "--size", "5 mm", "--mesh", "fre"), "--mesh: 'fre' is neither a mesh type nor a file; known:"),
             (("--beam", "100x20", "--size", "5 mm"), "--material: none; give one of steel, rubber"),
             (("--beam", "100x20", "--size", "5 mm", "--material", "stel"), "--material: unknown material 'stel'"),
-            ((*STEEL, "--size", "5 mm", "--poisson", "0.7"), "--poisson: '0.7' is out of range"),
-            ((*STEEL, "--size", "5 mm", "--young", "3 N"), "--young: '3 N' is a force; give a stress"),
+            (
+                (*OWN, "--young", "3 GPa", "--poisson", "0.7"),
+                "--poisson: '0.7' is out of range",
+            ),
+            (
+                (*OWN, "--young", "3 N", "--poisson", "0.3"),
+                "--young: '3 N' is a force; give a stress",
+            ),
         ],
     )
     def test_refusals_are_one_line(self, arguments, message):
         result = run("predict", *arguments)
-        assert result.exit_code == 1
+        assert result.exit_code == 2
         assert message in result.stderr
         assert len(result.stderr.splitlines()) == 1
 
@@ -502,8 +511,20 @@ class TestPredictAMesh:
             (("--size", "5 mm", "--loads", "pull"), "--loads: 'pull' cannot be predicted; known: traction"),
             (("--size", "5 mm", "--loads", "follower-pressure"), "--loads: 'follower-pressure' cannot be predicted; "),
             (("--size", "5 mm", "--loads", ","), "--loads: none; give some of traction, compression, bending, shear"),
-            (("--size", "5 mm", "--write", "net.txt"), "net.txt"),
-            (("--size", "5 mm", "--write", "none/net.csv"), "none/net.csv: folder none does not exist; make it first"),
+            (("--size", "5 mm", "--write", "net.txt"), "--write: net.txt: '.txt' is no format of springs; give a name"),
+            (
+                ("--size", "5 mm", "--write", ".csv"),
+                "--write: '.csv' is an ending alone; give a name before it",
+            ),
+            (
+                ("--size", "5 mm", "--young", "3 GPa", "--poisson", "0.3"),
+                "--young: '3 GPa' is beside --material steel",
+            ),
+            (
+                ("--size", "5 mm", "--poisson", "0.3"),
+                "--poisson: '0.3' is beside --material steel",
+            ),
+            (("--size", "5 mm", "--write", "none/net.csv"), "--write: none/net.csv: folder none does not exist; make"),
             (("--size", "5 mm", "--density", "7850"), "--density: '7850' has no unit; give a density such as"),
         ],
     )
@@ -511,8 +532,14 @@ class TestPredictAMesh:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "own.msh").write_text("")
         result = run("predict", *self.STEEL, *arguments)
-        assert result.exit_code == 1 and message in result.stderr and len(result.stderr.splitlines()) == 1
+        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
         assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
+
+    @pytest.mark.parametrize("command", ["predict", "springs"])
+    def test_help_has_the_ending_of_every_format(self, command):
+        said = run(command, "--help").stdout
+        for ending in (*ENDINGS, *FOR_SIMULATORS):
+            assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
 
     def test_work_is_counted(self):
         with counted(MeshType.__call__, solve_small_strain, Sheet.__init__) as calls:
@@ -539,6 +566,6 @@ class TestPredictAMesh:
                     continue  # is compared with the reference's estimate
             with counted(*work) as calls:
                 result = run("predict", "--beam", beam, asked, size, "--material", "steel")
-            assert not calls and result.exit_code == 1, (beam, size)
+            assert not calls and result.exit_code == 2, (beam, size)
             assert result.stdout == "" and len(result.stderr.splitlines()) == 1, (beam, size)
             assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr

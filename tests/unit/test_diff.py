@@ -281,6 +281,11 @@ class TestCommand:
             (("small", "text.nc"), "text.nc: cannot be read"),
             (("small", "plain.nc"), "plain.nc: is not a dataset of springtune; give the dataset.nc of a study"),
             (("small", "small", "--group", "curves"), "--group curves: neither has it; known: /, /sensitivity"),
+            (
+                ("small", "small", "--ignore", "displacment"),
+                "--ignore displacment: neither has it; did you mean 'displac",
+            ),
+            (("small", "small", "--ignore", "status", "--ignore", "none_*"), "--ignore none_*: neither has it"),
             (("small", "small", "--relative", "one"), "'one' is no tolerance; give a number such as 1e-6"),
             (("small", "small", "--absolute", "-1"), "'-1' is no tolerance"),
             (("small", "small", "--relative", "nan"), "'nan' is no tolerance"),

@@ -8,6 +8,7 @@ import click
 from .diff import DIFFERENT, Trouble, comparison_text, opened, tolerance
 from .examples import examples
 from .folders import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
+from .options import WrongCall
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,6 +70,8 @@ def accept(
     try:
         _accept(dataset_path(results), target, names, relative, absolute, unsolved)
     except (OSError, ValueError) as error:
+        if str(error).startswith("--"):  # an option names what is not there
+            raise WrongCall(str(error)) from None
         raise click.ClickException(str(error)) from None
 
 

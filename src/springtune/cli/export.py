@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from .examples import examples
+from .options import WrongCall
 
 
 @click.command(
@@ -36,13 +37,15 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
     PATH is results/<study>, or its dataset.nc.
     """
     from ..output import reading
+    from ..output.export import RequestError, selected
     from ..output.export import export as write
-    from ..output.export import selected
 
     names = [name.strip() for name in variables.split(",") if name.strip()]
     try:
         reading.check_opens(path)
         with reading.open(path) as tree, reading.guarded(path):
             click.echo(write(tree, target, group, names, selected(pairs), force))
+    except RequestError as error:
+        raise WrongCall(str(error)) from None
     except (OSError, ValueError) as error:
         raise click.ClickException(str(error)) from None

@@ -8,6 +8,7 @@ import click
 from ..registry import NAME, NAME_RULE
 from .examples import examples
 from .folders import CONFIG_FOLDER
+from .options import WrongCall
 from .run import checkout_here, library_checkout
 from .schema import SCHEMA
 
@@ -47,7 +48,7 @@ def new(study: str) -> None:
 
     path = _path(study)
     if not NAME.fullmatch(path.stem):
-        raise click.ClickException(f"'{path.stem}' cannot name a study; {NAME_RULE}")
+        raise WrongCall(f"'{path.stem}' cannot name a study; {NAME_RULE}")
     if os.path.lexists(path):
         raise click.ClickException(f"{path}: is there already; give another name, or change that file")
     if not path.parent.is_dir():
@@ -58,6 +59,8 @@ def new(study: str) -> None:
         raise click.ClickException(
             f"{path}: cannot be written: {error.strerror or error}; name another place"
         ) from None
+    if not path.resolve().is_relative_to(Path.cwd().resolve()):
+        click.echo(f"written outside of this folder: {path.resolve()}")
     click.echo(f"{path}: 2 scenes; change it as you like, and run it:\n  springtune run {path}")
 
 

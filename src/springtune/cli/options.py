@@ -10,6 +10,42 @@ if TYPE_CHECKING:
     from ..problem.geometry import Beam
     from ..problem.materials import Material
 
+MANY = 1_000_000
+"""Particles from which on it is said that a mesh is being made: it takes seconds."""
+
+WRONG, FAILED = 2, 1
+"""Exit codes: an option is wrong, and what it asks for cannot be had."""
+
+
+class WrongCall(click.ClickException):
+    """A command was called in a wrong way."""
+
+    exit_code = WRONG
+
+
+class Unmet(ValueError):
+    """What is asked for cannot be had, though the options are right."""
+
+
+def refused(error: Exception, message: str) -> int:
+    """Say why nothing is done, in one line, and return the exit code: 2 where the message names a wrong option."""
+    click.echo(message, err=True)
+    return WRONG if message.startswith("--") and not isinstance(error, (Unmet, OSError)) else FAILED
+
+
+def check_target(option: str, target: Path) -> None:
+    """Refuse a name whose ending is no format of springs, or whose folder is not there; ValueError names the option."""
+    from ..handover import formats
+
+    try:
+        formats.check_target(target)
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+SPRING_FILES = ".csv, .json, .vtu (ParaView), .h5, .xml or .mjcf (MuJoCo), .scn or .py (SOFA), or .xpbd.json (XPBD)"
+"""Endings of files of springs, for the help."""
+
 MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 """Young's modulus and Poisson's ratio of the paper's materials."""
 
@@ -43,7 +79,11 @@ def asked_beam(text: str, thickness: str) -> "Beam":
         raise ValueError(f"--beam: '{text}' is not length x height; give millimetres such as 200x40") from None
     if not (length > 0 and height > 0):
         raise ValueError(f"--beam: '{text}' has a side that is not above zero; give millimetres such as 200x40")
-    return Beam(length, height, asked_quantity("--thickness", thickness, "length"), text)
+    thick = asked_quantity("--thickness", thickness, "length")
+    try:
+        return Beam(length, height, thick, text)
+    except ValueError as error:
+        raise ValueError(f"--beam: {error}") from None
 
 
 def asked_material(name: str | None, young: str | None, poisson: str | None, density: str | None = None) -> "Material":
@@ -53,6 +93,12 @@ def asked_material(name: str | None, young: str | None, poisson: str | None, den
     if name is not None and name not in MATERIALS:
         raise ValueError(
             f"--material: unknown material '{name}'; known: {', '.join(MATERIALS)}; or give --young and --poisson"
+        )
+    if name is not None and (young or poisson):
+        other = "--young" if young else "--poisson"
+        raise ValueError(
+            f"{other}: '{young or poisson}' is beside --material {name}, which has its own; leave --material out, and "
+            "give --young and --poisson"
         )
     defaults = (None, None) if name is None else MATERIALS[name]
     young, poisson = young or defaults[0], poisson or defaults[1]
@@ -102,6 +148,9 @@ def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "
     from ..mesh import MESH_TYPES, read_beam_mesh
 
     if edge is not None:
+        count = MESH_TYPES[mesh_type].particles(beam.length, beam.height, edge)
+        if count > MANY:
+            click.echo(f"making a {mesh_type} mesh of some {count / 1e6:.1f} million particles ...", err=True)
         return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
     scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
     return read_beam_mesh(mesh_type, beam.length, beam.height, scale)

@@ -8,7 +8,19 @@ import click
 
 from .completion import mesh_types
 from .examples import examples
-from .options import MATERIALS, asked_beam, asked_material, asked_mesh, asked_size, is_made, known_materials
+from .options import (
+    MATERIALS,
+    SPRING_FILES,
+    Unmet,
+    asked_beam,
+    asked_material,
+    asked_mesh,
+    asked_size,
+    check_target,
+    is_made,
+    known_materials,
+    refused,
+)
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -55,7 +67,7 @@ if TYPE_CHECKING:
     "--write",
     "target",
     type=click.Path(path_type=Path),
-    help="Write the springs of what is recommended: a .csv, .json, .vtu (ParaView) or .h5 file.",
+    help=f"Write the springs of what is recommended to a file: {SPRING_FILES}.",
 )
 def predict(
     beam: str,
@@ -79,15 +91,17 @@ def predict(
     strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
     """
-    from ..handover.formats import check_target
     from ..prediction import CASES, check_beam
     from ..springs import DefinitionError
 
     try:
         if target is not None:
-            check_target(target)
+            check_target("--write", target)
         sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
-        check_beam(sheet)
+        try:
+            check_beam(sheet)
+        except ValueError as problem:
+            raise ValueError(f"--{problem}") from None
         cases = CASES if loads is None else _asked_loads(loads)
         if error is not None:
             if size is not None:
@@ -97,9 +111,9 @@ def predict(
             _predict(sheet, solid, cases, mesh_type or "structured", size, unit, springs_alone, as_json, target)
     except OSError as problem:
         why = os.strerror(problem.errno) if problem.errno else problem
-        raise SystemExit(_refused(f"--write: {target}: {why}; give a file that can be written")) from None
+        raise SystemExit(refused(problem, f"--write: {target}: {why}; give a file that can be written")) from None
     except (click.ClickException, DefinitionError, ValueError) as problem:
-        raise SystemExit(_refused(str(getattr(problem, "message", problem)))) from None
+        raise SystemExit(refused(problem, str(getattr(problem, "message", problem)))) from None
 
 
 def _predict(
@@ -143,7 +157,7 @@ def _predict(
         click.echo(prediction_text(name, about, beam, material, found, known, sizes))
     if target is not None:
         if not solved:
-            raise ValueError("--write: nothing is recommended for this mesh, so nothing is written; take another mesh")
+            raise Unmet("--write: nothing is recommended for this mesh, so nothing is written; take another mesh")
         mesh = _asked_mesh(beam, mesh_type, edge, unit) if mesh is None else mesh
         _write(beam, mesh, material, solved[0], name, loads, target, quiet=as_json)
 
@@ -176,15 +190,10 @@ def _find(
     click.echo((search_json if as_json else search_text)(beam, material, search, springs_alone))
     if target is not None:
         if best is None:
-            raise ValueError(f"--write: no mesh keeps {error}, so nothing is written; allow a larger error")
+            raise Unmet(f"--write: no mesh keeps {error}, so nothing is written; allow a larger error")
         mesh = MESH_TYPES[best.mesh_type](beam.length, beam.height, best.size)
         name = f"{best.mesh_type} {size_text(best.size)}"
         _write(beam, mesh, material, best.choice.definition, name, loads, target, quiet=as_json)
-
-
-def _refused(message: str) -> int:
-    click.echo(message, err=True)
-    return 1
 
 
 def _asked_loads(text: str) -> tuple[str, ...]:
@@ -201,7 +210,7 @@ def _asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> 
 
     mesh = asked_mesh(beam, mesh_type, edge, unit)
     if edge is None and len(mesh.points) > SOLVED_FROM_FILE:
-        raise ValueError(
+        raise Unmet(
             f"--mesh: '{mesh_type}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are solved "
             "here; give a coarser mesh, or make it a mesh file of a study"
         )

@@ -2,6 +2,7 @@
 
 import os
 import re
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,18 @@ import click
 
 from .completion import mesh_types
 from .examples import examples
-from .options import asked_beam, asked_material, asked_mesh, asked_size, is_made, known_materials
+from .options import (
+    SPRING_FILES,
+    Unmet,
+    asked_beam,
+    asked_material,
+    asked_mesh,
+    asked_size,
+    check_target,
+    is_made,
+    known_materials,
+    refused,
+)
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -74,8 +86,7 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
     "target",
     required=True,
     type=click.Path(path_type=Path),
-    help="File: .csv, .json, .vtu (ParaView), .h5, .xml (MuJoCo), .scn or .py (SOFA) or .xpbd.json; one that is there "
-    "is replaced.",
+    help=f"File: {SPRING_FILES}; one that is there is replaced.",
 )
 def springs(
     beam: str,
@@ -98,29 +109,29 @@ def springs(
     The file says what its numbers are: definition, formula and source, and how far off the network is under traction,
     bending, shear and the load that is given, solved on this very mesh.
     """
-    from ..handover.formats import check_target
+    from ..handover.simulation import EquilibriumWarning
     from ..springs import DefinitionError
 
     try:
-        check_target(target)
+        check_target("--out", target)
         sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
         made = is_made(mesh_type)
         edge = asked_size(sheet, mesh_type, size) if made else None
         mesh = asked_mesh(sheet, mesh_type, edge, unit)
         name = f"{mesh_type} {size}" if made else Path(mesh_type).name
         net = _net(sheet, solid, mesh, name, definition, stiffness, load, force)
-        written = net.write(target)
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always", EquilibriumWarning)
+            written = net.write(target)
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else error
-        raise SystemExit(_refused(f"--out: {target}: {why}; give a file that can be written")) from None
+        raise SystemExit(refused(error, f"--out: {target}: {why}; give a file that can be written")) from None
     except (click.ClickException, DefinitionError, ValueError) as error:
-        raise SystemExit(_refused(OPTIONS.sub("--", str(getattr(error, "message", error)), count=1))) from None
+        said = OPTIONS.sub("--", str(getattr(error, "message", error)), count=1)
+        raise SystemExit(refused(error, said)) from None
     click.echo(written_text(net, written))
-
-
-def _refused(message: str) -> int:
-    click.echo(message, err=True)
-    return 1
+    for one in heard:
+        click.echo(str(one.message))
 
 
 def _net(
@@ -147,7 +158,7 @@ def _net(
         scene = Scene(beam, mesh, material, load, force, definition=definition, stiffness=stiffness)
         return SpringNet.from_scene(scene, name)
     except SingularError as error:  # of the patch test that scales springs
-        raise ValueError(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
+        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
 def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:

@@ -622,4 +622,6 @@ def _format_of(path: Path) -> _Format:
     ending = max((one for one in known if path.name.lower().endswith(one)), key=len, default="")
     if not ending:
         raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(known)}")
+    if path.name.lower() == ending:
+        raise ValueError(f"'{path}' is an ending alone; give a name before it, such as net{ending}")
     return known[ending]

@@ -1,5 +1,6 @@
 """What simulators need besides springs: masses, a damping, a step that is stable, and where it all should come to."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -40,6 +41,10 @@ class Net:
     energies: tuple[Terms, ...]
     header: Mapping[str, Any]
     masses: np.ndarray | None = None
+
+
+class EquilibriumWarning(UserWarning):
+    """What is written has no equilibrium to come to, or one that is far away."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,7 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
             displacements = found.displacements if status is Status.SOLVED else None
         except SingularError as error:
             why = str(error)
+        _warn(net, displacements, why)
     stable = largest
     if displacements is not None:
         # The loaded mode swings beyond its place, as damping that is critical for the lowest one lets it.
@@ -138,6 +144,18 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
         stable = min(stable, 2 / stiffest)
     step = STEP_SHARE * stable
     return Simulation(net.masses, force, largest, step, lowest, loaded, 2 * lowest, displacements, why)
+
+
+def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
+    """Say aloud what a file says of its equilibrium only where somebody looks for it."""
+    if displacements is None:
+        said = f"no equilibrium was found, so the file has none: {why}; give a smaller force"
+    else:
+        moved, extent = float(np.abs(displacements).max()), float(np.ptp(net.points, axis=0).max())
+        if moved <= extent:
+            return
+        said = f"the equilibrium is {moved:.3g} m away from rest, further than the beam is long ({extent:.3g} m)"
+    warnings.warn(said, EquilibriumWarning, stacklevel=2)
 
 
 def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:

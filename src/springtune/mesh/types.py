@@ -9,7 +9,7 @@ from typing import TypeVar
 from ..registry import Declared, Registry
 from .cells import SIDES, Mesh, MeshError
 
-MOST_MESHED = 10_000_000
+MOST_MESHED = 5_000_000
 """Particles beyond which no mesh is made: its edges alone take gigabytes."""
 
 
@@ -155,7 +155,7 @@ class MeshType(Declared):
             return ""
         least = 1.1 * size * math.sqrt(count / MOST_MESHED)
         remedy = f"at least {1e3 * least:.2g} mm" if least < side else "a shorter beam"
-        return f"makes some {count:.2g} particles of {box}, more than can be meshed ({MOST_MESHED:.0e}); give {remedy}"
+        return f"makes some {count:.2g} particles of {box}, more than can be meshed ({MOST_MESHED:,}); give {remedy}"
 
 
 MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type")

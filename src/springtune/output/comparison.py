@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 import xarray as xr
 
+from ..problem.quantities import nearest
 from .alignment import Axis, axis
 from .flags import NOT_REQUESTED, flag_words, is_flagged
 from .swept import with_swept
@@ -250,7 +251,7 @@ def compare(
     Raises
     ------
     ValueError
-        If neither dataset has a group that is asked for, or labels are none.
+        If neither dataset has a group that is asked for, or a variable that is ignored, or labels are none.
 
     Examples
     --------
@@ -263,6 +264,10 @@ def compare(
     [('stiffness', '100x20', 2.0)]
     """
     nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in with_swept([before, after])]
+    held = sorted({variable for own in nodes for data in own.values() for variable in map(str, data.variables)})
+    for pattern in ignored:
+        if not any(fnmatchcase(name, pattern) for name in held):
+            raise ValueError(f"--ignore {pattern}: neither has it; {nearest(pattern, held)}")
     if groups:
         wanted = {"/" + name.strip("/") for name in groups}
         for name in sorted(wanted - set(nodes[0]) - set(nodes[1])):

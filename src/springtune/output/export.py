@@ -26,6 +26,10 @@ from .text import label_text
 EXTRA = "install what is missing with `pip install springtune[export]`"
 
 
+class RequestError(ValueError):
+    """What is asked for is not in the dataset, or of no format: the request is wrong, not the dataset."""
+
+
 @dataclass(frozen=True)
 class Column:
     """A column of a long table.
@@ -90,13 +94,13 @@ def table(
     48
     >>> table(tree, "curves")
     Traceback (most recent call last):
-    ValueError: group 'curves': there is none; known: /, benchmark, block, ...
+    springtune.output.export.RequestError: group 'curves': there is none; known: /, benchmark, block, ...
     """
     data = _selected(_group(tree, group), selection or {})
     for name in variables:
         if name not in data.variables or name in data.dims:
             known = nearest(name, sorted(str(known) for known in data.variables if known not in data.dims))
-            raise ValueError(f"variable '{name}': group '{group}' has none of that name; {known}")
+            raise RequestError(f"variable '{name}': group '{group}' has none of that name; {known}")
     status = data.get("status")
     if variables:
         chosen = [data[name] for name in variables]
@@ -123,14 +127,14 @@ def _group(tree: xr.DataTree, name: str) -> xr.Dataset:
     names = {"/": tree} | {node.path[1:]: node for node in tree.subtree if node.path != "/"}
     wanted = name.strip("/") or "/"
     if wanted not in names:
-        raise ValueError(f"group '{name}': there is none; {nearest(wanted, ['/', *sorted(set(names) - {'/'})])}")
+        raise RequestError(f"group '{name}': there is none; {nearest(wanted, ['/', *sorted(set(names) - {'/'})])}")
     return names[wanted].to_dataset()
 
 
 def _selected(data: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> xr.Dataset:
     for name, labels in selection.items():
         if name not in data.dims:
-            raise ValueError(f"--select {name}: no dimension of that name; {nearest(name, map(str, data.dims))}")
+            raise RequestError(f"--select {name}: no dimension of that name; {nearest(name, map(str, data.dims))}")
         coordinate = data[name]
         data = data.isel({name: [_place(name, coordinate, label) for label in labels]})
     return data
@@ -147,7 +151,7 @@ def _place(name: str, coordinate: xr.DataArray, label: str) -> int:
         unit = coordinate.attrs.get("units", "1")
         listed = f"known: {', '.join(f'{value:g}' for value in known)}" + ("" if unit == "1" else f" {unit}")
     if not len(found):
-        raise ValueError(f"--select {name}={label}: no such label; {listed}")
+        raise RequestError(f"--select {name}={label}: no such label; {listed}")
     return int(found[0])
 
 
@@ -161,7 +165,7 @@ def _number(name: str, coordinate: xr.DataArray, label: str) -> float:
     try:
         return parse(label, kinds[0]) if kinds else float("nan")
     except UnitError as error:
-        raise ValueError(f"--select {name}: {error}") from None
+        raise RequestError(f"--select {name}: {error}") from None
 
 
 def _ordered(data: xr.Dataset, names: set[str]) -> list[str]:
@@ -331,7 +335,7 @@ def export(
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in EXPORTS:
-        raise ValueError(f"{path}: '{ending}' is no format to export to; give a file ending in {', '.join(EXPORTS)}")
+        raise RequestError(f"{path}: '{ending}' is no format to export to; give a file ending in {', '.join(EXPORTS)}")
     check_folder(path)
     if path.exists() and not force:
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
@@ -339,11 +343,11 @@ def export(
         return _mesh(tree, path, group, variables, selection or {})
     if ending in (".vtu", ".pvd"):
         if group.strip("/") not in ("", "fields") or variables:
-            raise ValueError(f"{path}: ParaView gets the group 'fields'; leave --group and --variables out")
+            raise RequestError(f"{path}: ParaView gets the group 'fields'; leave --group and --variables out")
         return _paraview(tree, path, selection or {})
     if ending == ".zarr":
         if group.strip("/") or variables or selection:
-            raise ValueError(
+            raise RequestError(
                 f"{path}: Zarr takes the whole dataset; leave --group, --variables and --select out, or export a table"
             )
         if path.exists() and not any((path / name).exists() for name in (".zgroup", "zarr.json")):
@@ -374,7 +378,7 @@ def _mesh(
     for name, given in selection.items():
         chosen = _selected(fields, {name: given})[name].values.tolist()
         if len(chosen) > 1:
-            raise ValueError(f"--select {name}: {len(chosen)} labels; give one, or export a table")
+            raise RequestError(f"--select {name}: {len(chosen)} labels; give one, or export a table")
         labels[name] = chosen[0]
     found = reading.field(tree, **labels)
     with replacing(path) as unfinished:
@@ -540,6 +544,6 @@ def selected(text: Sequence[str]) -> dict[str, list[str]]:
     for pair in (pair.strip() for one in text for pair in one.split(",")):
         name, equals, label = pair.partition("=")
         if not (name and equals and label):
-            raise ValueError(f"--select: '{pair}' is no dimension=label; give such as beam=200x40,mesh_size=5 mm")
+            raise RequestError(f"--select: '{pair}' is no dimension=label; give such as beam=200x40,mesh_size=5 mm")
         found.setdefault(name.strip(), []).append(label.strip())
     return found

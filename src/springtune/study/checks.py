@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..mesh import MESH_TYPES
+from ..mesh.types import MOST_MESHED
 from ..problem.loads import LOADS
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from ..problem.quantities import nearest
@@ -17,10 +18,6 @@ from .combinations import SAME_VALUE, check_groups, count, values_of
 from .config import GRID_PARAMETERS, PLAUSIBLE, StatedStiffness, StudyConfig
 from .messages import Key, Problems
 from .model import Grid, MeshSpec, Reference, SceneSpec
-
-MOST_PARTICLES = 5e6
-"""A mesh with more particles is taken for an error of units."""
-
 
 MOST_CELLS = 2_500_000
 """Most cells of a dataset: combinations of labels of all its dimensions, whether or not a grid asks for them."""
@@ -156,8 +153,8 @@ def check_particles(
     """Mesh sizes against the box that they are for: no mesh of an absurd number of particles."""
     size = min(sizes)
     particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
-    if particles > MOST_PARTICLES:
-        least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.2g} mm"
+    if particles > MOST_MESHED:
+        least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED):.2g} mm"
         problems.add(path, f"{1e3 * size:g} mm gives {particles:.0e} particles; give {least} or more")
 
 
@@ -230,9 +227,9 @@ def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[G
                 if size > min(length, height):
                     side = _in_mm(min(length, height))
                     problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
-                elif length * height / (COEFFICIENT * size**2) > MOST_PARTICLES:
+                elif length * height / (COEFFICIENT * size**2) > MOST_MESHED:
                     particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
-                    least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_PARTICLES):.2g} mm"
+                    least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED):.2g} mm"
                     problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
 
 

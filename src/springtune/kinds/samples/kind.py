@@ -6,11 +6,12 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from ...mesh import MESH_TYPES
+from ...mesh.types import MOST_MESHED
 from ...problem.loads import LOADS
 from ...problem.parameters import MOST_SCENES
 from ...problem.quantities import nearest
 from ...springs import DEFINITIONS
-from ...study.checks import MORE_SCENES, MOST_PARTICLES, most_scenes
+from ...study.checks import MORE_SCENES, most_scenes
 from ...study.config import Section
 from ...study.fields import (
     DefinitionName,
@@ -238,9 +239,9 @@ def _check_sizes(section, problems):
     if section.mesh_type in MESH_TYPES:
         box = (length["high"], height["low"] if relative else height["high"])
         particles = MESH_TYPES[section.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
-        if particles > MOST_PARTICLES:
+        if particles > MOST_MESHED:
             low, beam = f"{size['low']:g}" if relative else _mm(size["low"]), f"{_mm(box[0])} x {_mm(box[1])}"
-            most = f"more than {MOST_PARTICLES:.0e}"
+            most = f"more than {MOST_MESHED:.0e}"
             problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
 
 

@@ -96,12 +96,12 @@ def _sensitivity(curves, root, selection, swept, ax):
     place = {"left": 0.45, "right": 0.14, "bottom": 0.4, "top": 0.52}
     style.arrange(figure, axes, **place)
     ends, seen = [], set()
+    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit
     for number, size in enumerate(curves.mesh_size.values):
         curve = curves.isel(mesh_size=number)
         if (curve.status.values != 0).any():
-            end, found = _curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number))
+            end, found = _curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
             ends, seen = [*ends, *end], seen | found
-    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit
     errors = 100 * np.abs(curves.deformation_error.values)
     highest = np.nanmax(errors, initial=0.0)
     lowest_of_each = [np.nanmin(one) for one in errors.reshape(-1, errors.shape[-1]) if np.isfinite(one).any()]
@@ -125,7 +125,7 @@ def _sensitivity(curves, root, selection, swept, ax):
     return panel
 
 
-def _curve(panel, curve, unit, name, look):
+def _curve(panel, curve, unit, name, look, known):
     """Draw one curve: ends for names, and what of it needs a word."""
     marker, colour, seen = look["marker"], look["color"], set()
     line = {"color": colour, "linestyle": look["linestyle"]}
@@ -138,7 +138,8 @@ def _curve(panel, curve, unit, name, look):
         stiffness, error = np.insert(stiffness, place, best), np.insert(error, place, 0.0)
         panel.plot(best / unit, 0, marker=marker, markersize=4.5, color=colour, clip_on=False, zorder=4)
         seen.add("minimum")
-    if np.isfinite(predicted):
+    # Beyond the axes a mark would stand over the words at their ends.
+    if np.isfinite(predicted) and known.size and known.min() <= predicted / unit <= known.max():
         panel.plot(predicted / unit, 0, marker="|", markersize=11, markeredgewidth=1.2, color=colour, clip_on=False)
         seen.add("predicted")
     unstable = np.where(flags == 4, error, np.nan)
