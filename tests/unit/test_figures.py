@@ -30,7 +30,7 @@ from springtune.kinds.laying.figures import plot_laying
 from springtune.kinds.moduli.figures import definitions, plot_definitions_loads, plot_definitions_size, plot_moduli
 from springtune.kinds.refinement.figures import plot_refinement
 from springtune.kinds.scenes import figures
-from springtune.kinds.scenes.figures import NETWORK_LINE, plot_block, plot_deformed, plot_sensitivity, plot_size
+from springtune.kinds.scenes.figures import NETWORK_LINE, _curve, plot_block, plot_deformed, plot_sensitivity, plot_size
 from springtune.kinds.stability.figures import (
     PLOTS,
     plot_stability_buckling,
@@ -399,3 +399,21 @@ def test_no_line_runs_through_the_key_of_a_sensitivity_figure(tree):
     frame = panel.get_legend().get_frame()
     assert frame.get_visible() and frame.get_alpha() == 1 and frame.get_facecolor()[:3] == (1, 1, 1)
     plt.close(panel.figure)
+
+
+@pytest.mark.parametrize(("predicted", "shown"), [(150e6, True), (50e6, False), (300e6, False)])
+def test_a_prediction_beyond_the_axes_has_no_mark_and_no_word(predicted, shown):
+    stiffness = np.array([100e6, 150e6, 200e6])
+    curve = xr.Dataset(
+        {
+            "stiffness": ("stiffness_ratio", stiffness),
+            "deformation_error": ("stiffness_ratio", [0.3, 0.2, 0.1]),
+            "status": ("stiffness_ratio", [1, 1, 1]),
+            "best_stiffness": np.nan,
+            "predicted_stiffness": predicted,
+        }
+    )
+    panel = Figure().add_subplot()
+    _, seen = _curve(panel, curve, 1e6, "5 mm", style.line(0), stiffness / 1e6)
+    assert ("predicted" in seen) == shown
+    assert any(line.get_marker() == "|" for line in panel.lines) == shown

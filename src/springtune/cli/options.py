@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ..problem.geometry import Beam
     from ..problem.materials import Material
 
-MANY = 1_000_000
+SAID_FROM = 1_000_000
 """Particles from which on it is said that a mesh is being made: it takes seconds."""
 
 WRONG, FAILED = 2, 1
@@ -149,7 +149,7 @@ def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "
 
     if edge is not None:
         count = MESH_TYPES[mesh_type].particles(beam.length, beam.height, edge)
-        if count > MANY:
+        if count > SAID_FROM:
             click.echo(f"making a {mesh_type} mesh of some {count / 1e6:.1f} million particles ...", err=True)
         return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
     scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
