@@ -30,7 +30,14 @@ from springtune.kinds.laying.figures import plot_laying
 from springtune.kinds.moduli.figures import definitions, plot_definitions_loads, plot_definitions_size, plot_moduli
 from springtune.kinds.refinement.figures import plot_refinement
 from springtune.kinds.scenes import figures
-from springtune.kinds.scenes.figures import NETWORK_LINE, _curve, plot_block, plot_deformed, plot_sensitivity, plot_size
+from springtune.kinds.scenes.figures import (
+    NETWORK_LINE,
+    draw_curve,
+    plot_block,
+    plot_deformed,
+    plot_sensitivity,
+    plot_size,
+)
 from springtune.kinds.stability.figures import (
     PLOTS,
     plot_stability_buckling,
@@ -414,6 +421,6 @@ def test_a_prediction_beyond_the_axes_has_no_mark_and_no_word(predicted, shown):
         }
     )
     panel = Figure().add_subplot()
-    _, seen = _curve(panel, curve, 1e6, "5 mm", style.line(0), stiffness / 1e6)
+    _, seen = draw_curve(panel, curve, 1e6, "5 mm", style.line(0), stiffness / 1e6)
     assert ("predicted" in seen) == shown
     assert any(line.get_marker() == "|" for line in panel.lines) == shown

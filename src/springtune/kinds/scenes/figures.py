@@ -100,7 +100,7 @@ def _sensitivity(curves, root, selection, swept, ax):
     for number, size in enumerate(curves.mesh_size.values):
         curve = curves.isel(mesh_size=number)
         if (curve.status.values != 0).any():
-            end, found = _curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
+            end, found = draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
             ends, seen = [*ends, *end], seen | found
     errors = 100 * np.abs(curves.deformation_error.values)
     highest = np.nanmax(errors, initial=0.0)
@@ -125,7 +125,7 @@ def _sensitivity(curves, root, selection, swept, ax):
     return panel
 
 
-def _curve(panel, curve, unit, name, look, known):
+def draw_curve(panel, curve, unit, name, look, known):
     """Draw one curve: ends for names, and what of it needs a word."""
     marker, colour, seen = look["marker"], look["color"], set()
     line = {"color": colour, "linestyle": look["linestyle"]}
