@@ -176,7 +176,7 @@ class TestErrors:
             (lambda: st.Material(1e9, 0.3, 0), "density: 0 is not above zero; give a density such as '7850 kg/m"),
             (lambda: st.make_mesh(BEAM, "structred", "5 mm"), "mesh type: 'structred' is unknown; did you mean"),
             (lambda: st.make_mesh(BEAM, "right", "30 mm"), "mesh size: '30 mm' is larger than beam .100x20."),
-            (lambda: st.make_mesh(BEAM, "right", "1 nm"), "'1 nm' makes some 2e.15 particles .* give at least 0.01"),
+            (lambda: st.make_mesh(BEAM, "right", "1 nm"), "'1 nm' makes some 2e.15 particles .* at least 0.022 mm"),
             (lambda: st.read_mesh("no.vtu", BEAM), "no.vtu: there is no such file; give the path of a mesh file"),
             (lambda: st.moduli(scene().mesh, STEEL, "baudet"), "definition 'baudet': needs .* use mesh type"),
             (lambda: st.moduli(scene().mesh, STEEL, "paper"), "definition 'paper' is told its stiffness .* choose one"),
