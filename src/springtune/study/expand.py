@@ -18,7 +18,7 @@ from .checks import check_cells, check_files, check_numbers, mesh_type_names, st
 from .combinations import Combination, combinations
 from .config import StudyConfig
 from .fields import RANGE_DIGITS
-from .messages import LONGEST_SHOWN, Problems
+from .messages import Problems, clipped
 from .model import (
     FURTHER_REFERENCES,
     CurveSpec,
@@ -277,7 +277,7 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
                 problems.add(
                     ("definitions", "calibrated"),
                     f"beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name} has "
-                    f"{len(values)} {what} ({_clipped(listed)}), and one stiffness is calibrated; give it one value, "
+                    f"{len(values)} {what} ({clipped(listed)}), and one stiffness is calibrated; give it one value, "
                     "or calibrate on a beam or load that is not swept",
                 )
     curves: list[CurveSpec] = []
@@ -291,10 +291,6 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
             )
         curves += found
     return curves
-
-
-def _clipped(text: str) -> str:
-    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
 
 
 def build(

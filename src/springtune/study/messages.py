@@ -70,7 +70,7 @@ class Problems:
         above = (path[:size] for size in range(len(path), 0, -1))
         line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
         place = self._places.get(path) or (f"{self._file}:{line}" if line else self._file)
-        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{_clipped(key)}" for key in path).removeprefix(".")
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{clipped(key)}" for key in path).removeprefix(".")
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
 
     def located(self, path: tuple[Key, ...], place: str) -> None:
@@ -145,8 +145,9 @@ def show(value: object) -> str:
         return "a list" if value else "an empty list"
     if value is None:
         return "nothing"
-    return f"'{_clipped(str(value))}'"
+    return f"'{clipped(str(value))}'"
 
 
-def _clipped(text: str) -> str:
+def clipped(text: str) -> str:
+    """Text of which a message shows the beginning."""
     return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."

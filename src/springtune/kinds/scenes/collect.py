@@ -320,7 +320,8 @@ def _face_reference(study, folder, one, kind):
 
 def _fields(study, folder, axes):
     """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
-    scenes = [scene for scene in study.scenes if scene in plan.shown_scenes(study)]
+    whole = plan.shown_scenes(study)
+    scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
     kept = [
         mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))

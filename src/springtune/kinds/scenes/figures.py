@@ -175,11 +175,11 @@ def _key(panel, seen):
 
 
 def _sensitivity_title(panel, root, selection, swept):
-    named = dict(selection)
-    if root is not None and "beam" in named:
-        named["beam"] = labelled_beam(root, named["beam"])
+    shown = dict(selection)
+    if root is not None and "beam" in shown:
+        shown["beam"] = labelled_beam(root, shown["beam"])
     room = panel.get_window_extent().width / panel.figure.dpi
-    words = [*_named(named, "beam", "mesh_type", "material", "load"), *swept]
+    words = [*named(shown, "beam", "mesh_type", "material", "load"), *swept]
     first = labels.wrapped(", ".join(words), room, 8)
     if root is None:
         return first
@@ -226,10 +226,10 @@ def swept_words(values):
     return found
 
 
-def _named(selection, *names):
+def named(selection, *names):
     """Labels of a selection for a title."""
-    named = [str(selection[name]) for name in names if name in selection]
-    return named + [str(name) for name in [selection.get("kinematics", USUAL)] if name != USUAL]
+    found = [str(selection[name]) for name in names if name in selection]
+    return found + [str(name) for name in [selection.get("kinematics", USUAL)] if name != USUAL]
 
 
 # -- errors against mesh size ------------------------------------------------------------------------------------------
@@ -275,30 +275,55 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     ('Mesh size [mm]', 'Deformation error [%]')
     """
     root = group(data, "/")
-    root, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
+    root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
-    shown = []
-    for name in beams:
-        asked = labels_of(root.status.sel(beam=name) != 0, "definition")
-        parts = np.array_split(asked, -(-len(asked) // MOST_LINES))
-        shown += [(name, part.tolist()) for part in parts]
+    parts = {name: parts_of(root.status.sel(beam=name) != 0) for name in beams}
+    shown = [(name, number) for name in beams for number in range(len(parts[name]))]
+    looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
+
+    def draw(panel, one):
+        name, number = one
+        drawn = _errors(
+            panel, root.sel(beam=name), {each: looks[each] for each in parts[name][number]}, one == shown[0]
+        )
+        part = f", {number + 1} of {len(parts[name])}" if len(parts[name]) > 1 else ""
+        panel.set_xlabel("Mesh size [mm]")
+        return ", ".join([labelled_beam(root, name) + part, *swept_words(_of_beam(values, name))]), *drawn
+
+    return error_panels(ax, shown, draw, ", ".join(named(selection, "mesh_type", "material", "load")), bool(values))
+
+
+def error_panels(ax, shown, draw, title, swept):
+    """Small multiples of deformation errors.
+
+    Parameters
+    ----------
+    ax : Figure, sequence of Axes or None
+    shown : list
+        What each panel shows.
+    draw : callable
+        Of a panel and what it shows: draws it, and returns its title, ends of lines for their names, and a note.
+    title : str
+        Of the figure.
+    swept : bool
+        Whether titles of panels say what is swept, and take more lines.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_panels,)
+    """
     columns = min(3, len(shown)) if len(shown) != 4 else 2
     figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
-    title = ", ".join(_named(selection, "mesh_type", "material", "load"))
     place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
     style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
     drawn = []
-    for panel, (name, definitions) in zip(flat, shown):
-        looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
-        drawn.append(_errors(panel, root.sel(beam=name), {one: looks[one] for one in definitions}, panel is flat[0]))
-        parts = [one for beam, one in shown if beam == name]
-        part = f", {parts.index(definitions) + 1} of {len(parts)}" if len(parts) > 1 else ""
-        room = panel.get_window_extent().width / panel.figure.dpi
-        words = ", ".join([labelled_beam(root, name) + part, *swept_words(_of_beam(values, name))])
-        panel.set(title=labels.wrapped(words, room, 8), xlabel="Mesh size [mm]")
+    for panel, one in zip(flat, shown):
+        words, *found = draw(panel, one)
+        drawn.append(found)
+        panel.set_title(labels.wrapped(words, panel.get_window_extent().width / panel.figure.dpi, 8))
     under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
-    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if values else 0.0
+    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
     if ax is None:
         figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
     for panel in axes[:, 0]:
@@ -323,19 +348,10 @@ def _errors(panel, here, looks, first):
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes, ends, said, statuses = 1e3 * here.mesh_size.values, [], [], set()
     for definition, look in looks.items():
-        cell = here.sel(definition=definition)
-        error, flags = 100 * cell.deformation_error.values, cell.status.values
-        known = np.isfinite(error)
-        if known.any():
-            panel.plot(sizes, error, label=definition, **look)
-            last = np.flatnonzero(known)[-1]
-            ends.append((sizes[last], error[last], definition, look["color"]))
-        doubtful = known & (flags > 1)
-        if doubtful.any():
-            panel.plot(sizes[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
-                       markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
-            statuses |= {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}
-        said += _lacking(definition, sizes, flags, known)
+        end, doubts, lost = error_line(panel, sizes, here.sel(definition=definition), definition, look)
+        ends, statuses = ends + end, statuses | doubts
+        for reason, values in lost.items():
+            said.append(f"{definition}, {', '.join(f'{value:g}' for value in values)} mm: {reason}")
     if statuses:
         said.insert(0, f"hollow: {', '.join(sorted(statuses))}")
     if "paper_displacement" in here:
@@ -355,21 +371,57 @@ def _errors(panel, here, looks, first):
     return ends, "\n".join(labels.wrapped(text, room) for text in said)
 
 
-def _lacking(definition, sizes, flags, known):
-    """Sizes on which a definition was asked for and has no error, and why: lines of a note."""
-    reasons = {}
-    for size, flag in zip(sizes[~known], flags[~known]):
+def error_line(panel, x, cell, name, look, asked=...):
+    """Draw the errors of a definition, hollow where their equilibrium is in doubt.
+
+    Parameters
+    ----------
+    panel : matplotlib.axes.Axes
+    x : ndarray, shape (n,)
+    cell : xarray.Dataset
+        With ``deformation_error`` and ``status``, shape (n,).
+    name : str
+    look : dict
+        Of the line.
+    asked : ndarray of bool, optional
+        Where the line goes; a value that is not there is a gap in it.
+
+    Returns
+    -------
+    ends : list of tuple
+        End of the line for its name; none of a line without values.
+    doubts : set of str
+        What is in doubt.
+    lost : dict of str to list of float
+        Where it was asked for and has no error, by the reason.
+    """
+    error, flags = 100 * cell.deformation_error.values, cell.status.values
+    known, ends, lost = np.isfinite(error), [], {}
+    if known.any():
+        panel.plot(x[asked], error[asked], label=name, **look)
+        last = np.flatnonzero(known)[-1]
+        ends = [(x[last], error[last], name, look["color"])]
+    doubtful = known & (flags > 1)
+    if doubtful.any():
+        panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
+                   markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
+    for value, flag in zip(x[~known], flags[~known]):
         if flag:
-            reason = "no reference" if flag == 1 else STATUS[flag].replace("_", " ")
-            reasons.setdefault(reason, []).append(f"{size:g}")
-    return [f"{definition}, {', '.join(found)} mm: {reason}" for reason, found in reasons.items()]
+            lost.setdefault("no reference" if flag == 1 else STATUS[flag].replace("_", " "), []).append(value)
+    return ends, {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}, lost
+
+
+def parts_of(present):
+    """Definitions that a beam has, in parts that one panel can show."""
+    asked = labels_of(present, "definition")
+    return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
 
 
 def _of_beam(values, beam):
     return {name: value.sel(beam=beam) for name, value in values.items()}
 
 
-def _by_beam(root, beam, mesh_type, material, load, kinematics):
+def by_beam(root, beam, mesh_type, material, load, kinematics):
     """Data of a figure with a panel a beam, the beams, and the selection."""
     if beam is not None:
         choose(root.status != 0, beam=beam)
@@ -437,7 +489,7 @@ def plot_deformed(
     fields, root = group(data, "fields", alone=False), group(data, "/")
     kept = fields.definition.values.tolist()
     definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
-    cut, beams, selection = _by_beam(root, beam, mesh_type, material, load, kinematics)
+    cut, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     fields = fields.sel({"definition": definition, "mesh_type": selection["mesh_type"]})
     if "kinematics" in fields.dims:
         fields = fields.sel(kinematics=selection["kinematics"])
@@ -452,7 +504,7 @@ def plot_deformed(
     figure, axes = style.panels(
         ax, nrows=len(beams), figsize=(style.COLUMN, 0.8 + sum(heights) + 0.6 * (len(beams) - 1)), ratios=heights
     )
-    title = ", ".join(_named(selection, "mesh_type", "material", "load"))
+    title = ", ".join(named(selection, "mesh_type", "material", "load"))
     place = {"left": 0.45, "right": 0.08, "bottom": 0.38, "top": 0.58, "down": 0.6, "title": title}
     style.arrange(figure, axes, **place)
     grid, axes = axes, axes[:, 0]

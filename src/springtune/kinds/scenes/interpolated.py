@@ -4,11 +4,12 @@ An interpolant has no whole fields. References that need one are solved one by o
 """
 
 from math import ceil, floor, log, log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...problem.loads import LOADS
 from ...reference.similarity import unit_problem
 from ...springs import DEFINITIONS
+from .remembered import once_a_study
 from .shown import keeps_fields, shown
 
 if TYPE_CHECKING:
@@ -39,9 +40,8 @@ a study mostly leave its interpolant as it is."""
 NU_STEP = 0.05
 """Distance of the ends of ranges of Poisson's ratio [1]."""
 
-_known: dict[int, tuple[Any, Any, dict[str, "tuple[Box, dict[Body, tuple[float, float]]]"]]] = {}
 
-
+@once_a_study("grids", "outputs")
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     """Interpolants that a study has.
 
@@ -56,16 +56,6 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
         By the name of the kind of load: the box of aspect ratios and Poisson's ratios, and by beam, material and load
         the aspect ratio and Poisson's ratio of each of its unit problems.
     """
-    # Asked for every scene: grids of a study are known by their place.
-    known = _known.get(id(study.grids))
-    if known is None or known[0] is not study.grids or known[1] != study.outputs:
-        if len(_known) > 8:
-            _known.clear()
-        _known[id(study.grids)] = known = study.grids, study.outputs, _interpolants(study)
-    return known[2]
-
-
-def _interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     if any(name in study.outputs for name in WITH_FIELDS):
         return {}
     scenes = [scene for grid in study.grids for scene in grid.scenes]

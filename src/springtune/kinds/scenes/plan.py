@@ -13,6 +13,7 @@ from ...reference.similarity import unit_problem, unit_scales
 from ..base import Stage
 from . import stored_mesh
 from .interpolated import expected_solves, interpolants
+from .remembered import once_a_study
 from .shown import shown
 from .stored_scene import calibrated_key
 
@@ -136,16 +137,17 @@ def scene_key(study, scene):
     )
 
 
-_shared: dict[str, Any] = {}
+@once_a_study("grids", "outputs")
+def _parts(study):
+    """What `_common` has found of a study so far."""
+    return {}
 
 
 def _common(study, scene):
     """What scenes share that differ in force or by a factor on the stiffness: a part of their tasks, and its key."""
-    if _shared.get("grids") is not study.grids or _shared["outputs"] != study.outputs:
-        _shared.clear()
-        _shared.update(grids=study.grids, outputs=study.outputs, parts={})
+    known = _parts(study)
     place = scene.mesh, scene.material, scene.load, scene.definition, scene.kinematics
-    if place not in _shared["parts"]:
+    if place not in known:
         load, mesh = LOADS[scene.load], scene.mesh
         task = {
             "material": material_key(scene.material),
@@ -160,18 +162,14 @@ def _common(study, scene):
             task["reference"] = reference
         code = stage_key("kinds.scenes.solve"), definition_key(scene.definition)
         key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
-        _shared["parts"][place] = {"task": task, "key": key}
-    return _shared["parts"][place]
+        known[place] = {"task": task, "key": key}
+    return known[place]
 
 
-_shown: dict[str, Any] = {}
-
-
+@once_a_study("scenes")
 def shown_scenes(study):
     """Scenes whose whole fields are kept, whether or not they are drawn."""
-    if _shown.get("scenes") is not study.scenes:
-        _shown.update(scenes=study.scenes, found=shown(study.scenes, study.swept))
-    return _shown["found"]
+    return shown(study.scenes, study.swept)
 
 
 def solved_key(study, scene, calibration):
@@ -195,16 +193,11 @@ def _thickness_ratio(study, scene):
     return scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
 
 
-_thicknesses: dict[str, Any] = {}
-
-
+@once_a_study("curves")
 def _calibrating(study):
     """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
-    if _thicknesses.get("curves") is not study.curves:
-        curves = [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
-        found = {calibration_name(one): one.mesh.beam.thickness for one in curves}
-        _thicknesses.update(curves=study.curves, found=found)
-    return _thicknesses["found"]
+    curves = [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
+    return {calibration_name(one): one.mesh.beam.thickness for one in curves}
 
 
 def calibration_name(scene):

@@ -1,13 +1,10 @@
 """Figures of sweeps: errors against a parameter that a study gives several values."""
 
-import numpy as np
-
 from ...output import labels, style
-from ...output.dataset import STATUS
-from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept
+from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept
 from ...problem.parameters import SWEPT
 from ..base import distinct
-from .figures import swept_words
+from .figures import USUAL, by_beam, error_line, error_panels, named, parts_of, swept_words
 from .outputs import SCENE_LABELS
 
 ALONG_X = {
@@ -21,9 +18,6 @@ ALONG_X = {
 
 WIDE = 20.0
 """Largest value over the smallest from which on an axis is logarithmic."""
-
-MOST_LINES = 6
-"""Definitions in one panel; more of them take further panels."""
 
 
 def sweep(tree):
@@ -44,7 +38,7 @@ def sweep(tree):
         for stem, selection in distinct(f"sweep_{name}", SCENE_LABELS, cells(present, SCENE_LABELS)).items():
             here = present.sel(selection)
             counts = {one: _most(here.sel(kinematics=one), name) for one in labels_of(here, "kinematics")}
-            chosen = max(counts, key=lambda one: (counts[one], one == "nonlinear"))
+            chosen = max(counts, key=lambda one: (counts[one], one == USUAL))
             if counts[chosen] > 1:
                 yield stem, plot_sweep, selection | {"parameter": name, "kinematics": chosen}
 
@@ -102,43 +96,20 @@ def plot_sweep(
     swept = [name for name in SWEPT if name in root.status.dims]
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
-    if beam is not None:
-        choose(root.status != 0, beam=beam)
-        root = root.sel(beam=[beam])
     root = root[["status", "deformation_error", "beam_length", "beam_height"]]
-    selection = choose(root.status != 0, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics)
-    root = root.sel(selection)
-    present = root.status != 0
-    several = [name for name in labels_of(present, "beam") if _most(present.sel(beam=[name]), parameter) > 1]
-    shown = [_of_beam(root, name, parameter, mesh_size) for name in several or labels_of(present, "beam")]
-    shown = [(one, part.tolist()) for one in shown for part in _parts(one)]
-    columns = min(3, len(shown)) if len(shown) != 4 else 2
-    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
-    names = [str(selection[name]) for name in ("mesh_type", "material", "load") if name in selection]
-    names += [selection["kinematics"]] * (selection.get("kinematics", "nonlinear") != "nonlinear")
-    place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": ", ".join(names)}
-    style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
+    root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
+    several = [name for name in beams if _most((root.status != 0).sel(beam=[name]), parameter) > 1]
     looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
-    drawn = []
-    for panel, (one, definitions) in zip(flat, shown):
-        drawn.append(_panel(panel, one, {name: looks[name] for name in definitions}, parameter))
-        room = panel.get_window_extent().width / panel.figure.dpi
-        panel.set(title=labels.wrapped(one.attrs["words"], room, 8), xlabel=ALONG_X[parameter][0])
-    under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
-    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1)
-    if ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
-    for panel in axes[:, 0]:
-        panel.set_ylabel("Deformation error [%]")
-    place |= {"top": 0.48 + over, "bottom": 0.4 + under, "down": 0.7 + under + over, "across": 0.06}
-    labels.settle(figure, axes, place)
-    for panel, (ends, said) in zip(flat, drawn):
-        labels.name_lines(panel, ends)
-        if ends:
-            labels.note(panel, said)
-        else:
-            labels.say(panel, "no errors: " + said.replace("\n", "; "))
-    return flat
+    shown = [_of_beam(root, name, parameter, mesh_size) for name in several or beams]
+    shown = [(one, part) for one in shown for part in parts_of(one.status != 0)]
+
+    def draw(panel, one):
+        here, definitions = one
+        drawn = _panel(panel, here, {name: looks[name] for name in definitions}, parameter)
+        panel.set_xlabel(ALONG_X[parameter][0])
+        return here.attrs["words"], *drawn
+
+    return error_panels(ax, shown, draw, ", ".join(named(selection, "mesh_type", "material", "load")), True)
 
 
 def _most(present, parameter):
@@ -169,34 +140,15 @@ def _of_beam(root, name, parameter, mesh_size):
     return at(here, values).assign_attrs(words=", ".join(words))
 
 
-def _parts(here):
-    asked = labels_of(here.status != 0, "definition")
-    return np.array_split(asked, -(-len(asked) // MOST_LINES))
-
-
 def _panel(panel, here, looks, parameter):
     """Draw errors over a parameter: ends of lines for names, and what a note says."""
     here = here.transpose("definition", parameter, ...)
     x, ends, said, statuses = ALONG_X[parameter][1] * here[parameter].values, [], [], set()
     for definition, look in looks.items():
         cell = here.sel(definition=definition)
-        error, flags = 100 * cell.deformation_error.values, cell.status.values
-        known = np.isfinite(error)
-        if known.any():
-            # What other beams or grids ask for makes no gaps.
-            asked = flags != 0
-            panel.plot(x[asked], error[asked], label=definition, **look)
-            last = np.flatnonzero(known)[-1]
-            ends.append((x[last], error[last], definition, look["color"]))
-        doubtful = known & (flags > 1)
-        if doubtful.any():
-            panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
-                       markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
-            statuses |= {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}
-        lost: dict[str, list[float]] = {}
-        for value, flag in zip(x[~known], flags[~known]):
-            if flag:
-                lost.setdefault("no reference" if flag == 1 else STATUS[flag].replace("_", " "), []).append(value)
+        # What other beams or grids ask for makes no gaps.
+        end, doubts, lost = error_line(panel, x, cell, definition, look, cell.status.values != 0)
+        ends, statuses = ends + end, statuses | doubts
         for reason, found in lost.items():
             span = f"{min(found):.4g}" if len(found) == 1 else f"{len(found)} from {min(found):.4g} to {max(found):.4g}"
             said.append(f"{definition}, {span}: {reason}")
