@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .quantities import positive
 
 
@@ -61,3 +63,17 @@ class Material:
                 f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}: isotropic materials have -1 < nu <= 0.5; "
                 "give a number in that range"
             )
+
+    @property
+    def plane_stress(self) -> np.ndarray:
+        """Stiffness in plane stress [Pa], shape (3, 3): stresses xx, yy, xy of strains xx, yy and the shear angle xy.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
+        [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
+        """
+        modulus, nu = self.young_modulus, self.poisson_ratio
+        diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
+        return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
