@@ -87,7 +87,8 @@ class _Groups:
             elif block.type in LEFT_OUT:
                 (lines if block.type == "line" else points)[name].append(np.asarray(block.data)[chosen])
         for name, nodes in self._point_sets():
-            points[name].append(nodes)
+            if len(nodes):
+                points[name].append(nodes)
         for name in {**lines, **points, **cells}:
             if not NAME.fullmatch(name):
                 self.unusable[name] = f"cannot be a name; {NAME_RULE}"

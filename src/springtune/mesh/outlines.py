@@ -24,6 +24,9 @@ LEAST_AROUND = 6
 GRADING = 0.3
 """How much longer edges get over the distance from shorter ones, at most: netgen's."""
 
+EDGES_A_LINE = 0.6
+"""Length of a line over the mesh size that netgen takes it for, at least: 1 would divide edges next to shorter ones."""
+
 MOST_ROUNDS = 20
 """Most times that a mesh is made anew because netgen divided edges of arcs."""
 
@@ -121,12 +124,12 @@ def mesh_shape(
     if mesh_type != "free":
         raise MeshError(f"mesh type: {mesh_type!r} fills rectangles, and {what} has an outline of its own; give 'free'")
     sizes = _sizes(shape, size, dict(refined or {}), what)
-    stretches, inner_points = _divided(shape, sizes)
+    stretches, lines, fine = _divided(shape, sizes)
     (left, low), _ = shape.extent
     origin = np.array([left, low])
     regions = [one.inner for one in shape.rounds]
     for _ in range(MOST_ROUNDS):
-        made = _netgen(stretches, inner_points, sizes, regions, origin, what)
+        made = _netgen(stretches, lines, fine, sizes, regions, origin, what)
         arcs_divided = [n for n, found in made.divided.items() if stretches[n].side.arc]
         if not arcs_divided:
             break
@@ -173,12 +176,13 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
 
 def _divided(
     shape: Outlined, sizes: Mapping[str, float]
-) -> tuple[list[_Stretch], list[tuple[Point, Point, float, int]]]:
-    """Stretches of the outlines, one for each edge, and lines through points that are on none."""
+) -> tuple[list[_Stretch], list[tuple[Point, Point, int]], dict[Point, float]]:
+    """Stretches of the outlines, one for each edge; lines from points on none; and sizes at all named points."""
     (left, low), (right, high) = shape.extent
     small = 1e-9 * max(right - left, high - low)
     inside = dict(shape.points)
     stretches = []
+    fine: dict[Point, float] = {}
     for number, one in enumerate(shape.rounds):
         outer = 0 if one.around is None else 1 + one.around
         inner = 0 if one.inner is None else 1 + number
@@ -189,8 +193,10 @@ def _divided(
                 parameter = side.parameter_near(point, small)
                 if parameter is not None:
                     inside.pop(name, None)
-                    if min(math.dist(point, side.at(end)) for end in (0.0, 1.0)) > small:
-                        cuts.add(parameter)
+                    parameter = next((end for end in (0.0, 1.0) if math.dist(point, side.at(end)) <= small), parameter)
+                    cuts.add(parameter)
+                    place = side.at(parameter)
+                    fine[place] = min(sizes.get(name, size), fine.get(place, size))
             places = sorted(cuts)
             for begin, end in zip(places, places[1:]):
                 # A hair less: a side of exactly n edges shall not be split into n + 1 by rounding.
@@ -200,7 +206,8 @@ def _divided(
                     count = max(count, math.ceil(LEAST_AROUND * turn / (2 * math.pi) * (1 - 1e-9)))
                 ends = side.divided(max(count, 1), begin, end)
                 stretches += [_Stretch(side, *pair, inner, outer) for pair in zip(ends, ends[1:])]
-    return _apart(stretches, shape.name), _lines(shape, inside, sizes)
+    fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
+    return _apart(stretches, shape.name), _lines(shape, {point: fine[point] for point in inside.values()}), fine
 
 
 def _apart(stretches: list[_Stretch], name: str) -> list[_Stretch]:
@@ -222,12 +229,9 @@ def _apart(stretches: list[_Stretch], name: str) -> list[_Stretch]:
     raise MeshError(f"shape '{name}': arcs are too near to others to be meshed; keep them apart")
 
 
-def _lines(
-    shape: Outlined, named: Mapping[str, Point], sizes: Mapping[str, float]
-) -> list[tuple[Point, Point, float, int]]:
-    """Lines of one edge from points inside the body, their sizes and regions: netgen places particles on lines only."""
+def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, Point, int]]:
+    """Lines of one edge from points inside the body, and their regions: netgen places particles on lines only."""
     sides = [side for one in shape.rounds for side in one.sides]
-    points = {point: sizes.get(name, sizes[""]) for name, point in named.items()}
     found = []
     for point, size in points.items():
         others = [other for other in points if other != point]
@@ -244,7 +248,7 @@ def _lines(
             ends = [(point[0] + x, point[1] + y) for x, y in ways]
             end = max(ends, key=room)
         around = [i for i, one in enumerate(shape.rounds) if one.winds_about(point)]
-        found.append((point, end, size, 1 + min(around, key=lambda i: shape.rounds[i].area)))
+        found.append((point, end, 1 + min(around, key=lambda i: shape.rounds[i].area)))
     return found
 
 
@@ -261,7 +265,8 @@ class _Made:
 
 def _netgen(
     stretches: Sequence[_Stretch],
-    lines: Sequence[tuple[Point, Point, float, int]],
+    lines: Sequence[tuple[Point, Point, int]],
+    fine: Mapping[Point, float],
     sizes: Mapping[str, float],
     regions: Sequence[str | None],
     origin: np.ndarray,
@@ -275,22 +280,21 @@ def _netgen(
     unit = sizes[""]
     outline = SplineGeometry()
     pairs = [(stretch.side.at(stretch.low), stretch.side.at(stretch.high)) for stretch in stretches]
-    pairs += [(start, end) for start, end, *_ in lines]
-    fine = {start: size for start, _, size, _ in lines}
+    pairs += [(start, end) for start, end, _ in lines]
     numbers: dict[Point, int] = {}
     for point in (point for pair in pairs for point in pair):
         if point not in numbers:
             x, y = (np.array(point) - origin) / unit
             numbers[point] = outline.AppendPoint(x, y, maxh=fine.get(point, unit) / unit)
     joined = [(numbers[start], numbers[end]) for start, end in pairs]
-    domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for *_, region in lines]
+    domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for _, _, region in lines]
     for number, ((start, end), (inner, outer)) in enumerate(zip(joined, domains)):
         outline.Append(["line", start, end], leftdomain=inner, rightdomain=outer, bc=number + 1)
     for number, region in enumerate(regions):
         if region and region in sizes:
             outline.SetDomainMaxH(number + 1, sizes[region] / unit)
     try:
-        made = outline.GenerateMesh(maxh=1.0 + 1e-9, grading=GRADING)
+        made = outline.GenerateMesh(maxh=1.0 + 1e-9, grading=GRADING, segmentsperedge=EDGES_A_LINE)
     except NgException as error:
         raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: {error}; give another size") from None
     points = np.array([point.p for point in made.Points()])[:, :2]

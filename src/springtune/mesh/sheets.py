@@ -49,10 +49,6 @@ def sheet_fault(mesh: Mesh) -> str:
     if fault:
         return fault
     points = mesh.points
-    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
-    if len(again):
-        where = in_words(points[again[0]])
-        return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
     touching = _touching(points, outline)
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
@@ -60,6 +56,10 @@ def sheet_fault(mesh: Mesh) -> str:
         return (
             opening(points, outline[touching], count) or f"cells overlap ({count}, the first one {first}); remove some"
         )
+    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
+    if len(again):
+        where = in_words(points[again[0]])
+        return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
     rounds = _rounds(outline)
     for one in rounds:
         others = outline[~np.isin(outline[:, 0], one)]

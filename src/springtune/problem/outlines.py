@@ -416,6 +416,6 @@ def _chords_apart(a: Point, b: Point, c: Point, d: Point) -> tuple[float, Point]
     return min((_to_chord(a, c, d), a), (_to_chord(b, c, d), b), (_to_chord(c, a, b), c), (_to_chord(d, a, b), d))
 
 
-def in_mm(point: Point) -> str:
+def in_mm(point: Point, digits: int = 9) -> str:
     """A point, in words."""
-    return f"({1e3 * point[0]:.9g}, {1e3 * point[1]:.9g}) mm"
+    return f"({1e3 * point[0]:.{digits}g}, {1e3 * point[1]:.{digits}g}) mm"

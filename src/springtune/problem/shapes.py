@@ -652,10 +652,6 @@ class Shape:
     def _check_rounds(self) -> None:
         """Refuse rounds that meet each other or themselves, or are at a wrong place; turn a clockwise outline."""
         sides = _round(self.outline, "outline")
-        if enclosed(sides) < 0:
-            back = turned(sides)
-            object.__setattr__(self, "outline", tuple(Segment(one.start, one.centre, one.group) for one in back))
-            sides = back
         (left, low), (right, high) = extent(sides)
         size = max(right - left, high - low)
         rounds = [("outline", sides)]
@@ -672,8 +668,10 @@ class Shape:
         if met:
             (first, i), (second, j), where = met
             if first == second:
-                raise ValueError(f"{rounds[first][0]}: sides {i + 1} and {j + 1} meet at {in_mm(where)}; move a corner")
-            raise ValueError(f"{rounds[second][0]} meets {rounds[first][0]} at {in_mm(where)}; keep them apart")
+                raise ValueError(
+                    f"{rounds[first][0]}: sides {i + 1} and {j + 1} meet at {in_mm(where, 4)}; move a corner"
+                )
+            raise ValueError(f"{rounds[second][0]} meets {rounds[first][0]} at {in_mm(where, 4)}; keep them apart")
         for what, one in rounds[1:]:
             if not winds_about(sides, one[0].start):
                 raise ValueError(f"{what}: is outside the outline, at {in_mm(one[0].start)}; move it")
@@ -681,6 +679,9 @@ class Shape:
             inside = [what for what, one in rounds[1:] if one is not other and winds_about(other, one[0].start)]
             if inside and not hole.part:
                 raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
+        if enclosed(sides) < 0:
+            back = tuple(Segment(one.start, one.centre, one.group) for one in turned(sides))
+            object.__setattr__(self, "outline", back)
         names = set(self.groups) & set(self.points)
         if names:
             raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")
