@@ -9,7 +9,7 @@ import numpy as np
 
 from ..registry import NAME, NAME_RULE
 from .cells import Mesh, MeshError
-from .formats import CELLS, DIMENSIONS, LEFT_OUT, PART_NUMBERS, PHYSICAL, assembled, coordinates, file_content
+from .formats import CELL_DIMENSIONS, CELLS, LEFT_OUT, PART_NUMBERS, PHYSICAL, assembled, coordinates, file_content
 from .groups import GroupedMesh
 from .sheets import in_words, outline_of, sheet_fault
 
@@ -123,11 +123,11 @@ class _Groups:
         for key, arrays in content.cell_data.items():
             for number, values in enumerate(arrays):
                 values = np.asarray(values)
-                if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in DIMENSIONS:
+                if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in CELL_DIMENSIONS:
                     continue
                 if key == PHYSICAL:
                     for tag in np.unique(values[values != 0]).tolist():
-                        name = tags.get((tag, DIMENSIONS[blocks[number].type]), str(tag))
+                        name = tags.get((tag, CELL_DIMENSIONS[blocks[number].type]), str(tag))
                         if name not in named:
                             yield name, number, np.flatnonzero(values == tag)
                 elif key == PART_NUMBERS:
