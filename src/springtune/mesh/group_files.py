@@ -79,7 +79,9 @@ class _Groups:
             block = self.content.cells[number]
             if not len(chosen):
                 continue
-            if block.type in CELLS:
+            if not 0 <= chosen.min() <= chosen.max() < len(block.data):
+                self.unusable[name] = "has cells that are not in the file; remove these"
+            elif block.type in CELLS:
                 masks = cells.setdefault(
                     name, {n: np.zeros(len(found), dtype=bool) for n, found in self.mesh.cells.items()}
                 )
@@ -92,12 +94,16 @@ class _Groups:
         for name in {**lines, **points, **cells}:
             if not NAME.fullmatch(name):
                 self.unusable[name] = f"cannot be a name; {NAME_RULE}"
+            given = np.concatenate([one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]] or [[0]])
+            if not 0 <= given.min() <= given.max() < len(self.numbers):
+                self.unusable[name] = "has points that are not in the file; remove these"
+            if name in self.unusable:
                 continue
             if name in lines:
                 self._add_lines(name, np.unique(np.concatenate(lines[name]).reshape(-1, 2), axis=0))
             if name in points and name not in self.unusable:
                 self._add_points(name, np.unique(np.concatenate(points[name])))
-        self._add_parts({name: masks for name, masks in cells.items() if NAME.fullmatch(name)})
+        self._add_parts({name: masks for name, masks in cells.items() if name not in self.unusable})
         for name in [name for name in self.sides if name in self.points]:
             del self.points[name], self.sides[name]
             self.unusable[name] = "names sides and a point in the file; rename one"
