@@ -25,7 +25,7 @@ Ends = tuple[int, int]
 """Points at the ends of a side, the lower number first."""
 
 LARGEST_TURN = np.pi / 6
-"""Of a side of a triangle along an arc [rad]."""
+"""Of the direction of a side of a triangle along an arc [rad]."""
 
 LARGEST_SAGITTA = 0.15
 """Of a side of a triangle along an arc, over the distance to what else there is."""
@@ -128,13 +128,14 @@ class CoarseMesh:
     def _cut_side(self, first: int, second: int, share: float, new: int) -> np.ndarray:
         """The point a share of the way from one corner to another, and its number in the places of `sides`."""
         ends = (min(first, second), max(first, second))
-        side = self.sides.pop(ends, None)
+        side = self.sides.get(ends)
         if side is None:
             return self.points[first] + share * (self.points[second] - self.points[first])
         if first != ends[0]:
             share = 1 - share
         where = self.curve(ends, np.array([2 * share - 1]))[0]
         middle = side.angles[0] + share * (side.angles[1] - side.angles[0])
+        del self.sides[ends]
         self.sides[ends[0], new] = replace(side, angles=(side.angles[0], middle))
         self.sides[ends[1], new] = replace(side, angles=(side.angles[1], middle))
         return where
@@ -290,6 +291,14 @@ class _Piece:
             return self.start + shares[:, None] * (self.end - self.start)
         return self.arc.at(self.angles[0] + shares * (self.angles[1] - self.angles[0]))
 
+    @property
+    def turn(self) -> float:
+        """By which its direction turns [rad]."""
+        if self.arc is None:
+            return 0.0
+        one, other = (self.arc.slope(angle) for angle in self.angles)
+        return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one @ other))
+
     def cut(self, share: float) -> "tuple[_Piece, _Piece]":
         middle = self.at(np.array([share]))[0]
         angle = self.angles[0] + share * (self.angles[1] - self.angles[0])
@@ -391,8 +400,7 @@ def _refined(pieces: list[_Piece], largest_turn: float) -> list[_Piece]:
                 ELEMENT_GROWTH * nearest,
                 (2 * lengths[clear] + apart[clear]).min(initial=np.inf),
             )
-            turn = abs(piece.angles[1] - piece.angles[0])
-            if lengths[i] > 1.01 * limit or turn > 1.01 * largest_turn or sagittas[i] > LARGEST_SAGITTA * nearest:
+            if lengths[i] > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagittas[i] > LARGEST_SAGITTA * nearest:
                 refined += piece.cut(0.5)
                 done = False
             else:
@@ -410,7 +418,7 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     corners : iterable of str
         Named points that are to be corners of triangles; those on the outline are anyway.
     largest_turn : float
-        Of a side along an arc [rad].
+        Of the direction of a side along an arc [rad].
 
     Returns
     -------

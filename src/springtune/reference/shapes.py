@@ -271,12 +271,14 @@ class _Problem:
             raise ValueError(f"shape {shape.name!r} has no outline; give the mesh of its file")
         held = [support.group for support in load.supports]
         used = {*held, *(traction.group for traction in load.tractions)} & set(self.points)
+        # Small triangles where a stress is asked for: it is the last to converge.
+        probed = {quantity.of for quantity in load.quantities if quantity.kind == "stress"} & set(self.points)
         if grouped is not None:
-            self.mesh = grouped_mesh(grouped, {name: tuple(self.points[name]) for name in used})
+            self.mesh = grouped_mesh(grouped, {name: tuple(self.points[name]) for name in used | probed})
         else:
             turn = LARGEST_TURN
             for _ in range(5):
-                self.mesh = outline_mesh(shape, used, turn)
+                self.mesh = outline_mesh(shape, used | probed, turn)
                 if _unfolded(self.mesh):
                     break
                 turn /= 2
@@ -346,6 +348,8 @@ class _Problem:
         for name in used:
             point = self.mesh.named[name]
             self.corners.setdefault(point, "a force at a point" if name in at_points else "a support at a point")
+        for name in probed:
+            self.corners.setdefault(self.mesh.named[name], "")
         self.loaded_points = at_points
         self.infinite_energy = bool(at_points)
         self.kinds = {quantity.name: quantity.kind for quantity in load.quantities} | {"": "energy"}
@@ -393,7 +397,7 @@ class _Problem:
         where = self.points[quantity.of]
         extent = np.ptp(self.mesh.points, axis=0).max()
         for corner, what in self.corners.items():
-            if np.linalg.norm(self.mesh.points[corner] - where) <= 1e-9 * extent:
+            if what and np.linalg.norm(self.mesh.points[corner] - where) <= 1e-9 * extent:
                 finite = "stress" if quantity.kind == "stress" else "displacement"
                 return f"; {quantity.of!r} is a corner where {what}, and {finite} may be infinite there"
         return ""
@@ -450,7 +454,7 @@ class _Space:
             self.places[self.on_side(ends)[2:]] = inverse @ (mesh.curve(ends, along) - straight)
         bent = np.zeros(len(codes), dtype=bool)
         bent[[self._edge(ends) for ends in curved]] = True
-        self.curved = bent[of_triangles].any(axis=1)
+        self.curved = np.asarray(bent[of_triangles].any(axis=1))
 
     def _edge(self, ends: tuple[int, int]) -> int:
         return int(np.searchsorted(self.codes, ends[0] * len(self.mesh.points) + ends[1]))
@@ -705,7 +709,7 @@ class _Level:
             return self._area_growth()
         if quantity.kind == "stress":
             place = ("xx", "yy", "xy").index(quantity.component)
-            return float(self.stresses(problem.points[quantity.of][None])[0, place])
+            return float(self._corner_stress(space.mesh.named[quantity.of])[place])
         axis = "xy".index(quantity.component)
         if quantity.kind == "reaction":
             return self._reaction(quantity.of, axis)
@@ -789,6 +793,11 @@ class _Level:
             curved = curved[np.flatnonzero(np.abs(step).max(axis=1) > 1e-13)]
         return found, local
 
+    def _corner_stress(self, point: int) -> np.ndarray:
+        """Mean of the stresses in the triangles at a corner [Pa], shape (3,)."""
+        rows, places = np.nonzero(self.space.corners == point)
+        return self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places]).mean(axis=0)
+
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points [m], shape (n, 2)."""
         points = np.asarray(points, dtype=float)
@@ -804,11 +813,14 @@ class _Level:
         points = np.asarray(points, dtype=float)
         result = np.empty((len(points), 3))
         for rows in np.array_split(np.arange(len(points)), max(1, len(points) // 4000)):
-            found, local = self._located(points[rows])
-            _, gradients = shape_functions(self.space.degree, local)
-            numbers = self.space.numbers[found]
-            jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
-            slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
-            strains = np.stack([slopes[:, 0, 0], slopes[:, 1, 1], slopes[:, 0, 1] + slopes[:, 1, 0]], axis=1)
-            result[rows] = np.einsum("pij,pj->pi", self.problem.stiffness[self.space.mesh.parts[found]], strains)
+            result[rows] = self._stresses(*self._located(points[rows]))
         return result
+
+    def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Stresses in triangles at reference coordinates [Pa], shape (n, 3)."""
+        _, gradients = shape_functions(self.space.degree, local)
+        numbers = self.space.numbers[found]
+        jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
+        slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
+        strains = np.stack([slopes[:, 0, 0], slopes[:, 1, 1], slopes[:, 0, 1] + slopes[:, 1, 0]], axis=1)
+        return np.einsum("pij,pj->pi", self.problem.stiffness[self.space.mesh.parts[found]], strains)
