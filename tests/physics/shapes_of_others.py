@@ -21,7 +21,7 @@ def cook():
     )
     quantities = (
         Quantity("tip", "displacement", "tip", "y", 23.96, "Simo and Rifai 1990"),
-        Quantity("mean tip", "displacement", "right", "y"),
+        Quantity("mean-tip", "displacement", "right", "y"),
         Quantity("energy", "energy"),
         Quantity("reaction", "reaction", "left", "y", -1.0, "equilibrium"),
     )
@@ -42,14 +42,14 @@ def holed_plate(size=0.05, radius=0.01):
     )
     quantities = (
         Quantity("end", "displacement", "right", "x"),
-        Quantity("top of the hole", "stress", "top of the hole", "xx"),
+        Quantity("top-of-the-hole", "stress", "top-of-the-hole", "xx"),
         Quantity("area", "area"),
     )
     supports = (Support("lower", y=0.0), Support("left", x=0.0))
     force = 10e6 * size * 1e-3
     load = LoadCase("pull", supports, (Traction("right", (force, 0.0)),), quantities=quantities)
-    points = {"top of the hole": (0.0, radius), "side of the hole": (radius, 0.0)}
-    return Shape("plate with a hole", 1e-3, outline, points=points, loads={"pull": load}), Material(210e9, 0.3)
+    points = {"top-of-the-hole": (0.0, radius), "side-of-the-hole": (radius, 0.0)}
+    return Shape("plate-with-a-hole", 1e-3, outline, points=points, loads={"pull": load}), Material(210e9, 0.3)
 
 
 def nafems_le1():
@@ -62,12 +62,12 @@ def nafems_le1():
         Segment((0.0, 1.0), CENTRE, group="DA"),
     )
     quantities = (
-        Quantity("stress at D", "stress", "D", "yy", 92.7e6, "NAFEMS LE1"),
+        Quantity("stress-at-D", "stress", "D", "yy", 92.7e6, "NAFEMS-LE1"),
         Quantity("D", "displacement", "D", "x"),
     )
     supports = (Support("CD", y=0.0), Support("AB", x=0.0))
     load = LoadCase("pull", supports, pressures=(Pressure("BC", -10e6),), quantities=quantities)
-    shape = Shape("NAFEMS LE1", 0.1, outline, points={"D": (2.0, 0.0)}, loads={"pull": load})
+    shape = Shape("NAFEMS-LE1", 0.1, outline, points={"D": (2.0, 0.0)}, loads={"pull": load})
     return shape, Material(210e9, 0.3)
 
 
@@ -91,17 +91,17 @@ def ring(inner=0.5, outer=1.0, pressure=1e6):
     )
     source = "Lame 1852"
     quantities = (
-        Quantity("inner point", "displacement", "inner point", "x", radial(inner), source),
-        Quantity("outer arc", "displacement", "outer", "x", 2 / pi * radial(outer), source),
-        Quantity("hoop", "stress", "inner point", "yy", factor * (1 + outer**2 / inner**2), source),
-        Quantity("across", "stress", "inner point", "xx", -pressure, source),
+        Quantity("inner-point", "displacement", "inner-point", "x", radial(inner), source),
+        Quantity("outer-arc", "displacement", "outer", "x", 2 / pi * radial(outer), source),
+        Quantity("hoop", "stress", "inner-point", "yy", factor * (1 + outer**2 / inner**2), source),
+        Quantity("across", "stress", "inner-point", "xx", -pressure, source),
         Quantity("area", "area", "", "", pi / 2 * (outer * radial(outer) - inner * radial(inner)), source),
         Quantity("energy", "energy", "", "", pressure * inner * pi / 4 * radial(inner) * thickness, source),
         Quantity("force", "reaction", "lower", "y", -pressure * inner * thickness, "equilibrium"),
     )
     supports = (Support("lower", y=0.0), Support("left", x=0.0))
     load = LoadCase("pressure", supports, pressures=(Pressure("inner", pressure),), quantities=quantities)
-    points = {"inner point": (inner, 0.0)}
+    points = {"inner-point": (inner, 0.0)}
     return Shape("ring", thickness, outline, points=points, loads={"pressure": load}), material
 
 
@@ -132,12 +132,12 @@ def curved_bar(inner=5.0, outer=10.0, modulus=1e4, moved=0.01):
     quantities = (
         Quantity("force", "reaction", "end", "x", -force, source),
         Quantity("energy", "energy", "", "", force * moved / 2, source),
-        Quantity("root", "stress", "root point", "xx", hoop, source),
+        Quantity("root", "stress", "root-point", "xx", hoop, source),
     )
-    supports = (Support("end", x=-moved), Support("root", x=0.0), Support("root point", y=0.0))
-    load = LoadCase("end moved", supports, quantities=quantities)
-    points = {"root point": (0.0, inner)}
-    return Shape("curved bar", 1.0, outline, points=points, loads={"end moved": load}), Material(modulus, 0.25)
+    supports = (Support("end", x=-moved), Support("root", x=0.0), Support("root-point", y=0.0))
+    load = LoadCase("end-moved", supports, quantities=quantities)
+    points = {"root-point": (0.0, inner)}
+    return Shape("curved-bar", 1.0, outline, points=points, loads={"end-moved": load}), Material(modulus, 0.25)
 
 
 def l_shape():
@@ -167,7 +167,7 @@ def straight_beam():
         )
         for name, force, component, value in [("extension", (1.0, 0.0), "x", 3e-5), ("shear", (0.0, 1.0), "y", 0.1081)]
     }
-    return Shape("straight beam", 0.1, outline, loads=loads), Material(1e7, 0.3)
+    return Shape("straight-beam", 0.1, outline, loads=loads), Material(1e7, 0.3)
 
 
 def curved_beam():
@@ -181,7 +181,7 @@ def curved_beam():
     )
     quantities = (Quantity("end", "displacement", "end", "y", 0.08734, "MacNeal and Harder 1985"),)
     load = LoadCase("shear", (Support("root", 0.0, 0.0),), (Traction("end", (0.0, 1.0)),), quantities=quantities)
-    return Shape("curved beam", 0.1, outline, loads={"shear": load}), Material(1e7, 0.25)
+    return Shape("curved-beam", 0.1, outline, loads={"shear": load}), Material(1e7, 0.25)
 
 
 ALL = (cook, holed_plate, nafems_le1, ring, curved_bar, l_shape, straight_beam, curved_beam)
