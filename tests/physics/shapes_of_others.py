@@ -1,6 +1,6 @@
 """Shapes, loads and materials that others published with an answer, and where it stands."""
 
-from math import cos, log, pi, sin
+from math import log, pi
 
 from springtune.problem.materials import Material
 from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
@@ -9,10 +9,11 @@ CENTRE = (0.0, 0.0)
 
 
 def cook():
-    """Cook, J. Struct. Div. ASCE 100:1851 (1974), as Bergan and Felippa, CMAME 50:25 (1985), give it: E = 1, nu = 1/3,
-    a unit of shear on the right side, which is 16 of 48 long; in metres and newtons. The upper edge of the tip, at
-    (48, 60), is what some papers give; 23.96 is of (48, 52), of fine meshes of good elements (Simo and Rifai, IJNME
-    29:1595, 1990)."""
+    """Cook, J. Struct. Div. ASCE 100:1851 (1974): a trapezoid with a unit of shear on its right side.
+
+    In metres and newtons, E = 1 and nu = 1/3. 23.96 is the displacement of the middle of that side, (48, 52), by fine
+    meshes of good elements (Simo and Rifai, IJNME 29:1595, 1990).
+    """
     outline = (
         Segment((0.0, 0.0), group="lower"),
         Segment((48.0, 44.0), group="right"),
@@ -31,8 +32,10 @@ def cook():
 
 
 def holed_plate(size=0.05, radius=0.01):
-    """A quarter of a square plate with a hole, pulled along x by 10 MPa; Howland, Phil. Trans. R. Soc. A 229:49 (1930)
-    has the strip, Kirsch, Z. VDI 42:797 (1898) the plate without end, whose stress concentration is 3."""
+    """A quarter of a square plate with a hole, pulled along x by 10 MPa.
+
+    Kirsch, Z. VDI 42:797 (1898), has the plate without end, whose stress concentration is 3.
+    """
     outline = (
         Segment((radius, 0.0), group="lower"),
         Segment((size, 0.0), group="right"),
@@ -53,8 +56,10 @@ def holed_plate(size=0.05, radius=0.01):
 
 
 def nafems_le1():
-    """NAFEMS, The Standard NAFEMS Benchmarks, TNSB rev. 3 (1990), LE1: an elliptic membrane, a quarter of it, 10 MPa
-    outwards on the outer edge; 92.7 MPa along y at D."""
+    """NAFEMS, The Standard NAFEMS Benchmarks, TNSB rev. 3 (1990), LE1: a quarter of an elliptic membrane.
+
+    10 MPa pull its outer edge outwards; 92.7 MPa along y at D.
+    """
     outline = (
         Segment((2.0, 0.0), group="CD"),
         Segment((3.25, 0.0), CENTRE, group="BC"),
@@ -151,8 +156,10 @@ def l_shape():
 
 
 def straight_beam():
-    """MacNeal and Harder, Finite Elements in Analysis and Design 1:3 (1985): 6 x .2 x .1, E = 1e7, nu = .3, a unit force
-    at the end; 3e-5 along it, .1081 across."""
+    """MacNeal and Harder, Finite Elements in Analysis and Design 1:3 (1985): 6 x .2 x .1, E = 1e7, nu = .3.
+
+    Its end moves by 3e-5 along a unit force along the beam, by .1081 along one across it.
+    """
     corners = [(0.0, 0.0), (6.0, 0.0), (6.0, 0.2), (0.0, 0.2)]
     groups = ("lower", "end", "upper", "root")
     outline = tuple(Segment(corner, group=group) for corner, group in zip(corners, groups))
@@ -171,8 +178,10 @@ def straight_beam():
 
 
 def curved_beam():
-    """MacNeal and Harder, as `straight_beam`: a quarter of a ring, radii 4.12 and 4.32, t = .1, E = 1e7, nu = .25, a
-    unit force across its end; .08734."""
+    """MacNeal and Harder, as `straight_beam`: a quarter of a ring, radii 4.12 and 4.32, t = .1, E = 1e7, nu = .25.
+
+    A unit force across its end moves that by .08734 in their table; elasticity has .08854.
+    """
     outline = (
         Segment((4.12, 0.0), group="root"),
         Segment((4.32, 0.0), CENTRE, group="outer"),

@@ -32,6 +32,9 @@ STRESS_SHARE = 10.0
 #: Quantities below this share of the largest one of their kind are judged by that share.
 SMALLEST_SHARE = 1e-3
 
+#: Force on a support at a point, over all of them, that is taken for none.
+SMALLEST_REACTION = 1e-6
+
 #: Turn of an outline made of straight sides that is taken for none [rad]: a polygon that stands for a circle.
 SMOOTH_TURN = np.radians(12)
 
@@ -194,7 +197,7 @@ def converge(
     shape, load, materials, grouped, tolerance
         As in `solve_shape`.
     tractions, displacements : mapping of str to callable, optional
-        By group: vectors of points and outward normals.
+        By group: vectors of points and outward normals, instead of those that the load has there.
 
     Returns
     -------
@@ -207,7 +210,6 @@ def converge(
     """
     problem = _Problem(shape, load, materials, grouped, tractions or {}, displacements or {})
     names = [quantity.name for quantity in load.quantities]
-    judged = names + ([] if problem.infinite_energy else [""])
     values: list[dict[str, float]] = []
     estimates: dict[str, float] = {}
     complaint = ""
@@ -219,10 +221,10 @@ def converge(
         level = _Level(problem, degree)
         values.append(level.values())
         if len(values) < 3:
-            complaint = "of three levels"
             continue
         complaint = ""
-        for name in judged:
+        problem.look_at_reactions(level)
+        for name in names + ([] if problem.infinite_energy else [""]):
             kind = problem.kinds[name]
             scale = max(abs(values[-1][name]), SMALLEST_SHARE * level.scale(kind)) or 1.0
             before, last = (abs(values[i][name] - values[i - 1][name]) / scale for i in (-2, -1))
@@ -324,7 +326,7 @@ class _Problem:
         for support in load.supports:
             supported.setdefault(support.group, []).append((support.x, support.y))
         for group in displacements:
-            supported.setdefault(group, []).append(group)
+            supported[group] = [group]
 
         def condition(side: Side) -> object:
             found = [(group, supported.get(group, []), loads.get(group, [])) for group in side.groups]
@@ -342,8 +344,7 @@ class _Problem:
             flat = np.abs(way) < 1e-12
             return bool(flat[1] and x is None and y is not None or flat[0] and y is None and x is not None)
 
-        smooth = SMOOTH_TURN if grouped is not None else 1e-6
-        self.corners = singular_corners(self.mesh, condition, lambda side: not condition(side), mirror, smooth)
+        self.corners = singular_corners(self.mesh, condition, lambda side: not condition(side), mirror, SMOOTH_TURN)
         at_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
         for name in used:
             point = self.mesh.named[name]
@@ -352,6 +353,7 @@ class _Problem:
             self.corners.setdefault(self.mesh.named[name], "")
         self.loaded_points = at_points
         self.infinite_energy = bool(at_points)
+        self.reacting: list[str] = []
         self.kinds = {quantity.name: quantity.kind for quantity in load.quantities} | {"": "energy"}
         self._quantities = {quantity.name: quantity for quantity in load.quantities}
         for quantity in load.quantities:
@@ -384,6 +386,16 @@ class _Problem:
                 f"{', '.join(sorted(self.loaded_points))} over a side"
             )
 
+    def look_at_reactions(self, level: "_Level") -> None:
+        """Note supports at points that carry a force, under which displacements and energy of a continuum are infinite.
+
+        Held points that only keep a body from moving carry none.
+        """
+        least = SMALLEST_REACTION * level.scale("reaction")
+        held = [support.group for support in self.load.supports if support.group in self.points]
+        self.reacting = [name for name in held if np.abs(level.residual[self.mesh.named[name]]).max() > least]
+        self.infinite_energy = bool(self.loaded_points or self.reacting)
+
     def place(self, name: str) -> str:
         """Of what a quantity is."""
         of = self._quantities[name].of if name else ""
@@ -392,6 +404,9 @@ class _Problem:
     def reason(self, name: str) -> str:
         """Why a quantity may not converge."""
         quantity = self._quantities.get(name)
+        if quantity and self.reacting and quantity.kind != "reaction":
+            names = ", ".join(map(repr, dict.fromkeys(self.reacting)))
+            return f"; held points carry forces, under which a continuum gives way without end: hold sides, not {names}"
         if quantity is None or quantity.of not in self.points:
             return ""
         where = self.points[quantity.of]
@@ -575,6 +590,8 @@ class _Level:
         load, thickness = problem.load, problem.shape.thickness
         total = np.zeros((space.n_functions, 2))
         for traction in load.tractions:
+            if traction.group in problem.tractions:
+                continue
             if traction.group in space.mesh.named:
                 total[space.mesh.named[traction.group]] += traction.force
             else:
@@ -598,7 +615,7 @@ class _Level:
         held, values = np.zeros((space.n_functions, 2), dtype=bool), np.zeros((space.n_functions, 2))
         for support in problem.load.supports:
             for axis, value in enumerate((support.x, support.y)):
-                if value is None:
+                if value is None or support.group in problem.displacements:
                     continue
                 if support.group in space.mesh.named:
                     corners = np.array([space.mesh.named[support.group]])
