@@ -735,7 +735,7 @@ class _Level:
         if quantity.kind == "energy":
             return self.energy
         if quantity.kind == "area":
-            return self._area_growth()
+            return float(self._area_growth().sum())
         if quantity.kind == "stress":
             place = ("xx", "yy", "xy").index(quantity.component)
             return float(self._corner_stress(space.mesh.named[quantity.of])[place])
@@ -760,8 +760,8 @@ class _Level:
                 claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
-    def _area_growth(self) -> float:
-        """Integral of the divergence of the displacements."""
+    def _area_growth(self) -> np.ndarray:
+        """Divergence of the displacements times the areas of quadrature points [m2]."""
         space = self.space
         _, weights, _, gradients = tabulated(space.degree, 2 * space.degree)
         jacobian, determinant = space.jacobians(gradients)
@@ -769,7 +769,7 @@ class _Level:
         # The determinant cancels: cofactors of the map, with its sense.
         by_x = slopes[..., 0, 0] * jacobian[..., 1, 1] - slopes[..., 0, 1] * jacobian[..., 1, 0]
         by_y = slopes[..., 1, 1] * jacobian[..., 0, 0] - slopes[..., 1, 0] * jacobian[..., 0, 1]
-        return float(((by_x + by_y) * np.sign(determinant) * weights).sum())
+        return (by_x + by_y) * np.sign(determinant) * weights
 
     def scale(self, kind: str) -> float:
         """What is largest of a kind of quantity."""
@@ -778,7 +778,7 @@ class _Level:
         if kind == "displacement":
             return motion
         if kind == "area":
-            return motion * float(np.ptp(mesh.points, axis=0).max())
+            return float(np.abs(self._area_growth()).sum())  # what shrinks apart from what grows
         if kind == "reaction":
             points = self.residual[: len(mesh.points)]
             return float(np.abs(points[self.held[: len(mesh.points)]]).sum())
