@@ -1,0 +1,601 @@
+r"""Coarse triangles of a shape whose sides lie on its arcs, graded towards its corners.
+
+Triangles at a corner are cut at a fifth of their sides, again and again: the layers of `grade`::
+
+        c
+       / \            Each triangle (v, a, b) becomes a similar one (v, a', b') and two beside it. Neighbours share
+      /   \           their cuts, so that the mesh stays conforming.
+     a'----b'
+    /   .    \
+   a ---------- b
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mesh.cells import MeshError, signed_areas
+from ..mesh.groups import GroupedMesh
+from ..problem.outlines import OutlineSide, Point
+from ..problem.shapes import Shape
+from .small_strain import ELEMENT_GROWTH, SHRINKAGE
+
+Ends = tuple[int, int]
+"""Points at the ends of a side, the lower number first."""
+
+LARGEST_TURN = np.pi / 6
+"""Of the direction of a side of a triangle along an arc [rad]."""
+
+LARGEST_SAGITTA = 0.15
+"""Of a side of a triangle along an arc, over the distance to what else there is."""
+
+SAMPLES = 7
+"""Points on a piece of an outline at which distances are taken."""
+
+SMALLEST = 1e-9
+"""Distance that is taken for none, over the extent of a shape."""
+
+STRAIGHT = 1e-6
+"""Turn of a polygon that is taken for none [rad]."""
+
+SMOOTH_TURN = np.radians(12)
+"""Turn of an outline that needs no smaller triangles [rad]: a polygon that stands for a circle."""
+
+SMALL_TURN = 1e-3
+"""Turn of an outline that is taken for none where stresses are concerned [rad]."""
+
+RIGHT_ANGLE = np.radians(91)
+"""Angle up to which the outline may have a corner between sides without supports and loads, and needs none [rad]."""
+
+FEWEST_ALONG = 4
+"""Sides of triangles along the extent of a shape, at least."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """A side of a triangle on the outline, or between two parts.
+
+    Attributes
+    ----------
+    groups : tuple of str
+        That it belongs to.
+    arc : OutlineSide or None
+        That it lies on; straight without.
+    span : tuple of float
+        Parameters of the arc at the corner of the lower number and at the other one.
+    """
+
+    groups: tuple[str, ...] = ()
+    arc: OutlineSide | None = None
+    span: tuple[float, float] = (0.0, 1.0)
+
+
+class CoarseMesh:
+    """Triangles, and what is known of their sides on the outline and between parts.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        [m]
+    triangles : ndarray of int, shape (n, 3)
+        Counter-clockwise.
+    parts : ndarray of int, shape (n,)
+        Number of the part that each is in.
+    names : tuple of str
+        Of the parts.
+    sides : dict of tuple of int to Side
+        By the points at their ends, the lower number first.
+    named : dict of str to int
+        Points of names that are corners of triangles.
+    """
+
+    def __init__(
+        self,
+        points: np.ndarray,
+        triangles: np.ndarray,
+        parts: np.ndarray,
+        names: tuple[str, ...],
+        sides: dict[Ends, Side],
+        named: dict[str, int],
+    ) -> None:
+        self.points, self.triangles, self.parts, self.names = points, triangles, parts, names
+        self.sides, self.named = sides, named
+
+    def copy(self) -> "CoarseMesh":
+        """A mesh that may be cut for itself."""
+        return CoarseMesh(self.points, self.triangles, self.parts, self.names, dict(self.sides), self.named)
+
+    def curve(self, ends: Ends, along: np.ndarray) -> np.ndarray:
+        """Points of a side, shape (n, 2) [m], from -1 at the corner of the lower number to 1."""
+        side = self.sides.get(ends)
+        share = (along + 1) / 2
+        if side is None or side.arc is None:
+            return self.points[ends[0]] + share[:, None] * (self.points[ends[1]] - self.points[ends[0]])
+        return _points(side.arc, side.span, share)
+
+    def _cut_side(self, first: int, second: int, share: float, new: int) -> np.ndarray:
+        """The point a share of the way from one corner to another, and its number in the places of `sides`."""
+        ends = (min(first, second), max(first, second))
+        side = self.sides.get(ends)
+        if side is None:
+            return self.points[first] + share * (self.points[second] - self.points[first])
+        if first != ends[0]:
+            share = 1 - share
+        where = self.curve(ends, np.array([2 * share - 1]))[0]
+        middle = side.span[0] + share * (side.span[1] - side.span[0])
+        del self.sides[ends]
+        self.sides[ends[0], new] = replace(side, span=(side.span[0], middle))
+        self.sides[ends[1], new] = replace(side, span=(side.span[1], middle))
+        return where
+
+    def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]], parts: list[int]) -> None:
+        self.triangles = np.concatenate([np.delete(self.triangles, rows, axis=0), np.array(triangles)])
+        self.parts = np.concatenate([np.delete(self.parts, rows), np.array(parts)])
+
+    def bisect(self, first: int, second: int) -> None:
+        """Split a side, and the triangles at it, in the middle.
+
+        Parameters
+        ----------
+        first, second : int
+            Points at its ends.
+        """
+        new = len(self.points)
+        where = self._cut_side(first, second, 0.5, new)
+        self.points = np.concatenate([self.points, where[None]])
+        rows = np.flatnonzero((self.triangles == first).any(axis=1) & (self.triangles == second).any(axis=1))
+        triangles, parts = [], []
+        for row in rows:
+            a, b, c = (int(corner) for corner in self.triangles[row])
+            while {a, b} != {first, second}:
+                a, b, c = b, c, a
+            triangles += [(a, new, c), (new, b, c)]
+            parts += [int(self.parts[row])] * 2
+        self._replace(rows, triangles, parts)
+
+    def insert(self, name: str, where: np.ndarray) -> None:
+        """Make a point inside the corner of triangles, and name it.
+
+        Parameters
+        ----------
+        name : str
+        where : ndarray of float, shape (2,)
+            [m]
+        """
+        near = np.argsort(np.linalg.norm(self.points - where, axis=1))
+        fixed = {end for ends in self.sides for end in ends} | set(self.named.values())
+        for point in near[:3]:
+            moved = self.points.copy()
+            moved[point] = where
+            around = self.triangles[(self.triangles == point).any(axis=1)]
+            if int(point) not in fixed and len(around) and _shapely(moved, around):
+                self.points, self.named = moved, self.named | {name: int(point)}
+                return
+        corners = self.points[self.triangles]
+        shares = np.stack([_area(where, corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]) for i in range(3)], axis=1)
+        row = int(np.argmax(shares.min(axis=1) / signed_areas(self.points, self.triangles)))
+        a, b, c = (int(corner) for corner in self.triangles[row])
+        new = len(self.points)
+        self.points, self.named = np.concatenate([self.points, where[None]]), self.named | {name: new}
+        self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)], [int(self.parts[row])] * 3)
+
+    def part_sides(self) -> dict[Ends, list[tuple[int, bool]]]:
+        """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
+        return _triangles_at(self.triangles, self.sides)
+
+    def isolate(self, corners: Iterable[int]) -> None:
+        """Bisect sides until no triangle has two of some corners.
+
+        Parameters
+        ----------
+        corners : iterable of int
+        """
+        chosen = np.array(sorted(corners), dtype=int)
+        while True:
+            among = np.isin(self.triangles, chosen)
+            rows = np.flatnonzero(among.sum(axis=1) > 1)
+            if not len(rows):
+                return
+            found = {
+                tuple(sorted(pair))
+                for row in rows
+                for pair in combinations((int(corner) for corner in self.triangles[row][among[row]]), 2)
+            }
+            first, second = min(found)
+            self.bisect(first, second)
+
+    def grade(self, corners: Iterable[int]) -> None:
+        """Cut the triangles at corners, of which no triangle has two, once.
+
+        Parameters
+        ----------
+        corners : iterable of int
+        """
+        for corner in sorted(corners):
+            rows = np.flatnonzero((self.triangles == corner).any(axis=1))
+            cuts: dict[int, int] = {}
+            wheres: list[np.ndarray] = []
+            triangles, parts = [], []
+            for row in rows:
+                v, a, b = (int(point) for point in self.triangles[row])
+                while v != corner:
+                    v, a, b = a, b, v
+                for end in (a, b):
+                    if end not in cuts:
+                        cuts[end] = len(self.points) + len(wheres)
+                        wheres.append(self._cut_side(corner, end, SHRINKAGE, cuts[end]))
+                near, far = cuts[a], cuts[b]
+                triangles += [(v, near, far)]
+                if np.linalg.norm(wheres[near - len(self.points)] - self.points[b]) < np.linalg.norm(
+                    wheres[far - len(self.points)] - self.points[a]
+                ):
+                    triangles += [(near, a, b), (near, b, far)]
+                else:
+                    triangles += [(near, a, far), (a, b, far)]
+                parts += [int(self.parts[row])] * 3
+            self.points = np.concatenate([self.points, np.array(wheres)])
+            self._replace(rows, triangles, parts)
+
+
+def _area(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> np.ndarray:
+    one, other = second - first, third - first
+    return 0.5 * (one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+
+
+def _shapely(points: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether triangles are counter-clockwise and not flat."""
+    sides = points[triangles] - points[np.roll(triangles, 1, axis=1)]
+    return bool((signed_areas(points, triangles) > 0.1 * (sides**2).sum(axis=(1, 2)) / 3).all())
+
+
+def _triangles_at(triangles: np.ndarray, sides: Iterable[Ends]) -> dict[Ends, list[tuple[int, bool]]]:
+    """Triangles at some sides, see `CoarseMesh.part_sides`."""
+    wanted: dict[Ends, list[tuple[int, bool]]] = {ends: [] for ends in sides}
+    corners = np.zeros(triangles.max() + 1, dtype=bool)
+    corners[[end for ends in wanted for end in ends]] = True
+    for i in range(3):
+        starts, ends = triangles[:, i], triangles[:, (i + 1) % 3]
+        for row in np.flatnonzero(corners[starts] & corners[ends]):
+            start, end = int(starts[row]), int(ends[row])
+            if (found := wanted.get((min(start, end), max(start, end)))) is not None:
+                found.append((int(row), start < end))
+    return wanted
+
+
+def _points(side: OutlineSide, span: tuple[float, float], shares: np.ndarray) -> np.ndarray:
+    """Points of a side at shares of the way between two parameters [m], shape (n, 2)."""
+    return np.array([side.at(float(span[0] + share * (span[1] - span[0]))) for share in shares])
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A stretch of the outline that becomes a side of triangles, or some; numbers of the regions beside it."""
+
+    side: OutlineSide
+    span: tuple[float, float]
+    groups: tuple[str, ...]
+    left: int
+    right: int
+
+    def at(self, shares: np.ndarray) -> np.ndarray:
+        return _points(self.side, self.span, shares)
+
+    @property
+    def turn(self) -> float:
+        """By which its direction turns [rad]."""
+        one, other = (self.side.slope(parameter) for parameter in self.span)
+        return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
+
+    def halves(self) -> "tuple[_Piece, _Piece]":
+        middle = sum(self.span) / 2
+        return replace(self, span=(self.span[0], middle)), replace(self, span=(middle, self.span[1]))
+
+
+def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
+    """Pieces that are short where others are near, and turn little."""
+    done = False
+    while not done:
+        done = True
+        samples = np.array([piece.at(np.linspace(0, 1, SAMPLES)) for piece in pieces])
+        chords = samples[:, -1] - samples[:, 0]
+        lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
+        normal = chords[:, ::-1] * [1, -1] / np.linalg.norm(chords, axis=1)[:, None]
+        sagittas = np.abs(((samples - samples[:, :1]) * normal[:, None]).sum(axis=2)).max(axis=1)
+        tree = cKDTree(samples.reshape(-1, 2))
+        refined: list[_Piece] = []
+        for piece, at, length, sagitta in zip(pieces, samples, lengths, sagittas):
+            # What is farther than its length does not matter.
+            near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // SAMPLES)
+            apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
+            clear = apart > SMALLEST * extent
+            nearest = apart[clear].min(initial=np.inf)
+            limit = min(
+                extent / FEWEST_ALONG,
+                ELEMENT_GROWTH * nearest,
+                (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf),
+            )
+            if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
+                refined += piece.halves()
+                done = False
+            else:
+                refined.append(piece)
+        pieces = refined
+    return pieces
+
+
+def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:
+    """Parameters of the ends of a side and of points on it, and the names of these."""
+    cuts, on_it = {0.0, 1.0}, []
+    for name, point in points.items():
+        parameter, distance = side.nearest(point)
+        if distance <= small:
+            on_it.append(name)
+            if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > small:
+                cuts.add(parameter)
+    return sorted(cuts), on_it
+
+
+def outline_mesh(
+    shape: Shape, grouped: GroupedMesh | None, points: Mapping[str, Point], largest_turn: float = LARGEST_TURN
+) -> CoarseMesh:
+    """Coarse triangles of a shape, by netgen's advancing front.
+
+    Parameters
+    ----------
+    shape : Shape
+    grouped : GroupedMesh or None
+        The mesh of one that is that of a file: the polygon around its cells, and those around its parts, are followed.
+    points : mapping of str to tuple of float
+        Named points that are to be corners of triangles [m].
+    largest_turn : float
+        Of the direction of a side along an arc [rad].
+
+    Returns
+    -------
+    CoarseMesh
+
+    Raises
+    ------
+    MeshError
+        If netgen fails.
+    """
+    if grouped is None:
+        names = ("", *shape.parts)
+        numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
+        whole = [
+            _Piece(side, (0.0, 1.0), (side.group,) if side.group else (), numbers[one.inner], numbers[one.outer])
+            for one in shape.rounds
+            for side in one.sides
+        ]
+    else:
+        names, whole = _polygons(grouped)
+    corners = np.array([end for piece in whole for end in (piece.side.start, piece.side.end)])
+    extent = float(np.ptp(corners, axis=0).max())
+    pieces, placed = [], set()
+    for piece in whole:
+        cuts, on_it = _cut(piece.side, points, SMALLEST * extent)
+        placed.update(on_it)
+        pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
+    mesh = _triangulated(shape.name, _refined(pieces, extent, largest_turn), names, extent)
+    for name, point in points.items():
+        where = np.array(point, dtype=float)
+        if name in placed:
+            mesh.named[name] = int(np.argmin(np.linalg.norm(mesh.points - where, axis=1)))
+            mesh.points[mesh.named[name]] = where
+    for name, point in points.items():
+        if name not in placed:
+            mesh.insert(name, np.array(point, dtype=float))
+    return mesh
+
+
+def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], extent: float) -> CoarseMesh:
+    """Triangles between pieces of outlines."""
+    from netgen.geom2d import SplineGeometry  # here, since only a shape should pay for it
+    from netgen.meshing import NgException
+
+    ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
+    # Lengths about 1: netgen's own tolerances are absolute.
+    scale, origin = FEWEST_ALONG / extent, ends.min(axis=(0, 1))
+    geometry = SplineGeometry()
+    keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
+    given = np.empty((len(keys), 2))
+    given[places.ravel()] = ends.reshape(-1, 2)
+    numbers = [geometry.AppendPoint(*((point - origin) * scale)) for point in given]
+    for i, (piece, (start, end)) in enumerate(zip(pieces, places.reshape(-1, 2))):
+        line = ["line", numbers[start], numbers[end]]
+        geometry.Append(line, leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
+    try:
+        made = geometry.GenerateMesh(maxh=1.0, grading=0.5)
+    except NgException as error:
+        raise MeshError(f"netgen cannot mesh {name!r}: {error}; look for sides that meet or touch") from None
+    points = np.array([point.p for point in made.Points()])[:, :2] / scale + origin
+    triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
+    parts = np.array([element.index - 1 for element in made.Elements2D()])
+    inverted = signed_areas(points, triangles) < 0
+    triangles[inverted] = triangles[inverted][:, ::-1]
+
+    sides = {}
+    exact = points.copy()
+    for element in made.Elements1D():
+        piece, (start, end) = pieces[element.index - 1], ends[element.index - 1]
+        first, second = sorted(vertex.nr - 1 for vertex in element.vertices)
+        shares = (points[[first, second]] - start) @ (end - start) / ((end - start) @ (end - start))
+        shares[np.abs(shares) < 1e-7] = 0.0
+        shares[np.abs(shares - 1) < 1e-7] = 1.0
+        exact[[first, second]] = piece.at(shares)
+        span = piece.span[0] + shares * (piece.span[1] - piece.span[0])
+        arc = piece.side if piece.side.arc else None
+        sides[first, second] = Side(piece.groups, arc, (float(span[0]), float(span[1])))
+    return CoarseMesh(exact, triangles, parts, names, sides, {})
+
+
+def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
+    """Names of parts, and straight pieces around and between the parts of a mesh."""
+    mesh = grouped.mesh
+    names = tuple(dict.fromkeys(["", *grouped.parts]))
+    ways, parts = [], []
+    for count, cells in mesh.cells.items():
+        of_cells = np.zeros(len(cells), dtype=int)
+        for name, inside in grouped.parts.items():
+            if count in inside:
+                of_cells[inside[count]] = names.index(name)
+        for i in range(count):
+            ways.append(cells[:, [i, (i + 1) % count]])
+            parts.append(of_cells)
+    n = len(mesh.points)
+    way, part = np.concatenate(ways), np.concatenate(parts)
+    codes, twins = way[:, 0] * n + way[:, 1], way[:, 1] * n + way[:, 0]
+    order = np.argsort(codes)
+    found = np.minimum(np.searchsorted(codes[order], twins), len(codes) - 1)
+    other = order[found]
+    outer = codes[other] != twins
+    between = ~outer & (part < part[other])
+    groups: dict[Ends, tuple[str, ...]] = {}
+    for name, edges in grouped.sides.items():
+        for first, second in np.sort(edges, axis=1).tolist():
+            groups[first, second] = (*groups.get((first, second), ()), name)
+    # From each point on: where to, and what is beside the way.
+    leaving: dict[int, list[tuple[int, tuple[tuple[str, ...], int, int]]]] = {}
+    arriving: dict[int, int] = {}
+    for row in np.flatnonzero(outer | between):
+        first, second = way[row].tolist()
+        right = 0 if outer[row] else int(part[other[row]]) + 1
+        key = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
+        leaving.setdefault(first, []).append((second, key))
+        arriving[second] = arriving.get(second, 0) + 1
+
+    def goes_on(before: int, here: int, key: object) -> tuple[int, object] | None:
+        """Where a straight way goes on to; None where it ends."""
+        if arriving.get(here) != 1 or len(leaving.get(here, ())) != 1 or leaving[here][0][1] != key:
+            return None
+        there = leaving[here][0][0]
+        one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
+        return (there, key) if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT * (one @ two) else None
+
+    continued = {
+        (here, goes_on(first, here, key)[0])  # type: ignore[index]
+        for first, ways_on in leaving.items()
+        for here, key in ways_on
+        if goes_on(first, here, key)
+    }
+    pieces = []
+    for first, ways_on in leaving.items():
+        for second, key in ways_on:
+            if (first, second) in continued:
+                continue
+            before, here = first, second
+            while (on := goes_on(before, here, key)) is not None:
+                before, here = here, on[0]
+            start, end = (tuple(mesh.points[point].tolist()) for point in (first, here))
+            pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *key))
+    return names, pieces
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A corner of the outline or of parts.
+
+    Attributes
+    ----------
+    what : str
+        What it is, in words.
+    rough : bool
+        Whether a solution is not smooth enough there for triangles of even size.
+    infinite : bool
+        Whether its stress is known to be infinite.
+    """
+
+    what: str
+    rough: bool = True
+    infinite: bool = False
+
+
+def corners_of(
+    mesh: CoarseMesh,
+    condition: Callable[[Side], object],
+    held: Callable[[Side], bool],
+    mirror: Callable[[Side, np.ndarray], bool],
+) -> dict[int, Corner]:
+    """Corners at which a solution may not be smooth.
+
+    Sides that are not held give way to an infinite stress where the outline is re-entrant, at more than half a turn
+    (Williams 1952); a side beyond which the solution goes on as its mirror image doubles the angle.
+
+    Parameters
+    ----------
+    mesh : CoarseMesh
+    condition : callable
+        What holds on a side, supports and loads; nothing where it is empty.
+    held : callable
+        Whether a side has a support.
+    mirror : callable
+        Whether the solution goes on beyond a side, of a direction, as its mirror image.
+
+    Returns
+    -------
+    dict of int to Corner
+    """
+    at_sides = mesh.part_sides()
+    at_corner: dict[int, list[Ends]] = {}
+    for ends in at_sides:
+        for end in ends:
+            at_corner.setdefault(end, []).append(ends)
+    inside: dict[int, set[int]] = {}
+    for row, i in zip(*np.nonzero(np.isin(mesh.triangles, list(at_corner)))):
+        inside.setdefault(int(mesh.triangles[row, i]), set()).add(int(mesh.parts[row]))
+
+    def leaving(corner: int, ends: Ends) -> np.ndarray:
+        """Direction of a side at a corner."""
+        side = mesh.sides[ends]
+        if side.arc is None:
+            other = ends[1] if ends[0] == corner else ends[0]
+            way = mesh.points[other] - mesh.points[corner]
+        else:
+            place = ends.index(corner)
+            way = np.array(side.arc.slope(side.span[place])) * (side.span[1 - place] - side.span[place])
+        return way / np.linalg.norm(way)
+
+    found: dict[int, Corner] = {}
+    for corner, around in at_corner.items():
+        outer = [ends for ends in around if len(at_sides[ends]) == 1]
+        between = [ends for ends in around if len(at_sides[ends]) > 1]
+        if len(inside[corner]) > 1:
+            if outer:
+                found[corner] = Corner("parts of different materials meet on the outline")
+            elif len(between) != 2:
+                found[corner] = Corner("parts meet")
+            else:
+                one, other = (leaving(corner, ends) for ends in between)
+                rough = np.arccos(np.clip(-(one @ other), -1, 1)) > SMOOTH_TURN
+                found[corner] = Corner("parts of different materials meet", bool(rough))
+            continue
+        if len(outer) != 2:
+            if outer:
+                found[corner] = Corner("pieces of the body touch")
+            continue
+        # The side from which the body lies counter-clockwise about the corner, then the other one.
+        leads = at_sides[outer[0]][0][1] == (outer[0][0] == corner)
+        first, last = outer if leads else outer[::-1]
+        one, other = leaving(corner, first), leaving(corner, last)
+        angle = float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other) % (2 * np.pi))
+        sides = mesh.sides[first], mesh.sides[last]
+        same = condition(sides[0]) == condition(sides[1])
+        mirrored = mirror(sides[0], one), mirror(sides[1], other)
+        free = not held(sides[0]), not held(sides[1])
+        bare = not condition(sides[0]), not condition(sides[1])
+        straight = same and abs(angle - np.pi) <= SMALL_TURN
+        if all(mirrored):
+            rough, infinite = abs(angle - np.pi / 2) > SMALL_TURN, angle > np.pi / 2 + SMALL_TURN and not straight
+        elif any(mirrored):
+            smooth = any(bare) and (2 * angle < RIGHT_ANGLE or abs(2 * angle - np.pi) <= SMOOTH_TURN)
+            rough, infinite = not smooth, any(free) and 2 * angle > np.pi + SMALL_TURN
+        else:
+            rough = not (all(bare) and angle < RIGHT_ANGLE)
+            infinite = all(free) and angle > np.pi + SMALL_TURN
+        what = "the outline has a corner" if same else "supports or loads change at an angle"
+        rough = rough and not (same and abs(angle - np.pi) <= SMOOTH_TURN)
+        found[corner] = Corner(f"{what} of {np.degrees(angle):.4g} degrees", rough, infinite)
+    return found
