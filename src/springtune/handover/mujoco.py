@@ -23,7 +23,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..mesh import corner_angles, signed_areas
-from .simulation import Net, Simulation, about, commented, numbers, simulate
+from .simulation import Net, Simulation, about, commented, load_in_words, numbers, simulate
 from .terms import Terms
 
 LEAST_MASS = 1e-15
@@ -109,7 +109,7 @@ def mjcf(net: Net) -> str:
 
 def _model(net: Net) -> str:
     load = net.header.get("load")
-    return net.header["definition"] + (f", {load['name']} of {abs(load['force']):g} N" if load else "")
+    return net.header["definition"] + (f", {load_in_words(load)}" if load else "")
 
 
 def _particles(net: Net, simulation: Simulation, bodies: bool) -> list[str]:

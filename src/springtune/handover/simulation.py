@@ -158,6 +158,22 @@ def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
     warnings.warn(said, EquilibriumWarning, stacklevel=2)
 
 
+def load_in_words(load: Mapping[str, Any]) -> str:
+    """Load of a header, with its size: the force on a beam, the factor on a load case of a shape.
+
+    Parameters
+    ----------
+    load : dict
+
+    Returns
+    -------
+    str
+    """
+    if "force" in load:
+        return f"{load['name']} of {abs(load['force']):g} N"
+    return load["name"] + ("" if load["scale"] == 1 else f" times {load['scale']:g}")
+
+
 def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:
     """Highest frequency about displacements [rad/s], by Lanczos' method; `Motion.omega_max` is that at rest."""
     root = diags_array(1 / np.sqrt(motion.mass))
@@ -251,7 +267,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     if left_out:
         lines.append(f"{left_out} springs of no stiffness are left out.")
     if load:
-        lines.append(f"Load: {load['name']} of {abs(load['force']):g} N.")
+        lines.append(f"Load: {load_in_words(load)}.")
     if isinstance(errors, dict):
         said = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
         if said:
