@@ -68,7 +68,7 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
             f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu, or, for its path, .pvd"
         )
     check_folder(path)
-    if result.equilibrium is None or not result.equilibrium.converged:
+    if not np.isfinite(result.displacement):
         raise ValueError(f"there is no equilibrium to write: {result.message}")
     if path.suffix.lower() == ".vtu":
         _Frames(scene).write(path, result.displacements)

@@ -736,7 +736,7 @@ class Result:
         """
         from .drawing import drawer
 
-        if self.equilibrium is None or not self.equilibrium.converged:
+        if not np.isfinite(self.displacement):
             raise ValueError(f"there is no equilibrium to draw: {self.message}")
         moved = self.scene.displacement_of(self.displacements)
         title = self.scene.title if np.isnan(moved) else f"{self.scene.title}: {1e3 * moved:.4g} mm"
