@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,7 +23,6 @@ from springtune.problem.boundary import (
     measured,
     particle_masses,
     reaction_weights,
-    supported,
     weights,
 )
 from springtune.problem.loads import LOAD_KINDS
@@ -166,7 +166,8 @@ def test_a_prescribed_stretch_is_the_equilibrium_under_its_forces(definition):
     result = scene.solve()
     assert result.status is st.Status.SOLVED
     reference, moved = scene.springs.reference, result.displacements
-    clamp = supported(grouped, replace(stretch, supports=CLAMP))[0]
+    clamp = np.zeros(scene.held.shape, dtype=bool)
+    clamp[grouped.sides["left"]] = True
     pulled = np.where(scene.held & ~clamp, scene.network.forces(moved), 0.0)
     network = Network(grouped.mesh, clamp, scene.springs.relative, scene.springs.energies)
     driven = StaticProblem(network, pulled).newton(1.0, moved + 1e-6 * LENGTH * ~clamp)
@@ -194,13 +195,14 @@ class TestEquilibrium:
         gravity=(0.0, -9.81),
     )
     shape = plate(case, points={"tip": (LENGTH, HEIGHT)}, holes=[st.Hole.circle((0.05, 0.02), 0.008)])
-    soft = st.Material("20 MPa", 0.3, density="7850 kg/m^3")
+    soft = st.Material("1 GPa", 0.3, density="7850 kg/m^3")
 
     @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
     def test_of_forces_and_moments(self, kinematics):
         grouped = st.mesh_shape(self.shape, 4e-3)
         scene = st.Scene(self.shape, grouped, self.soft, "pull", definition="delingette", kinematics=kinematics)
         solution = scene.statement.solve(scene.sheet, scene.springs)
+        assert solution.message == ""
         moved = solution.equilibrium.displacements
         acting = scene.forces
         if kinematics == "nonlinear":
@@ -246,7 +248,9 @@ def grouped_hole_area(grouped):
 
 
 def test_a_bar_hangs_by_its_weight():
-    """Its end moves by rho g L^2 / (2 E), of second order in the mesh size; its support carries all of it."""
+    """Its end moves by rho g L^2 / (2 E), on any mesh: an even pull on the end, which linear triangles answer exactly,
+    does the same work on both. Its support carries all of it.
+    """
     hang = load(
         END,
         st.Quantity("carried", "reaction", "left", "x"),
@@ -254,14 +258,9 @@ def test_a_bar_hangs_by_its_weight():
     )
     shape = plate(hang)
     material = st.Material("1 MPa", 0.0, density="1000 kg/m^3")
-    errors = []
-    for size in (10e-3, 5e-3):
-        grouped = st.mesh_shape(shape, size)
-        values = solved(shape, grouped, material).values
-        assert values["carried"] == pytest.approx(-1000 * 9.81 * LENGTH * HEIGHT * 1e-3, rel=1e-10)
-        errors.append(values["end"] / (1000 * 9.81 * LENGTH**2 / 2 / 1e6) - 1)
-    assert abs(errors[0]) < 0.02
-    assert abs(errors[1]) < abs(errors[0]) / 3
+    values = solved(shape, st.mesh_shape(shape, 7e-3), material).values
+    assert values["carried"] == pytest.approx(-1000 * 9.81 * LENGTH * HEIGHT * 1e-3, rel=1e-10)
+    assert values["end"] == pytest.approx(1000 * 9.81 * LENGTH**2 / 2 / 1e6, rel=1e-10)
 
 
 INNER, OUTER, PRESSURE = 0.05, 0.1, 1e6
@@ -281,7 +280,7 @@ def ring(*quantities):
 
 
 def test_a_ring_under_pressure():
-    """Lame: second order in displacement, and in the recovered stress on its rim better than first."""
+    """Lame: second order in displacement, and the recovered stress on its rim within .5 %."""
     shape = ring(st.Quantity("u", "displacement", "rim", "x"), st.Quantity("hoop", "stress", "rim", "yy"))
     ratio = INNER**2 / (OUTER**2 - INNER**2)
     radial = PRESSURE * ratio / 210e9 * (0.7 * INNER + 1.3 * OUTER**2 / INNER)
@@ -290,16 +289,17 @@ def test_a_ring_under_pressure():
     for size in (8e-3, 4e-3, 2e-3):
         values = solved(shape, st.mesh_shape(shape, size)).values
         errors.append((values["u"] / radial - 1, values["hoop"] / hoop - 1))
-    rates = np.log2(np.abs(errors[0]) / np.abs(errors[-1])) / 2
-    assert rates[0] == pytest.approx(2, abs=0.3)
-    assert rates[1] > 1.5
-    assert abs(errors[-1][0]) < 1e-3
-    assert abs(errors[-1][1]) < 0.01
+    moved, stress = np.transpose(errors)
+    assert np.log2(moved[0] / moved[-1]) / 2 == pytest.approx(2, abs=0.3)
+    assert abs(moved[-1]) < 2e-3
+    # That of the stress changes its sign.
+    assert np.abs(stress).max() < 5e-3
 
 
 def kirsch(points, radius=1.0):
     """Displacements over stress and shear modulus, and stress over stress, of a plate with a hole that is pulled along
-    x, in plane stress with nu = 0.3 (G. Kirsch, Z. VDI 42:797, 1898)."""
+    x, in plane stress with nu = 0.3 (G. Kirsch, Z. VDI 42:797, 1898).
+    """
     x, y = points.T
     r, turn = np.hypot(x, y), np.arctan2(y, x)
     kappa, a = (3 - 0.3) / (1 + 0.3), radius
@@ -315,7 +315,10 @@ def kirsch(points, radius=1.0):
 
 
 def test_recovered_stress_around_a_hole():
-    """Exact displacements on all of the outline but the hole: order two inside, three halves and more at the rim."""
+    """Exact displacements on all of the outline but the hole: order two inside, three halves and more at the rim.
+
+    Inside are the neighbours of the rim, too, hence the tolerance.
+    """
     o = (0.0, 0.0)
     outline = (
         st.Segment((1.0, 0.0), group="cut"),
@@ -327,7 +330,7 @@ def test_recovered_stress_around_a_hole():
     shape = st.Shape("plate", 1.0, outline)
     inside, rim = [], []
     material = st.Material(2.6, 0.3)  # of shear modulus 1
-    for size in (0.2, 0.1, 0.05):
+    for size in (0.1, 0.05):
         grouped = st.mesh_shape(shape, size)
         mesh = grouped.mesh
         springs = DEFINITIONS["delingette"].springs(mesh, material, 1.0)
@@ -346,11 +349,9 @@ def test_recovered_stress_around_a_hole():
         outline_[mesh.edges[mesh.on_outline]] = True
         inside.append(np.sqrt((away[~outline_] ** 2).mean()))
         rim.append(np.sqrt((away[on_rim] ** 2).mean()))
-    rate = np.polyfit(np.log([0.2, 0.1, 0.05]), np.log([inside, rim]).T, 1)[0]
-    print(rate, inside, rim)
-    assert rate[0] > 1.8
-    assert rate[1] > 1.5
-    assert rim[-1] < 0.02 * 3  # of the largest stress
+    assert np.log2(inside[0] / inside[1]) > 1.75
+    assert np.log2(rim[0] / rim[1]) > 1.5
+    assert rim[-1] < 0.02  # of the stress far away, a third of the largest one
 
 
 def test_stress_of_the_elliptic_membrane():
@@ -486,7 +487,7 @@ class TestRefusals:
             self.scene(material=210)
         with pytest.raises(ValueError, match="material: 'rim' is no part of the mesh"):
             self.scene(material={"": STEEL, "rim": RUBBER})
-        with pytest.raises(ValueError, match="the main part, '', has none; given: 'rim'"):
+        with pytest.raises(ValueError, match="main part, '' has none; given: 'rim'"):
             self.scene(material={"rim": RUBBER})
         beam = st.Beam("100 mm", "40 mm")
         mesh = st.make_mesh(beam, "right", "10 mm")
@@ -590,11 +591,11 @@ class TestAgainstReferences:
 
     def test_springs_fitted_to_the_reference(self):
         """Definitions that are told cases get the reference's displacements."""
-        scene = st.Scene(self.shape, st.mesh_shape(self.shape, 8e-3), THIRD, "pull", definition="adjoint",
+        scene = st.Scene(self.shape, st.mesh_shape(self.shape, 8e-3), THIRD, "pull", definition="annealed",
                          kinematics="linear")  # fmt: skip
         plain = st.Scene(self.shape, scene.grouped, THIRD, "pull", definition="lattice", kinematics="linear")
-        assert DEFINITIONS["adjoint"].needs == "cases"
-        assert abs(scene.solve().error) < 0.5 * abs(plain.solve().error)
+        assert DEFINITIONS["annealed"].needs == "cases"
+        assert abs(scene.solve().error) < 0.7 * abs(plain.solve().error)
 
     def test_is_drawn_and_written(self, tmp_path):
         result = solved(self.shape, self.grouped, STEEL, "lattice", "nonlinear")
@@ -606,7 +607,14 @@ class TestAgainstReferences:
         np.testing.assert_allclose(net.forces.sum(axis=0), [4e3, 0.0], atol=1e-8)
         assert net.masses.sum() == pytest.approx(7850 * 1e-3 * self.grouped.mesh.area, rel=1e-12)
         net.write(tmp_path / "net.csv")
-        assert result.scene.springs.write(tmp_path / "net.xml", errors=False)
+        scene = result.scene
+        scene.springs.write(tmp_path / "net.xml", errors=False)
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.xml"))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_forward(model, data)
+        # At our equilibrium its forces balance the load.
+        assert np.abs(data.qacc * model.body_mass[model.dof_bodyid]).max() < 1e-9 * 4e3
 
     def test_prescribed_displacements_are_in_no_file_of_springs(self, tmp_path):
         stretch = load(supports=(*CLAMP, st.Support("right", x=1e-4)))

@@ -147,9 +147,8 @@ def _tendons(net: Net, simulation: Simulation, dampers: bool) -> list[str]:
         for (first, second), stiffness, length in rows
         if stiffness
     ]
-    load = net.header.get("load")
-    if load:
-        shares = np.where(net.held, 0.0, net.forces / load["force"])
+    if simulation.force:
+        shares = np.where(net.held, 0.0, net.forces / simulation.force)
         joints = "".join(
             f'<joint joint="{"xy"[axis]}{number}" coef="{float(shares[number, axis])!r}"/>'
             for number, axis in np.argwhere(shares).tolist()
@@ -215,9 +214,10 @@ def _load(net: Net, simulation: Simulation) -> list[str]:
     lines = []
     if simulation.force:
         most = abs(simulation.force)
+        what = "load [N]" if "force" in net.header["load"] else "factor on the load"
         lines += [
             "  <actuator>",
-            "    <!-- The load [N]; the control is added to it. -->",
+            f"    <!-- The {what}; the control is added to it. -->",
             f'    <general name="load" tendon="load" gaintype="fixed" gainprm="1" biastype="affine" '
             f'biasprm="{simulation.force!r} 0 0" ctrllimited="true" ctrlrange="{-most!r} {most!r}"/>',
             "  </actuator>",

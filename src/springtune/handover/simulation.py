@@ -56,7 +56,7 @@ class Simulation:
     masses : ndarray of float, shape (n_points,)
         [kg]
     force : float
-        Of the load, with its sign [N]; 0 without a load.
+        Of the load, with its sign [N]; 1 for a load case of a shape, 0 without a load.
     largest_step : float
         Largest stable step of explicit schemes about rest, undamped [s].
     step : float
@@ -115,7 +115,8 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     assert net.masses is not None
     reference = float(net.header["reference_stiffness"])
     load = net.header.get("load")
-    force = float(load["force"]) if load else 0.0
+    # Of a shape, whose load case is of several forces, the factor on it.
+    force = float(load.get("force", 1.0)) if load else 0.0
     network = _network(net, reference)
     motion = Motion(network, net.masses / reference, net.forces / reference)
     largest = motion.step_limit("symplectic-euler")

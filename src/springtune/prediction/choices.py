@@ -82,7 +82,8 @@ class Choice:
     errors : dict of str to float
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
         (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
-        compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or for the reason in `failures`.
+        compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or
+        for the reason in `failures`.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
