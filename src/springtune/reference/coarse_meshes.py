@@ -15,52 +15,34 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.shapes import Segment, Shape
+from ..problem.outlines import OutlineSide
+from ..problem.shapes import Point, Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
 Ends = tuple[int, int]
 """Points at the ends of a side, the lower number first."""
 
 LARGEST_TURN = np.pi / 6
-"""Of a side of a triangle along an arc [rad]."""
+"""Of the direction of a side of a triangle along an arc [rad]."""
 
 LARGEST_SAGITTA = 0.15
 """Of a side of a triangle along an arc, over the distance to what else there is."""
 
+SAMPLES = 7
+"""Points on a piece of an outline at which distances are taken."""
+
+SMALLEST = 1e-9
+"""Distance that is taken for none, over the extent of a shape."""
+
+STRAIGHT = 1e-6
+"""Turn of a polygon that is taken for none [rad]."""
+
 FEWEST_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""
-
-
-@dataclass(frozen=True)
-class Arc:
-    """A circle, or an ellipse with its axes along x and y.
-
-    Attributes
-    ----------
-    centre : tuple of float
-        [m]
-    axes : tuple of float
-        Half axes along x and y [m].
-    """
-
-    centre: tuple[float, float]
-    axes: tuple[float, float]
-
-    def at(self, angles: np.ndarray | float) -> np.ndarray:
-        """Points of eccentric angles [rad], shape (..., 2) [m]."""
-        return np.array(self.centre) + np.array(self.axes) * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-
-    def slope(self, angle: float) -> np.ndarray:
-        """Derivative of `at`, shape (2,)."""
-        return np.array(self.axes) * [-np.sin(angle), np.cos(angle)]
-
-    def angle(self, point: Iterable[float]) -> float:
-        """Eccentric angle of a point [rad]."""
-        x, y = (np.array(point) - self.centre) / self.axes
-        return float(np.arctan2(y, x))
 
 
 @dataclass(frozen=True)
@@ -71,15 +53,15 @@ class Side:
     ----------
     groups : tuple of str
         That it belongs to.
-    arc : Arc or None
+    arc : OutlineSide or None
         That it lies on; straight without.
-    angles : tuple of float
-        On the arc, at the corner of the lower number and at the other one [rad].
+    span : tuple of float
+        Parameters of the arc at the corner of the lower number and at the other one.
     """
 
     groups: tuple[str, ...] = ()
-    arc: Arc | None = None
-    angles: tuple[float, float] = (0.0, 0.0)
+    arc: OutlineSide | None = None
+    span: tuple[float, float] = (0.0, 1.0)
 
 
 class CoarseMesh:
@@ -123,20 +105,21 @@ class CoarseMesh:
         share = (along + 1) / 2
         if side is None or side.arc is None:
             return self.points[ends[0]] + share[:, None] * (self.points[ends[1]] - self.points[ends[0]])
-        return side.arc.at(side.angles[0] + share * (side.angles[1] - side.angles[0]))
+        return _points(side.arc, side.span, share)
 
     def _cut_side(self, first: int, second: int, share: float, new: int) -> np.ndarray:
         """The point a share of the way from one corner to another, and its number in the places of `sides`."""
         ends = (min(first, second), max(first, second))
-        side = self.sides.pop(ends, None)
+        side = self.sides.get(ends)
         if side is None:
             return self.points[first] + share * (self.points[second] - self.points[first])
         if first != ends[0]:
             share = 1 - share
         where = self.curve(ends, np.array([2 * share - 1]))[0]
-        middle = side.angles[0] + share * (side.angles[1] - side.angles[0])
-        self.sides[ends[0], new] = replace(side, angles=(side.angles[0], middle))
-        self.sides[ends[1], new] = replace(side, angles=(side.angles[1], middle))
+        middle = side.span[0] + share * (side.span[1] - side.span[0])
+        del self.sides[ends]
+        self.sides[ends[0], new] = replace(side, span=(side.span[0], middle))
+        self.sides[ends[1], new] = replace(side, span=(side.span[1], middle))
         return where
 
     def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]], parts: list[int]) -> None:
@@ -273,127 +256,60 @@ def _triangles_at(triangles: np.ndarray, sides: Iterable[Ends]) -> dict[Ends, li
     return wanted
 
 
+def _points(side: OutlineSide, span: tuple[float, float], shares: np.ndarray) -> np.ndarray:
+    """Points of a side at shares of the way between two parameters [m], shape (n, 2)."""
+    return np.array([side.at(float(span[0] + share * (span[1] - span[0]))) for share in shares])
+
+
 @dataclass(frozen=True)
 class _Piece:
-    """A piece of a segment that becomes a side of triangles, or some."""
+    """A stretch of the outline that becomes a side of triangles, or some; numbers of the regions beside it."""
 
-    start: np.ndarray
-    end: np.ndarray
-    group: str
-    arc: Arc | None
-    angles: tuple[float, float]
+    side: OutlineSide
+    span: tuple[float, float]
+    groups: tuple[str, ...]
     left: int
     right: int
 
     def at(self, shares: np.ndarray) -> np.ndarray:
-        if self.arc is None:
-            return self.start + shares[:, None] * (self.end - self.start)
-        return self.arc.at(self.angles[0] + shares * (self.angles[1] - self.angles[0]))
+        return _points(self.side, self.span, shares)
 
-    def cut(self, share: float) -> "tuple[_Piece, _Piece]":
-        middle = self.at(np.array([share]))[0]
-        angle = self.angles[0] + share * (self.angles[1] - self.angles[0])
-        return (
-            replace(self, end=middle, angles=(self.angles[0], angle)),
-            replace(self, start=middle, angles=(angle, self.angles[1])),
-        )
+    @property
+    def turn(self) -> float:
+        """By which its direction turns [rad]."""
+        one, other = (self.side.slope(parameter) for parameter in self.span)
+        return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
 
-
-def arc_of(segment: Segment, end: tuple[float, float]) -> tuple[Arc, tuple[float, float]]:
-    """Arc of a segment, and the eccentric angles at its ends.
-
-    Parameters
-    ----------
-    segment : Segment
-        With a centre.
-    end : tuple of float
-        Where it ends [m].
-
-    Returns
-    -------
-    arc : Arc
-    angles : tuple of float
-        [rad], less than half a turn from each other.
-
-    Raises
-    ------
-    MeshError
-        If no ellipse about the centre with its axes along x and y passes both ends.
-    """
-    assert segment.centre is not None
-    first, second = (np.array(point) - segment.centre for point in (segment.start, end))
-    lengths = np.hypot(*first), np.hypot(*second)
-    if abs(lengths[0] - lengths[1]) <= 1e-9 * max(lengths):
-        axes = np.array([lengths[0], lengths[0]])
-    else:
-        squares = np.stack([first, second]) ** 2
-        try:
-            inverse = np.linalg.solve(squares, np.ones(2))
-        except np.linalg.LinAlgError:
-            inverse = np.zeros(2)
-        if not (inverse > 0).all():
-            raise MeshError(f"no ellipse about {segment.centre} passes {segment.start} and {end}; correct the centre")
-        axes = inverse**-0.5
-    arc = Arc(segment.centre, (float(axes[0]), float(axes[1])))
-    start, stop = arc.angle(segment.start), arc.angle(end)
-    return arc, (start, start + (stop - start + np.pi) % (2 * np.pi) - np.pi)
+    def halves(self) -> "tuple[_Piece, _Piece]":
+        middle = sum(self.span) / 2
+        return replace(self, span=(self.span[0], middle)), replace(self, span=(middle, self.span[1]))
 
 
-def _round(outline: tuple[Segment, ...], inner: int, outer: int, turned: bool) -> list[_Piece]:
-    """Pieces of a closed round, one a segment; `inner` is to the left where it is counter-clockwise."""
-    pieces = []
-    for segment, following in zip(outline, outline[1:] + outline[:1]):
-        start, end = np.array(segment.start), np.array(following.start)
-        arc, angles = arc_of(segment, following.start) if segment.centre is not None else (None, (0.0, 0.0))
-        left, right = (outer, inner) if turned else (inner, outer)
-        pieces.append(_Piece(start, end, segment.group, arc, angles, left, right))
-    return pieces
-
-
-def _polygon(outline: tuple[Segment, ...]) -> np.ndarray:
-    """Corners of a polygon that follows an outline closely."""
-    return np.concatenate([piece.at(np.linspace(0, 1, 24, endpoint=False)) for piece in _round(outline, 1, 0, False)])
-
-
-def _inside(polygon: np.ndarray, point: np.ndarray) -> bool:
-    start, end = polygon, np.roll(polygon, -1, axis=0)
-    crossed = (start[:, 1] > point[1]) != (end[:, 1] > point[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = start[:, 0] + (point[1] - start[:, 1]) * (end[:, 0] - start[:, 0]) / (end[:, 1] - start[:, 1])
-    return bool((crossed & (point[0] < x)).sum() % 2)
-
-
-def _turns(polygon: np.ndarray) -> bool:
-    """Whether a polygon is clockwise."""
-    x, y = (polygon - polygon[0]).T
-    return bool((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() < 0)
-
-
-def _refined(pieces: list[_Piece], largest_turn: float) -> list[_Piece]:
+def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
     """Pieces that are short where others are near, and turn little."""
-    extent = max(np.ptp([piece.start for piece in pieces], axis=0))
     done = False
     while not done:
         done = True
-        samples = np.array([piece.at(np.linspace(0, 1, 7)) for piece in pieces])
+        samples = np.array([piece.at(np.linspace(0, 1, SAMPLES)) for piece in pieces])
         chords = samples[:, -1] - samples[:, 0]
         lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
         normal = chords[:, ::-1] * [1, -1] / np.linalg.norm(chords, axis=1)[:, None]
         sagittas = np.abs(((samples - samples[:, :1]) * normal[:, None]).sum(axis=2)).max(axis=1)
+        tree = cKDTree(samples.reshape(-1, 2))
         refined: list[_Piece] = []
-        for i, piece in enumerate(pieces):
-            apart = np.linalg.norm(samples[:, None] - samples[i][None, :, None], axis=3).min(axis=(1, 2))
-            apart[i] = np.inf
-            clear = apart > 1e-9 * extent
+        for piece, at, length, sagitta in zip(pieces, samples, lengths, sagittas):
+            # What is farther than its length does not matter.
+            near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // SAMPLES)
+            apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
+            clear = apart > SMALLEST * extent
             nearest = apart[clear].min(initial=np.inf)
             limit = min(
                 extent / FEWEST_ALONG,
                 ELEMENT_GROWTH * nearest,
-                (2 * lengths[clear] + apart[clear]).min(initial=np.inf),
+                (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf),
             )
-            turn = abs(piece.angles[1] - piece.angles[0])
-            if lengths[i] > 1.01 * limit or turn > 1.01 * largest_turn or sagittas[i] > LARGEST_SAGITTA * nearest:
-                refined += piece.cut(0.5)
+            if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
+                refined += piece.halves()
                 done = False
             else:
                 refined.append(piece)
@@ -401,16 +317,32 @@ def _refined(pieces: list[_Piece], largest_turn: float) -> list[_Piece]:
     return pieces
 
 
-def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float = LARGEST_TURN) -> CoarseMesh:
-    """Coarse triangles of a shape that has an outline, by netgen's advancing front.
+def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:
+    """Parameters of the ends of a side and of points on it, and the names of these."""
+    cuts, on_it = {0.0, 1.0}, []
+    for name, point in points.items():
+        parameter, distance = side.nearest(point)
+        if distance <= small:
+            on_it.append(name)
+            if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > small:
+                cuts.add(parameter)
+    return sorted(cuts), on_it
+
+
+def outline_mesh(
+    shape: Shape, grouped: GroupedMesh | None, points: Mapping[str, Point], largest_turn: float = LARGEST_TURN
+) -> CoarseMesh:
+    """Coarse triangles of a shape, by netgen's advancing front.
 
     Parameters
     ----------
     shape : Shape
-    corners : iterable of str
-        Named points that are to be corners of triangles; those on the outline are anyway.
+    grouped : GroupedMesh or None
+        The mesh of one that is that of a file: the polygon around its cells, and those around its parts, are followed.
+    points : mapping of str to tuple of float
+        Named points that are to be corners of triangles [m].
     largest_turn : float
-        Of a side along an arc [rad].
+        Of the direction of a side along an arc [rad].
 
     Returns
     -------
@@ -421,55 +353,55 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     MeshError
         If netgen fails.
     """
+    if grouped is None:
+        names = ("", *shape.parts)
+        numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
+        whole = [
+            _Piece(side, (0.0, 1.0), (side.group,) if side.group else (), numbers[one.inner], numbers[one.outer])
+            for one in shape.rounds
+            for side in one.sides
+        ]
+    else:
+        names, whole = _polygons(grouped)
+    corners = np.array([end for piece in whole for end in (piece.side.start, piece.side.end)])
+    extent = float(np.ptp(corners, axis=0).max())
+    pieces, placed = [], set()
+    for piece in whole:
+        cuts, on_it = _cut(piece.side, points, SMALLEST * extent)
+        placed.update(on_it)
+        pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
+    mesh = _triangulated(shape.name, _refined(pieces, extent, largest_turn), names, extent)
+    for name, point in points.items():
+        where = np.array(point, dtype=float)
+        if name in placed:
+            mesh.named[name] = int(np.argmin(np.linalg.norm(mesh.points - where, axis=1)))
+            mesh.points[mesh.named[name]] = where
+    for name, point in points.items():
+        if name not in placed:
+            mesh.insert(name, np.array(point, dtype=float))
+    return mesh
+
+
+def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], extent: float) -> CoarseMesh:
+    """Triangles between pieces of outlines."""
     from netgen.geom2d import SplineGeometry  # here, since only a shape should pay for it
     from netgen.meshing import NgException
 
-    names = tuple(dict.fromkeys(["", *(hole.part for hole in shape.holes if hole.part)]))
-    polygons = [_polygon(hole.outline) for hole in shape.holes]
-    domains = [names.index(hole.part) + 1 if hole.part else 0 for hole in shape.holes]
-    pieces = _round(shape.outline, 1, 0, _turns(_polygon(shape.outline)))
-    for i, (hole, polygon) in enumerate(zip(shape.holes, polygons)):
-        around = [j for j, other in enumerate(polygons) if j != i and _inside(other, polygon[0])]
-        # The innermost of those around it is inside all others.
-        outer = max(around, key=lambda j: sum(_inside(polygons[k], polygons[j][0]) for k in around), default=None)
-        pieces += _round(hole.outline, domains[i], 1 if outer is None else domains[outer], _turns(polygon))
-
-    extent = max(np.ptp([piece.start for piece in pieces], axis=0))
-    placed, inner = {}, {}
-    for name, point in shape.points.items():
-        where = np.array(point, dtype=float)
-        for i, piece in enumerate(pieces):
-            share = _share(piece, where, 1e-9 * extent)
-            if share is not None:
-                placed[name] = where
-                if 1e-9 < share < 1 - 1e-9:
-                    pieces[i : i + 1] = piece.cut(share)
-                break
-        else:
-            if name in corners:
-                inner[name] = where
-    pieces = _refined(pieces, largest_turn)
-
+    ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
     # Lengths about 1: netgen's own tolerances are absolute.
-    scale = FEWEST_ALONG / extent
-    origin = pieces[0].start
+    scale, origin = FEWEST_ALONG / extent, ends.min(axis=(0, 1))
     geometry = SplineGeometry()
-    numbers: dict[tuple[int, int], int] = {}
-
-    def number(point: np.ndarray) -> int:
-        x, y = (point - origin) * scale
-        key = round(x * 1e8), round(y * 1e8)
-        if key not in numbers:
-            numbers[key] = geometry.AppendPoint(x, y)
-        return numbers[key]
-
-    for i, piece in enumerate(pieces):
-        ends = [number(piece.start), number(piece.end)]
-        geometry.Append(["line", *ends], leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
+    keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
+    given = np.empty((len(keys), 2))
+    given[places.ravel()] = ends.reshape(-1, 2)
+    numbers = [geometry.AppendPoint(*((point - origin) * scale)) for point in given]
+    for i, (piece, (start, end)) in enumerate(zip(pieces, places.reshape(-1, 2))):
+        line = ["line", numbers[start], numbers[end]]
+        geometry.Append(line, leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
     try:
         made = geometry.GenerateMesh(maxh=1.0, grading=0.5)
     except NgException as error:
-        raise MeshError(f"netgen cannot mesh {shape.name!r}: {error}; look for sides that meet or touch") from None
+        raise MeshError(f"netgen cannot mesh {name!r}: {error}; look for sides that meet or touch") from None
     points = np.array([point.p for point in made.Points()])[:, :2] / scale + origin
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
     parts = np.array([element.index - 1 for element in made.Elements2D()])
@@ -479,114 +411,78 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     sides = {}
     exact = points.copy()
     for element in made.Elements1D():
-        piece = pieces[element.index - 1]
-        chord = piece.end - piece.start
-        first, second = (vertex.nr - 1 for vertex in element.vertices)
-        shares = np.array([(points[end] - piece.start) @ chord / (chord @ chord) for end in (first, second)])
+        piece, (start, end) = pieces[element.index - 1], ends[element.index - 1]
+        first, second = sorted(vertex.nr - 1 for vertex in element.vertices)
+        shares = (points[[first, second]] - start) @ (end - start) / ((end - start) @ (end - start))
         shares[np.abs(shares) < 1e-7] = 0.0
         shares[np.abs(shares - 1) < 1e-7] = 1.0
         exact[[first, second]] = piece.at(shares)
-        angles = piece.angles[0] + shares * (piece.angles[1] - piece.angles[0])
-        if first > second:
-            first, second, angles = second, first, angles[::-1]
-        groups = (piece.group,) if piece.group else ()
-        sides[first, second] = Side(groups, piece.arc, (float(angles[0]), float(angles[1])))
-    for piece in pieces:  # the outline's own corners to the last bit
-        exact[np.argmin(np.linalg.norm(exact - piece.start, axis=1))] = piece.start
-    named = {}
-    for name, where in placed.items():
-        named[name] = int(np.argmin(np.linalg.norm(exact - where, axis=1)))
-        exact[named[name]] = where
-    mesh = CoarseMesh(exact, triangles, parts, names, sides, named)
-    for name, where in inner.items():
-        mesh.insert(name, where)
-    return mesh
+        span = piece.span[0] + shares * (piece.span[1] - piece.span[0])
+        arc = piece.side if piece.side.arc else None
+        sides[first, second] = Side(piece.groups, arc, (float(span[0]), float(span[1])))
+    return CoarseMesh(exact, triangles, parts, names, sides, {})
 
 
-def _share(piece: _Piece, where: np.ndarray, tolerance: float) -> float | None:
-    """How far along a piece a point is, from 0 to 1; None where it is not on it."""
-    if piece.arc is None:
-        chord = piece.end - piece.start
-        share = float((where - piece.start) @ chord / (chord @ chord))
-    else:
-        turn = piece.angles[1] - piece.angles[0]
-        beyond = (piece.arc.angle(where) - piece.angles[0]) * np.sign(turn)
-        share = float((beyond + 1e-9) % (2 * np.pi) - 1e-9) / abs(turn)
-    if not -1e-9 <= share <= 1 + 1e-9:
-        return None
-    share = min(max(share, 0.0), 1.0)
-    return share if np.linalg.norm(piece.at(np.array([share]))[0] - where) <= tolerance else None
-
-
-def grouped_mesh(grouped: GroupedMesh, corners: Mapping[str, tuple[float, float]]) -> CoarseMesh:
-    """Triangles of a mesh as read; quadrilaterals are halved by their shorter diagonal.
-
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    corners : mapping of str to tuple of float
-        Named points that are to be corners of triangles [m].
-
-    Returns
-    -------
-    CoarseMesh
-    """
+def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
+    """Names of parts, and straight pieces around and between the parts of a mesh."""
     mesh = grouped.mesh
     names = tuple(dict.fromkeys(["", *grouped.parts]))
-    of_cells = {count: np.zeros(len(cells), dtype=int) for count, cells in mesh.cells.items()}
-    for name, inside in grouped.parts.items():
-        for count, which in inside.items():
-            of_cells[count][which] = names.index(name)
-    triangles, parts = [mesh.triangles], [of_cells.get(3, np.zeros(0, dtype=int))]
-    if len(quads := mesh.quads):
-        at = mesh.points[quads]
-        across = np.linalg.norm(at[:, 2] - at[:, 0], axis=1) <= np.linalg.norm(at[:, 3] - at[:, 1], axis=1)
-        turned = np.where(across[:, None], quads, np.roll(quads, -1, axis=1))
-        triangles += [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
-        parts += [of_cells[4], of_cells[4]]
-    all_triangles, all_parts = np.concatenate(triangles), np.concatenate(parts)
-
-    groups: dict[tuple[int, int], tuple[str, ...]] = {}
-    for start, end in mesh.edges[mesh.on_outline].tolist():
-        groups[start, end] = ()
+    ways, parts = [], []
+    for count, cells in mesh.cells.items():
+        of_cells = np.zeros(len(cells), dtype=int)
+        for name, inside in grouped.parts.items():
+            if count in inside:
+                of_cells[inside[count]] = names.index(name)
+        for i in range(count):
+            ways.append(cells[:, [i, (i + 1) % count]])
+            parts.append(of_cells)
+    n = len(mesh.points)
+    way, part = np.concatenate(ways), np.concatenate(parts)
+    codes, twins = way[:, 0] * n + way[:, 1], way[:, 1] * n + way[:, 0]
+    order = np.argsort(codes)
+    found = np.minimum(np.searchsorted(codes[order], twins), len(codes) - 1)
+    other = order[found]
+    outer = codes[other] != twins
+    between = ~outer & (part < part[other])
+    groups: dict[Ends, tuple[str, ...]] = {}
     for name, edges in grouped.sides.items():
-        for start, end in np.sort(edges, axis=1).tolist():
-            groups[start, end] = (*groups.get((start, end), ()), name)
-    if len(names) > 1:
-        codes: dict[Ends, int] = {}
-        for i in range(3):
-            pairs = np.sort(all_triangles[:, [i, (i + 1) % 3]], axis=1)
-            for start, end, part in zip(*pairs.T.tolist(), all_parts.tolist()):
-                if codes.setdefault((start, end), part) != part:
-                    groups.setdefault((start, end), ())
-    # Points that no triangle has would be unknowns without a stiffness.
-    used, inverse = np.unique(all_triangles, return_inverse=True)
-    number = np.full(len(mesh.points), -1)
-    number[used] = np.arange(len(used))
-    sides = {}
-    for (start, end), of in groups.items():
-        first, second = int(number[start]), int(number[end])
-        sides[min(first, second), max(first, second)] = Side(of)
-    points = mesh.points[used]
-    coarse = CoarseMesh(points, inverse.reshape(-1, 3), all_parts, names, sides, {})
-    extent = np.ptp(points, axis=0).max()
-    for name, point in corners.items():
-        where = np.array(point, dtype=float)
-        apart = np.linalg.norm(coarse.points - where, axis=1)
-        if apart.min() <= 1e-9 * extent:
-            coarse.named[name] = int(np.argmin(apart))
-            continue
-        for first, second in list(coarse.sides):
-            start, end = coarse.points[first], coarse.points[second]
-            share = (where - start) @ (end - start) / ((end - start) @ (end - start))
-            if 0 < share < 1 and np.linalg.norm(start + share * (end - start) - where) <= 1e-9 * extent:
-                coarse.bisect(first, second)
-                coarse.points[-1] = where
-                coarse.named[name] = len(coarse.points) - 1
-                break
-        else:
-            coarse.insert(name, where)
-    return coarse
+        for first, second in np.sort(edges, axis=1).tolist():
+            groups[first, second] = (*groups.get((first, second), ()), name)
+    # From each point on: where to, and what is beside the way.
+    leaving: dict[int, list[tuple[int, tuple[tuple[str, ...], int, int]]]] = {}
+    arriving: dict[int, int] = {}
+    for row in np.flatnonzero(outer | between):
+        first, second = way[row].tolist()
+        right = 0 if outer[row] else int(part[other[row]]) + 1
+        key = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
+        leaving.setdefault(first, []).append((second, key))
+        arriving[second] = arriving.get(second, 0) + 1
+
+    def goes_on(before: int, here: int, key: object) -> tuple[int, object] | None:
+        """Where a straight way goes on to; None where it ends."""
+        if arriving.get(here) != 1 or len(leaving.get(here, ())) != 1 or leaving[here][0][1] != key:
+            return None
+        there = leaving[here][0][0]
+        one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
+        return (there, key) if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT * (one @ two) else None
+
+    continued = {
+        (here, goes_on(first, here, key)[0])  # type: ignore[index]
+        for first, ways_on in leaving.items()
+        for here, key in ways_on
+        if goes_on(first, here, key)
+    }
+    pieces = []
+    for first, ways_on in leaving.items():
+        for second, key in ways_on:
+            if (first, second) in continued:
+                continue
+            before, here = first, second
+            while (on := goes_on(before, here, key)) is not None:
+                before, here = here, on[0]
+            start, end = (tuple(mesh.points[point].tolist()) for point in (first, here))
+            pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *key))
+    return names, pieces
 
 
 def singular_corners(
@@ -633,7 +529,7 @@ def singular_corners(
             way = mesh.points[other] - mesh.points[corner]
         else:
             place = ends.index(corner)
-            way = side.arc.slope(side.angles[place]) * (side.angles[1 - place] - side.angles[place])
+            way = np.array(side.arc.slope(side.span[place])) * (side.span[1 - place] - side.span[place])
         return way / np.linalg.norm(way)
 
     found: dict[int, str] = {}
