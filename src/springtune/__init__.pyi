@@ -40,6 +40,7 @@ from .prediction import find_mesh as find_mesh
 from .prediction import predict as predict
 from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS
+from .problem.materials import AnisotropicMaterial as AnisotropicMaterial
 from .problem.materials import Material as Material
 from .problem.status import Status as Status
 from .scene.curve import Curve as Curve

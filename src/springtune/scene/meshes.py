@@ -14,13 +14,14 @@ FILLED = 1e-6
 """What a mesh may miss of its beam, over the beam's extent."""
 
 
-def is_a(value: object, wanted: type, name: str, example: str) -> None:
+def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str) -> None:
     """Refuse an argument of another type.
 
     Parameters
     ----------
     value : object
-    wanted : type
+    wanted : type or tuple of type
+        The first one is named in the message.
     name : str
         Of the argument.
     example : str
@@ -31,7 +32,8 @@ def is_a(value: object, wanted: type, name: str, example: str) -> None:
     ValueError
     """
     if not isinstance(value, wanted):
-        raise ValueError(f"{name}: {value!r} is not a {wanted.__name__}; give one such as {example}")
+        first = wanted[0] if isinstance(wanted, tuple) else wanted
+        raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
 
 
 A_BEAM, A_MESH, A_MATERIAL = (

@@ -69,11 +69,11 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
         if not number > 0:
             raise refuse(f"{show(value)} is not above zero; {negative}, such as '{example}'")
         if beyond(number, kind):
-            raise refuse(f"{show(value)} is beyond all measure; give a {kind} such as '{example}'")
+            raise refuse(f"{show(value)} is beyond all measure; give {units.QUANTITY_KINDS[kind].words}")
         return number
 
     schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
-    return Scalar(read, schema, f"a {kind} such as '{example}'")
+    return Scalar(read, schema, units.QUANTITY_KINDS[kind].words)
 
 
 def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:
