@@ -46,7 +46,7 @@ class Energy(ABC):
     points : ndarray of float, shape (n_points, 2)
         Rest positions of the particles [m].
     corners : ndarray of int, shape (n_cells, m)
-        Particles of each cell, counter-clockwise: all cells of a mesh with so many corners, as in its ``cells``.
+        Particles of each cell, counter-clockwise: all cells of a mesh with so many corners, or some.
     """
 
     points: np.ndarray

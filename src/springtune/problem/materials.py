@@ -280,7 +280,7 @@ class AnisotropicMaterial:
         """
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
-            if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], MATERIALS)):
+            if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
                 raise ValueError(f"ply {number}: {ply!r} is none; give a material, an angle and a thickness")
             material, angle, thickness = ply
             turned = rotated(material.plane_stress, quantity(angle, "angle", f"angle of ply {number}"))
@@ -408,7 +408,7 @@ CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")
 AnyMaterial = Material | AnisotropicMaterial
 """What a sheet can be of."""
 
-MATERIALS = (Material, AnisotropicMaterial)
+ANY_MATERIAL = (Material, AnisotropicMaterial)
 """Classes of `AnyMaterial`."""
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..mechanics.moduli import PatchTest, effective_stiffness
 from ..mesh import Mesh
-from ..problem.materials import MATERIALS, AnyMaterial, Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..springs import DefinitionError, Springs
 from .meshes import A_MATERIAL, A_MESH, is_a
 from .sheet import AnyDefinition, Sheet, definition_of, named
@@ -174,7 +174,7 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     '0.000000 0.3333 0.000000'
     """
     is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, MATERIALS, "material", A_MATERIAL)
+    is_a(material, ANY_MATERIAL, "material", A_MATERIAL)
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..mesh import Mesh
-from ..problem.materials import MATERIALS, AnyMaterial, Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import LEAST, MOST
 from ..registry import Declared, Registry
 
@@ -157,7 +157,7 @@ class Definition(Declared):
         """
         if not isinstance(mesh, Mesh):
             raise DefinitionError(f"mesh: {mesh!r} is not a Mesh; give a springtune.Mesh")
-        if not isinstance(material, MATERIALS):
+        if not isinstance(material, ANY_MATERIAL):
             raise DefinitionError(f"material: {material!r} is not a Material; give a springtune.Material")
         if not (material.isotropic or self.anisotropic):
             able = [name for name, one in DEFINITIONS.items() if one.anisotropic and not one.needs]
