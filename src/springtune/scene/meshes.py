@@ -7,6 +7,7 @@ import numpy as np
 from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
 from ..mesh.box import box_fault
 from ..problem.geometry import Beam
+from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive
 from .sheet import chosen
 
@@ -31,6 +32,10 @@ def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str
     ------
     ValueError
     """
+    if wanted is Material and isinstance(value, AnisotropicMaterial):
+        only_isotropic(
+            value, "a beam, as its reference,", "give a springtune.Shape, whose reference takes any material"
+        )
     if not isinstance(value, wanted):
         first = wanted[0] if isinstance(wanted, tuple) else wanted
         raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")

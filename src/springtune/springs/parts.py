@@ -15,7 +15,7 @@ with equal materials they give nearly what one material gives, not exactly.
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -24,13 +24,32 @@ from ..mesh.cells import no_cells
 from ..mesh.groups import GroupedMesh
 from ..problem.materials import ANY_MATERIAL, AnyMaterial
 from ..problem.quantities import nearest
-from .base import Definition, DefinitionError, Springs
+from .base import DefinitionError, Springs
 
 if TYPE_CHECKING:
     from ..mechanics.energies import Energy
 
 MAIN = ""
 """Name of the part that has no other."""
+
+
+class Derives(Protocol):
+    """What a definition has to have: one of `springtune.springs.DEFINITIONS`, or of one's own."""
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all springs have one stiffness."""
+
+    @property
+    def uniaxial(self) -> bool:
+        """Whether it is for loads alone that stretch a beam along its length."""
+
+    @property
+    def needs(self) -> str:
+        """What it is told besides mesh, material and thickness."""
+
+    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
+        """Springs of a mesh."""
 
 
 def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
@@ -101,7 +120,7 @@ def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) 
 
 
 def derive_by_parts(
-    definition: Definition,
+    definition: Derives,
     grouped: GroupedMesh,
     materials: Mapping[str, AnyMaterial],
     thickness: float,

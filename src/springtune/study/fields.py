@@ -76,6 +76,21 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
     return Scalar(read, schema, units.QUANTITY_KINDS[kind].words)
 
 
+def signed(kind: str) -> Scalar:
+    """Annotation of a quantity of either sign, of a key of `springtune.units.QUANTITY_KINDS`."""
+    words = units.QUANTITY_KINDS[kind].words
+
+    def read(value: str) -> float:
+        try:
+            return units.parse(value, kind)
+        except units.UnitError as error:
+            raise refuse(str(error)) from None
+
+    pattern = r"^\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
+    schema = {"type": "string", "pattern": pattern, "examples": [units.QUANTITY_KINDS[kind].example]}
+    return Scalar(read, schema, words)
+
+
 def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:
     """Annotation of a number from `low`, or `above` it, to `high`."""
 
@@ -127,6 +142,9 @@ Force = Annotated[float, quantity("force", "the load's name carries the sign: gi
 Stiffness = Annotated[float, quantity("stiffness")]
 Stress = Annotated[float, quantity("stress")]
 Density = Annotated[float, quantity("density")]
+Angle = Annotated[float, signed("angle")]
+SignedStress = Annotated[float, signed("stress")]
+OrthotropicRatio = Annotated[float, number("a number such as 0.3", -100, 100)]
 PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0, 0.5)]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
