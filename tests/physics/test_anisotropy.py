@@ -183,6 +183,23 @@ def test_energy_fit_is_the_least_of_relative_energies():
             assert norm(np.einsum("i,ijk->jk", other, unit)) >= best * (1 - 1e-12)
 
 
+@settings(max_examples=40)
+@given(
+    along=st.floats(1, 10), across=st.floats(1, 10), coupling=st.floats(0.05, 0.9), shear=st.floats(0.05, 1),
+    mesh=st.sampled_from([braced(1.0), braced(1.5), lattice(2, 2), MESH_TYPES["free"](0.02, 0.01, 4e-3)]),
+)  # fmt: skip
+def test_no_springs_alone_are_nearer_than_the_bound(along, across, coupling, shear, mesh):
+    """Whatever the mesh, some strain's energy is off by |C12 - C66| / (C66 + sqrt(C11 C22))."""
+    mean = np.sqrt(along * across)
+    material = AnisotropicMaterial(along, across, coupling * mean, shear * mean)
+    values, vectors = np.linalg.eigh(material.plane_stress)
+    root = vectors / np.sqrt(values)
+    for name in ("energy-fit", "element-fit"):
+        found = affine(name, mesh, material)
+        error = np.abs(np.linalg.eigvalsh(root.T @ found @ root) - 1).max()
+        assert error >= abs(coupling - shear) / (shear + 1) - 1e-9
+
+
 # -- moduli ------------------------------------------------------------------------------------------------------------
 
 
