@@ -9,8 +9,11 @@ from springtune.mechanics.moduli import affine_stiffness, axial_moduli, effectiv
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh
+from springtune.prediction import predict
+from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnisotropicMaterial, Material
 from springtune.scene.moduli import moduli
+from springtune.scene.single import Scene
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.parts import cells_of_parts, derive_by_parts
 
@@ -407,3 +410,14 @@ def test_energies_of_different_parts_are_told_apart():
         for one, other in ((third, fifth), (fifth, third))
     }
     assert len(keys) == 2
+
+
+def test_beams_refuse_what_is_not_isotropic_by_name():
+    beam = Beam("100 mm", "20 mm")
+    mesh = MESH_TYPES["right"](0.1, 0.02, 5e-3)
+    with pytest.raises(ValueError, match="material: 'board' is anisotropic, and beams are of isotropic ones.*Shape"):
+        Scene(beam, mesh, BOARD, "traction", "1 kN")
+    with pytest.raises(ValueError, match="material: 'ply' is anisotropic, and beams are of isotropic ones.*Shape"):
+        predict(beam, mesh, PLY)
+    with pytest.raises(DefinitionError, match="definition 'lattice': needs an isotropic material and 'ply' is"):
+        moduli(mesh, PLY, "lattice")

@@ -542,15 +542,14 @@ def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
     return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
 
 
-def only_isotropic(material: AnyMaterial, what: str, remedy: str) -> Material:
+def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     """The material, refused where it is not isotropic.
 
     Parameters
     ----------
     material : Material or AnisotropicMaterial
-    what : str
-        What needs an isotropic one, for the message.
     remedy : str
+        For the message.
 
     Returns
     -------
@@ -562,13 +561,16 @@ def only_isotropic(material: AnyMaterial, what: str, remedy: str) -> Material:
 
     Examples
     --------
-    >>> only_isotropic(AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9, name="board"), "this", "take another")
+    >>> only_isotropic(AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9, name="board"), "take another")
     Traceback (most recent call last):
     ...
-    ValueError: material: 'board' is anisotropic and this is of isotropic ones; take another
+    ValueError: material: 'board' is anisotropic, and beams are of isotropic ones, as their references; take another
     """
     if not isinstance(material, Material):
-        raise ValueError(f"material: {material.name!r} is anisotropic and {what} is of isotropic ones; {remedy}")
+        raise ValueError(
+            f"material: {material.name!r} is anisotropic, and beams are of isotropic ones, as their references; "
+            f"{remedy}"
+        )
     return material
 
 

@@ -33,9 +33,7 @@ def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str
     ValueError
     """
     if wanted is Material and isinstance(value, AnisotropicMaterial):
-        only_isotropic(
-            value, "a beam, as its reference,", "give a springtune.Shape, whose reference takes any material"
-        )
+        only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
         first = wanted[0] if isinstance(wanted, tuple) else wanted
         raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")

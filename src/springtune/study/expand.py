@@ -187,9 +187,7 @@ class _Bodies:
         key = one["material"], one.get("young_modulus"), one.get("poisson_ratio")
         if key not in self._materials:
             own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
-            material = only_isotropic(
-                self._declared.materials[key[0]], "a grid of beams", "put the sheet under 'shapes'"
-            )
+            material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
             self._materials[key] = replace(material, **own)
         return self._materials[key]
 
