@@ -24,6 +24,8 @@ KNOWN = {
     "own_definition": (2 / math.sqrt(3) * (1 + 1 / 10) - 1, 2e-2),
     # Cauchy's relation.
     "poisson_ratio": (1 / 3, 1e-2),
+    # The same.
+    "orthotropic_springs": (1.0, 1e-9),
     # Euler; shear takes off 0.1 % (Engesser), 18 rows of linear triangles, too stiff in bending, add 0.6 %.
     "buckling": (1.0, 1e-2),
     # sqrt(E/rho) / (4 L); the clamped end, which cannot shrink sideways, adds 0.1 %.
