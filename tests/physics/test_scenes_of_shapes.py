@@ -462,6 +462,48 @@ class TestQuantities:
             particle_masses(grouped, 1e-3, {"": 1.0, "heavy": None})
 
 
+class TestMaterials:
+    def bar(self, mesh_type="right"):
+        """Two halves, one beyond the other, with sides and points."""
+        mesh = MESH_TYPES[mesh_type](LENGTH, HEIGHT, 1e-2)
+        sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
+        sides["lower"] = mesh.outline_edges(1, 0.0)
+        far = {3: mesh.points[mesh.triangles].mean(axis=1)[:, 0] > LENGTH / 2}
+        points = {"near": np.array([0.02, 0.02]), "far": np.array([0.08, 0.02])}
+        return GroupedMesh(mesh, sides, points, {"far": far})
+
+    def test_a_bar_of_two(self):
+        """In series, without lateral strain: exact, as is the stress on either side of where they meet."""
+        stresses = [st.Quantity(f"in-{name}", "stress", name, "xx") for name in ("near", "far")]
+        pull = load(END, *stresses, tractions=[st.Traction("right", (1e3, 0.0))], gravity=(0.0, 0.0))
+        shape = plate(pull, points={"near": (0.02, 0.02), "far": (0.08, 0.02)})
+        materials = {"": st.Material(2e9, 0.0), "far": st.Material(1e9, 0.0)}
+        values = solved(shape, self.bar(), materials, "delingette").values
+        stress = 1e3 / (HEIGHT * 1e-3)
+        assert values["end"] == pytest.approx(stress * LENGTH / 2 * (1 / 2e9 + 1 / 1e9), rel=1e-10)
+        for name in ("in-near", "in-far"):
+            assert values[name] == pytest.approx(stress, rel=1e-9)
+
+    def test_one_material_given_by_parts_is_that_material(self):
+        pull = load(END, tractions=[st.Traction("right", (1e3, 0.0))])
+        shape, grouped = plate(pull), self.bar()
+        alone = solved(shape, grouped, STEEL).displacement
+        assert solved(shape, grouped, {"": STEEL, "far": STEEL}).displacement == pytest.approx(alone, rel=1e-12)
+
+    def test_an_anisotropic_sheet(self):
+        """Even stress, and the strains that the compliance says."""
+        board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa", name="board")
+        quantities = END, st.Quantity("xx", "stress", "near", "xx"), st.Quantity("v", "displacement", "near", "y")
+        pull = load(*quantities, tractions=[st.Traction("right", (1e3, 0.0))])
+        shape = plate(pull, points={"near": (0.02, 0.02)})
+        stress = 1e3 / (HEIGHT * 1e-3)
+        compliance = np.linalg.inv(board.plane_stress)
+        values = solved(shape, st.mesh_shape(shape, 8e-3), board).values
+        assert values["end"] == pytest.approx(stress * compliance[0, 0] * LENGTH, rel=1e-9)
+        assert values["v"] == pytest.approx(stress * compliance[0, 1] * 0.02, rel=1e-9)
+        assert values["xx"] == pytest.approx(stress, rel=1e-9)
+
+
 class TestRefusals:
     """Each names what is wrong, and what there is."""
 

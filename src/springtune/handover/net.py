@@ -29,7 +29,7 @@ from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import no_cells
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
 from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
@@ -419,7 +419,7 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
 def _header(
     definition: Definition | OwnDefinition,
     sheet: Sheet,
-    materials: Sequence[Material],
+    materials: Sequence[AnyMaterial],
     springs: Springs,
     inertia: np.ndarray | None,
     held: np.ndarray | None,
@@ -555,7 +555,7 @@ def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
 def _stable_steps(
     sheet: Sheet,
     springs: Springs,
-    materials: Sequence[Material],
+    materials: Sequence[AnyMaterial],
     inertia: np.ndarray | None,
     held: np.ndarray | None,
 ) -> dict[str, float | str] | str:

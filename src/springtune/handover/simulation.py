@@ -258,12 +258,15 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     """
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
+    constants = ""
+    if material["young_modulus"] is not None:
+        constants = f"Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio {material['poisson_ratio']:g}, "
     left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
     lines = [
         f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",
         f"{len(net.points)} particles, {len(net.springs) - left_out} springs; m, kg, s, N.",
-        f"Material '{material['name']}': Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio "
-        f"{material['poisson_ratio']:g}, density {material['density']:g} kg/m3; thickness {header['thickness']:g} m.",
+        f"Material '{material['name']}': {constants}density {material['density']:g} kg/m3; thickness "
+        f"{header['thickness']:g} m.",
     ]
     if left_out:
         lines.append(f"{left_out} springs of no stiffness are left out.")

@@ -18,7 +18,7 @@ from ..mesh.groups import GroupedMesh
 from ..problem.compare import deformation_error
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
 from ..problem.shapes import Shape
 from ..problem.status import Status
@@ -213,7 +213,7 @@ def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> 
 def predict(
     beam: Beam | Shape,
     mesh: Mesh | GroupedMesh,
-    material: Material | Mapping[str, Material],
+    material: AnyMaterial | Mapping[str, AnyMaterial],
     known: References | None = None,
     *,
     loads: Iterable[str] = CASES,
@@ -226,7 +226,7 @@ def predict(
     beam : Beam or Shape
     mesh : Mesh or GroupedMesh
         That fills the beam; of a shape with its groups.
-    material : Material or mapping of str to Material
+    material : Material, AnisotropicMaterial or mapping of str to those
         Of a shape of several parts by their names.
     known : dict, optional
         What `springtune.prediction.references` gave for the beam, the material and the loads.
@@ -310,7 +310,7 @@ def predict(
 
 
 def _on_shape(
-    shape: Shape, mesh: Mesh | GroupedMesh, material: Material | Mapping[str, Material], load: str | None
+    shape: Shape, mesh: Mesh | GroupedMesh, material: AnyMaterial | Mapping[str, AnyMaterial], load: str | None
 ) -> list[Choice]:
     """As `predict`, of a shape."""
     if load is None:
@@ -537,7 +537,7 @@ class TriedMesh:
         return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
 
 
-def in_words(sheet: Sheet, material: Material | None, name: str, springs: Springs) -> tuple[float, float, str]:
+def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and in words what else there is.
 
     Parameters

@@ -336,7 +336,7 @@ class Sheet:
     def derive_on_shape(
         self,
         definition: Definition | OwnDefinition,
-        materials: Mapping[str, Material],
+        materials: Mapping[str, AnyMaterial],
         grouped: GroupedMesh,
         stiffness: float | None = None,
         cases: list[Case] | None = None,
@@ -347,7 +347,7 @@ class Sheet:
         Parameters
         ----------
         definition : Definition
-        materials : mapping of str to Material
+        materials : mapping of str to Material or AnisotropicMaterial
             By part, the main one at ``""``.
         grouped : GroupedMesh
             Of this mesh.

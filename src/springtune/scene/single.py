@@ -18,7 +18,7 @@ from ..mesh.groups import GroupedMesh
 from ..problem.compare import deformation_error
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from ..problem.status import Status
@@ -45,8 +45,8 @@ class Scene:
         The body.
     mesh : Mesh or GroupedMesh
         That fills the beam, see `springtune.make_mesh` and `springtune.read_mesh`; of a shape with its groups.
-    material : Material or mapping of str to Material
-        Of a shape of several parts by their names, the main one at ``""``.
+    material : Material, AnisotropicMaterial or mapping of str to those
+        Isotropic of a beam; of a shape of several parts by their names, the main one at ``""``.
     load : str
         Key of `springtune.LOADS`: what is held, and where the force acts; of a shape key of its own ``loads``.
     force : float or str, optional
@@ -122,7 +122,7 @@ class Scene:
         self,
         beam: Beam | Shape,
         mesh: Mesh | GroupedMesh,
-        material: Material | Mapping[str, Material],
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         load: str,
         force: float | str | None = None,
         *,

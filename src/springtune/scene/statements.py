@@ -27,7 +27,7 @@ from ..problem.boundary import (
 )
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import nearest, positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..springs import Definition, DefinitionError, Springs
@@ -73,7 +73,7 @@ class BeamStatement:
         self,
         beam: Beam,
         mesh: Mesh | GroupedMesh,
-        material: Material | Mapping[str, Material],
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         load: str,
         force: float | str | None,
         kinematics: str,
@@ -169,7 +169,7 @@ class ShapeStatement:
     ----------
     shape : Shape
     grouped : GroupedMesh
-    material : Material or mapping of str to Material
+    material : Material, AnisotropicMaterial or mapping of str to those
         By part, the main one at ``""``; or of all.
     load : str
         Key of the shape's loads.
@@ -205,7 +205,7 @@ class ShapeStatement:
         self,
         shape: Shape,
         grouped: GroupedMesh | Mesh,
-        material: Material | Mapping[str, Material],
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         load: str,
         scale: float,
         kinematics: str,
@@ -428,12 +428,12 @@ def scaled(case: LoadCase, scale: float) -> LoadCase:
     )
 
 
-def _materials(material: Material | Mapping[str, Material], grouped: GroupedMesh) -> dict[str, Material]:
+def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: GroupedMesh) -> dict[str, AnyMaterial]:
     """Material of each part that the mesh has, checked."""
     parts = {str(name) for labels in part_names(grouped).values() for name in np.unique(labels)}
     given = dict(material) if isinstance(material, Mapping) else dict.fromkeys(sorted(parts), material)
     for name, one in given.items():
-        if not hasattr(one, "plane_stress"):
+        if not isinstance(one, ANY_MATERIAL):
             of = f" of part {name!r}" if name else ""
             raise ValueError(f"material{of}: {one!r} is not a Material; give one such as {A_MATERIAL}")
     for name in sorted(parts - set(given)):
