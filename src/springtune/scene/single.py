@@ -111,6 +111,21 @@ class Scene:
     >>> print(f"{result.status}: {1e3 * result.displacement:.2f} mm, error {100 * result.error:+.1f} %")
     solved: 9.51 mm, error +0.1 %
 
+    A shape, with the stress beside its hole:
+
+    >>> pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))],
+    ...                    quantities=[st.Quantity("end", "displacement", "right", "x"),
+    ...                                st.Quantity("rim", "stress", "rim", "xx")])
+    >>> hole = st.Hole.circle(("50 mm", "20 mm"), "8 mm")
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[hole], points={"rim": ("50 mm", "28 mm")},
+    ...                            loads={"pull": pull})
+    >>> grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "0.5 mm"})
+    >>> there = st.Scene(plate, grouped, steel, "pull", definition="delingette", kinematics="linear").solve()
+    >>> print(f"{1e6 * there.values['end']:.1f} um, {1e-6 * there.values['rim']:.0f} MPa")
+    55.9 um, 359 MPa
+    >>> print(*(f"{name} {100 * error:+.1f} %" for name, error in there.errors.items()))
+    end -0.5 % rim -4.5 %
+
     The network without units, as the mechanics have it: force and stiffness over the reference stiffness.
 
     >>> moved = scene.problem.nonlinear(scene.force / scene.springs.reference)
