@@ -15,7 +15,7 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import deformation_error
+from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
@@ -671,7 +671,7 @@ class Result:
 
     @property
     def errors(self) -> dict[str, float]:
-        """As `error`, of each quantity of interest [1]; infinite or NaN where the reference has none of it.
+        """As `error`, of each quantity of interest [1]; NaN where the reference has none of it, or exactly zero.
 
         Examples
         --------
@@ -684,9 +684,7 @@ class Result:
         >>> result.values.keys() == result.errors.keys()
         True
         """
-        known = self.scene.reference_values()
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return {name: float(deformation_error(value, known[name])) for name, value in self.values.items()}
+        return quantity_errors(self.values, self.scene.reference_values())
 
     def write(self, path: str | Path, steps: int = 10) -> list[Path]:
         """Write the deformed network for ParaView, or whatever else reads VTU.
