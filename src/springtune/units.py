@@ -39,6 +39,11 @@ class Kind:
     unit: str
     example: str
 
+    @property
+    def words(self) -> str:
+        """What to give, for messages: ``a length such as '200 mm'``."""
+        return f"{_article(self.name)} such as '{self.example}'"
+
 
 QUANTITY_KINDS = {
     kind.name: kind
@@ -48,6 +53,7 @@ QUANTITY_KINDS = {
         Kind("stiffness", "N/m", "170e6 N/m"),
         Kind("stress", "Pa", "210 GPa"),
         Kind("density", "kg/m^3", "7850 kg/m^3"),
+        Kind("angle", "rad", "30 deg"),
     )
 }
 """Kinds of quantity by name."""
@@ -58,6 +64,7 @@ COMMON = {
     "stiffness": {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6", "N/cm": "1e2"},
     "stress": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/m^2": "1", "N/mm^2": "1e6"},
     "density": {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"},
+    "angle": {"rad": "1", "deg": "0.01745329251994329576923690768488612713", "mrad": "1e-3"},
 }
 """Usual units of each kind and their size in its SI unit."""
 
@@ -123,8 +130,8 @@ def parse(text: str, kind: str) -> float:
     wanted = QUANTITY_KINDS[kind]
     if len(text) > LONGEST_QUANTITY:
         text = f"{text[:57]}..."
-        raise UnitError(f"'{text}' is too long; give a {kind} such as '{wanted.example}'")
-    remedy = f"give a {kind} such as '{wanted.example}'"
+        raise UnitError(f"'{text}' is too long; give {wanted.words}")
+    remedy = f"give {wanted.words}"
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
         raise UnitError(f"'{text}' does not begin with a finite number; {remedy}")
@@ -156,7 +163,8 @@ def _spelling(unit: str) -> str:
 
 
 def _article(kind: str) -> str:
-    return f"a {kind}" if kind in QUANTITY_KINDS else kind
+    article = "an" if kind[0] in "aeiou" else "a"
+    return f"{article} {kind}" if kind in QUANTITY_KINDS else kind
 
 
 def _measure(unit: str) -> tuple[str, Decimal] | None:
@@ -196,6 +204,8 @@ def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     except Exception:  # pint raises many kinds, tokenizer's and its own
         return None
     for kind in QUANTITY_KINDS.values():
+        if kind.name == "angle":
+            continue  # to pint it is a number, as a percentage is
         if given.dimensionality == registry.parse_units(kind.unit).dimensionality:
             return kind.name, Decimal(f"{size:.15g}")
     return f"of dimension {given.dimensionality}", Decimal(1)

@@ -294,3 +294,57 @@ def lateral_forces(mesh: Mesh) -> np.ndarray:
     for value, sign in ((y.min(), -1.0), (y.max(), 1.0)):
         forces[:, 1] += sign * mesh.side_shares(mesh.outline_edges(1, value), 0)
     return forces
+
+
+def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
+    """Stiffness in plane stress of the whole network, of any anisotropy, on any mesh.
+
+    The whole outline, holes included, is moved as an even strain moves it, along x, along y and in shear; the particles
+    inside find their places. The work of the outline is the energy of the strain: an upper bound of what other tests
+    find, which it tends to as the mesh is refined.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of any outline.
+    springs : Springs
+
+    Returns
+    -------
+    ndarray of float, shape (3, 3)
+        C t over the reference stiffness [1], in Voigt's order xx, yy, xy with the shear angle; symmetric.
+
+    Raises
+    ------
+    SingularError
+        If the network is singular or unstable at rest.
+
+    Examples
+    --------
+    Squares that each give 1 to every side and to both diagonals:
+
+    >>> from types import SimpleNamespace
+    >>> from springtune.mesh import MESH_TYPES
+    >>> mesh = MESH_TYPES["braced"](0.06, 0.04, 0.01)
+    >>> parts = np.ones((len(mesh.quads), 6))
+    >>> springs = SimpleNamespace(relative=mesh.sum_to_edges({4: parts}), energies=(), lateral=0.0)
+    >>> abs(outline_stiffness(mesh, springs).round(6)).tolist()
+    [[3.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[mesh.edges[mesh.on_outline]] = True
+    network = Network(mesh, held, springs.relative, springs.energies)
+    if network.unknowns and network.rest_factor.negative_pivots:
+        raise SingularError("the network is unstable at rest")
+    x, y = (mesh.points - mesh.points[0]).T
+    none = np.zeros(len(x))
+    fields = [np.stack(field, axis=1) for field in ((x, none), (none, y), (0.5 * y, 0.5 * x))]
+    moved = fields
+    if network.unknowns:
+        # What particles inside lack of an equilibrium, all fields at once.
+        forces = np.stack([network.linear_resistance(field) for field in fields], axis=1)
+        back = network.rest_factor.solve(forces).T
+        moved = [field - network.expand(one) for field, one in zip(fields, back, strict=True)]
+    resisted = [network.linear_forces(field) for field in moved]
+    work = np.array([[float((force * field).sum()) for field in fields] for force in resisted]) / mesh.area
+    return 0.5 * (work + work.T)
