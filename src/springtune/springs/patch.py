@@ -4,9 +4,9 @@
 `springtune.springs.area`) has: one factorization of the mesh, scaled out of all later ones.
 
 A strip between straight faces, such as a beam, is tested between rollers on its ends: E along x. Any other mesh, with
-holes or slanted sides, is tested by three affine displacements of its whole outline, rims of holes included: a continuum
-of any shape has an even strain then. Their forces are a stiffness C, and with ``S = C^-1`` 1/E_eff is the mean over all
-directions of the strain along a unit pull, ``(3 S11 + 3 S22 + 2 S12 + S66) / 8``.
+holes or slanted sides, is tested by three affine displacements of its whole outline, rims of holes included: a
+continuum of any shape has an even strain then. Their forces are a stiffness C, and with ``S = C^-1`` 1/E_eff is the
+mean over all directions of the strain along a unit pull, ``(3 S11 + 3 S22 + 2 S12 + S66) / 8``.
 
 It repairs what disorder costs in tension; bending, shear and nu stay what the springs make them. Derived here.
 """
