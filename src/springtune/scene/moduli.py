@@ -104,11 +104,12 @@ def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
 
     Notes
     -----
-    Young's modulus is F L / (u H t) and Poisson's ratio that of the mean strains where the ends of the mesh are moved
-    apart by u and slide; where the mesh is no strip between straight faces, 1/E and nu/E are means over all directions
-    under affine displacements of the whole outline, holes included; the shear modulus is the work of the outline,
-    sheared evenly by an angle, over that angle's square and the volume; see `springtune.mechanics.moduli`. They are those of the mesh that is given: rows of
-    triangles that are fitted to a box are stretched, and not isotropic.
+    Young's modulus is F L / (u H t) and Poisson's ratio that of the mean strains where the ends of the mesh are
+    moved apart by u and slide; where the mesh is no strip between straight faces, 1/E and nu/E are means over all
+    directions under affine displacements of the whole outline, holes included; the shear modulus is the work of the
+    outline, sheared evenly by an angle, over that angle's square and the volume; see `springtune.mechanics.moduli`.
+    They are those of the mesh that is given: rows of triangles that are fitted to a box are stretched, and not
+    isotropic.
 
     Examples
     --------
