@@ -140,13 +140,37 @@ def _one_round(outline: np.ndarray, count: int) -> bool:
     return bool((rounds == rounds[0]).all())
 
 
-def _parts(mesh: Mesh) -> int:
-    """Number of parts of a mesh that no edge joins; a point without a cell is one."""
+def free_body(mesh: Mesh) -> np.ndarray:
+    """Directions to hold so that a body cannot move as a whole and is free otherwise.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    ndarray of bool, shape (n_points, 2)
+        Three are held, at two particles far from each other.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has parts that no edge joins, or points without a cell.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count = len(mesh.points)
-    return int(connected_components(coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count)))[0])
+    parts = connected_components(coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count)))[0]
+    if parts > 1:
+        raise MeshError(f"the mesh has {parts} parts that no edge joins, and a free body is one; join them")
+    corner = np.argmin(mesh.points.sum(axis=1))
+    away = np.abs(mesh.points - mesh.points[corner])
+    far = np.argmax((away**2).sum(axis=1))
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[corner] = True
+    held[far, np.argmin(away[far])] = True
+    return held
 
 
 def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
@@ -232,24 +256,14 @@ class PatchTest:
     @cached_property
     def _free_body(self) -> tuple[np.ndarray, np.ndarray]:
         """Directions held, none but the rigid motions', and forces of three even stresses, shape (3, n_points, 2)."""
-        mesh = self.mesh
-        parts = _parts(mesh)
-        if parts > 1:
-            raise MeshError(f"the mesh cannot have a patch test: it has {parts} parts that no edge joins; join them")
-        corner = np.argmin(mesh.points.sum(axis=1))
-        away = np.abs(mesh.points - mesh.points[corner])
-        far = np.argmax((away**2).sum(axis=1))
-        held = np.zeros(mesh.points.shape, dtype=bool)
-        held[corner] = True
-        held[far, np.argmin(away[far])] = True
-        return held, np.stack([outline_forces(mesh, np.array(stress)) for stress in STRESSES])
+        return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in STRESSES])
 
     def compliance(self, springs: Elastic) -> np.ndarray:
         """Compliance under even tractions, see `outline_compliance`."""
         held, forces = self._free_body
         network = self._network("free body", held, springs)
-        moved = network.rest_factor.solve(np.stack([network.reduce(load) for load in forces], axis=1))
-        work = np.stack([network.reduce(load) for load in forces]) @ moved / self.mesh.area
+        loads = [network.reduce(force) for force in forces]
+        work = np.array(loads) @ np.array([network.rest_factor.solve(load) for load in loads]).T / self.mesh.area
         return 0.5 * (work + work.T)
 
     def stiffness(self, springs: Elastic) -> np.ndarray:
@@ -257,12 +271,10 @@ class PatchTest:
         held = self._frame[0]
         network = self._network("frame", held, springs)
         fields = [self.mesh.points @ np.array(strain) for strain in STRAINS]
+        moved = fields
         if network.unknowns:
-            loads = np.stack([network.linear_resistance(field) for field in fields], axis=1)
-            inside = network.rest_factor.solve(loads)
-            moved = [field - network.expand(inner) for field, inner in zip(fields, inside.T)]
-        else:
-            moved = fields
+            inside = [network.rest_factor.solve(network.linear_resistance(field)) for field in fields]
+            moved = [field - network.expand(inner) for field, inner in zip(fields, inside)]
         forces = [network.linear_forces(field) for field in moved]
         work = np.array([[(force * field).sum() for field in fields] for force in forces]) / self.mesh.area
         return 0.5 * (work + work.T)
