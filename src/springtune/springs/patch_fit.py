@@ -56,8 +56,9 @@ LEAST = 1e-12
 WEIGHT = 0.1
 """lambda: weight of the mean squared logarithm of a spring's change against the squared misfit of the tests [1]."""
 
-STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.01
-"""Gauss-Newton steps at most; largest change of a logarithm in one of them, and that at which they end [1]."""
+STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.3
+"""Gauss-Newton steps at most; largest change of a logarithm in one of them, and that below which it is the last [1]:
+the next would be some tenth of it."""
 
 
 @definition("patch-fit", order=195, cells=(3,))
