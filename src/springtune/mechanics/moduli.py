@@ -1,10 +1,15 @@
-"""Effective moduli of networks: patch tests with an even strain.
+r"""Effective moduli of networks: patch tests with an even strain.
 
 ::
 
-          o------o------o------o          u_x given on both ends, u_y free but for one particle: E and nu
+          o------o------o------o          u_x given on both ends, u_y free but for one particle: E and nu of a strip
         ->|    sheet           |->
           o------o------o------o          both given on the whole outline, as for even shear: G
+
+          <- o---o---o                    an affine displacement of the whole outline, rims of holes included: three of
+         <-  |  ___  | ->                 them are the stiffness of any mesh, whatever its shape; likewise three even
+             o-/   \-o  ->               tractions on the outline of the free body its compliance
+          <- o-\___/-o
 
 Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1]. They are those of the
 mesh that is given: rows of triangles fitted to a box are stretched, and their moduli differ from the exact lattice's
@@ -73,6 +78,13 @@ def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return np.unique(edges[left]), np.unique(edges[~left])
 
 
+STRESSES = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (1.0, 0.0)))
+"""Unit stresses xx, yy and xy [1]."""
+
+STRAINS = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 0.5), (0.5, 0.0)))
+"""Unit strains xx, yy and shear angle xy [1]."""
+
+
 def strip_fault(mesh: Mesh) -> str:
     """Why a patch test between rollers says nothing of a mesh, with the remedy; empty where it does.
 
@@ -126,6 +138,39 @@ def _one_round(outline: np.ndarray, count: int) -> bool:
     joined = coo_array((np.ones(len(outline)), outline.T), shape=(count, count))
     rounds = connected_components(joined, directed=False)[1][outline[:, 0]]
     return bool((rounds == rounds[0]).all())
+
+
+def free_body(mesh: Mesh) -> np.ndarray:
+    """Directions to hold so that a body cannot move as a whole and is free otherwise.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    ndarray of bool, shape (n_points, 2)
+        Three are held, at two particles far from each other.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has parts that no edge joins, or points without a cell.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.points)
+    parts = connected_components(coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count)))[0]
+    if parts > 1:
+        raise MeshError(f"the mesh has {parts} parts that no edge joins, and a free body is one; join them")
+    corner = np.argmin(mesh.points.sum(axis=1))
+    away = np.abs(mesh.points - mesh.points[corner])
+    far = np.argmax((away**2).sum(axis=1))
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[corner] = True
+    held[far, np.argmin(away[far])] = True
+    return held
 
 
 def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
@@ -188,11 +233,13 @@ class PatchTest:
         return network
 
     @cached_property
+    def strip_fault(self) -> str:
+        """As the function `strip_fault` of the mesh."""
+        return strip_fault(self.mesh)
+
+    @cached_property
     def _rollers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Particles at both ends, directions held and displacements given between rollers."""
-        fault = strip_fault(self.mesh)
-        if fault:
-            raise MeshError(f"the mesh cannot have a patch test: {fault}")
         left, right = ends(self.mesh)
         held = np.zeros(self.mesh.points.shape, dtype=bool)
         held[left, 0] = held[right, 0] = True
@@ -206,8 +253,40 @@ class PatchTest:
         held[self.mesh.edges[self.mesh.on_outline]] = True
         return held, self.mesh.points[:, ::-1] * [1.0, 0.0]
 
+    @cached_property
+    def _free_body(self) -> tuple[np.ndarray, np.ndarray]:
+        """Directions held, none but the rigid motions', and forces of three even stresses, shape (3, n_points, 2)."""
+        return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in STRESSES])
+
+    def compliance(self, springs: Elastic) -> np.ndarray:
+        """Compliance under even tractions, see `outline_compliance`."""
+        held, forces = self._free_body
+        network = self._network("free body", held, springs)
+        loads = [network.reduce(force) for force in forces]
+        work = np.array(loads) @ np.array([network.rest_factor.solve(load) for load in loads]).T / self.mesh.area
+        return 0.5 * (work + work.T)
+
+    def stiffness(self, springs: Elastic) -> np.ndarray:
+        """Stiffness under affine displacements of the outline, see `outline_stiffness`."""
+        held = self._frame[0]
+        network = self._network("frame", held, springs)
+        fields = [(self.mesh.points - self.mesh.points[0]) @ np.array(strain) for strain in STRAINS]
+        moved = fields
+        if network.unknowns:
+            inside = [network.rest_factor.solve(network.linear_resistance(field)) for field in fields]
+            moved = [field - network.expand(inner) for field, inner in zip(fields, inside)]
+        forces = [network.linear_forces(field) for field in moved]
+        work = np.array([[(force * field).sum() for field in fields] for force in forces]) / self.mesh.area
+        return 0.5 * (work + work.T)
+
     def axial(self, springs: Elastic) -> tuple[float, float]:
         """Young's modulus and Poisson's ratio, see `axial_moduli`."""
+        if self.strip_fault:
+            if springs.lateral:
+                raise MeshError(
+                    f"the mesh cannot have a patch test of springs that go with a lateral stress: {self.strip_fault}"
+                )
+            return isotropic_moduli(np.linalg.inv(self.stiffness(springs)))
         mesh, (left, right, held, given) = self.mesh, self._rollers
         network = self._network("rollers", held, springs)
         moved = given + network.expand(network.rest_factor.solve(-network.linear_resistance(given)))
@@ -233,7 +312,10 @@ class PatchTest:
 
 
 def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
-    """Young's modulus along x and Poisson's ratio, between rollers.
+    """Young's modulus and Poisson's ratio: along x between rollers, or of a mesh that is no strip by its whole outline.
+
+    What is no strip, see `strip_fault`, has no axis of its own: its moduli are means over all directions, see
+    `isotropic_moduli`, of `outline_stiffness`.
 
     Parameters
     ----------
@@ -252,7 +334,7 @@ def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
     SingularError
         If the network is singular or unstable at rest.
     MeshError
-        If the mesh is no full strip, see `strip_fault`.
+        If the mesh is no strip and the springs go with a lateral stress.
 
     Examples
     --------
@@ -296,23 +378,46 @@ def lateral_forces(mesh: Mesh) -> np.ndarray:
     return forces
 
 
-def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Stiffness in plane stress of the whole network, of any anisotropy, on any mesh.
-
-    The whole outline, holes included, is moved as an even strain moves it, along x, along y and in shear; the particles
-    inside find their places. The work of the outline is the energy of the strain: an upper bound of what other tests
-    find, which it tends to as the mesh is refined.
+def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
+    """Forces of an even stress on the outline, rims of holes included.
 
     Parameters
     ----------
     mesh : Mesh
-        Of any outline.
+    stress : ndarray of float, shape (2, 2)
+        [Pa]
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+        Over the thickness [N/m].
+    """
+    total = np.zeros(mesh.points.shape)
+    for corners in mesh.cells.values():
+        # Cell by cell; inside they cancel.
+        here = mesh.points[corners]
+        side = np.roll(here, -1, axis=1) - here
+        pull = 0.5 * np.stack([side[..., 1], -side[..., 0]], axis=2) @ stress.T
+        np.add.at(total, corners, pull + np.roll(pull, 1, axis=1))
+    return total
+
+
+def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
+    """Stiffness in plane stress under affine displacements of the whole outline, rims of holes included.
+
+    A continuum has the same even strain inside whatever its outline is, so the test is exact on any mesh: for linear
+    triangles it returns the material's own stiffness. A network relaxes inside. No test of the same mesh is stiffer
+    (Hill's bounds): with `outline_compliance` it encloses what the network is under even loads of other kinds.
+
+    Parameters
+    ----------
+    mesh : Mesh
     springs : Springs
 
     Returns
     -------
     ndarray of float, shape (3, 3)
-        C t over the reference stiffness [1], in Voigt's order xx, yy, xy with the shear angle; symmetric.
+        Times the thickness, over the reference stiffness [1]; Voigt: xx, yy, shear angle xy.
 
     Raises
     ------
@@ -321,30 +426,76 @@ def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
 
     Examples
     --------
-    Squares that each give 1 to every side and to both diagonals:
+    The triangular lattice: E / (1 - nu^2), nu E / (1 - nu^2) and G of E = 2 / sqrt(3), nu = 1/3, on an L:
 
     >>> from types import SimpleNamespace
-    >>> from springtune.mesh import MESH_TYPES
-    >>> mesh = MESH_TYPES["braced"](0.06, 0.04, 0.01)
-    >>> parts = np.ones((len(mesh.quads), 6))
-    >>> springs = SimpleNamespace(relative=mesh.sum_to_edges({4: parts}), energies=(), lateral=0.0)
-    >>> abs(outline_stiffness(mesh, springs).round(6)).tolist()
-    [[3.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> from springtune.mesh import Mesh, lattice
+    >>> whole = lattice(12, 8)
+    >>> middles = whole.points[whole.triangles].mean(axis=1)
+    >>> used, corners = np.unique(whole.triangles[(middles < [6, 4]).any(axis=1)], return_inverse=True)
+    >>> mesh = Mesh(whole.points[used], corners.reshape(-1, 3))
+    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
+    >>> outline_stiffness(mesh, springs).round(6) + 0.0
+    array([[1.299038, 0.433013, 0.      ],
+           [0.433013, 1.299038, 0.      ],
+           [0.      , 0.      , 0.433013]])
     """
-    held = np.zeros(mesh.points.shape, dtype=bool)
-    held[mesh.edges[mesh.on_outline]] = True
-    network = Network(mesh, held, springs.relative, springs.energies)
-    if network.unknowns and network.rest_factor.negative_pivots:
-        raise SingularError("the network is unstable at rest")
-    x, y = (mesh.points - mesh.points[0]).T
-    none = np.zeros(len(x))
-    fields = [np.stack(field, axis=1) for field in ((x, none), (none, y), (0.5 * y, 0.5 * x))]
-    moved = fields
-    if network.unknowns:
-        # What particles inside lack of an equilibrium, all fields at once.
-        forces = np.stack([network.linear_resistance(field) for field in fields], axis=1)
-        back = network.rest_factor.solve(forces).T
-        moved = [field - network.expand(one) for field, one in zip(fields, back, strict=True)]
-    resisted = [network.linear_forces(field) for field in moved]
-    work = np.array([[float((force * field).sum()) for field in fields] for force in resisted]) / mesh.area
-    return 0.5 * (work + work.T)
+    return PatchTest(mesh).stiffness(springs)
+
+
+def outline_compliance(mesh: Mesh, springs: Elastic) -> np.ndarray:
+    """Compliance in plane stress under even tractions on the whole outline, rims of holes included, the body free.
+
+    Column by column the mean strains under unit stresses xx, yy and xy. Like `outline_stiffness` exact on any mesh; no
+    test of the same mesh is softer.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    springs : Springs
+
+    Returns
+    -------
+    ndarray of float, shape (3, 3)
+        Over the thickness, times the reference stiffness [1]; Voigt: xx, yy, shear angle xy.
+
+    Raises
+    ------
+    SingularError
+        If the network is singular or unstable at rest.
+    MeshError
+        If the mesh has parts that no edge joins.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from springtune.mesh import lattice
+    >>> mesh = lattice(12, 8)
+    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
+    >>> [float(modulus.round(6)) for modulus in isotropic_moduli(outline_compliance(mesh, springs))]
+    [1.154701, 0.333333]
+    """
+    return PatchTest(mesh).compliance(springs)
+
+
+def isotropic_moduli(compliance: np.ndarray) -> tuple[float, float]:
+    """Young's modulus and Poisson's ratio of a compliance, means over all directions.
+
+    1/E is the mean strain along a unit pull over the directions of the pull, nu/E the mean shortening across it; an
+    isotropic compliance has them exactly, and a turned one has the same.
+
+    Parameters
+    ----------
+    compliance : ndarray of float, shape (3, 3)
+        Voigt: xx, yy, shear angle xy.
+
+    Returns
+    -------
+    young_modulus : float
+        One over the unit of the compliance.
+    poisson_ratio : float
+        [1]
+    """
+    (xx, xy, _), (_, yy, _), (_, _, shear) = compliance
+    along, across = (3 * (xx + yy) + 2 * xy + shear) / 8, (xx + yy + 6 * xy - shear) / 8
+    return 1 / along, -across / along

@@ -20,7 +20,8 @@ class Moduli:
     Attributes
     ----------
     young_modulus_error : float
-        Young's modulus along x between rollers over the material's, less one [1].
+        Young's modulus along x between rollers over the material's, less one [1]; where the mesh is no strip, that
+        under affine displacements of its outline, mean over all directions.
     poisson_ratio : float
         Poisson's ratio there [1].
     shear_modulus_error : float
@@ -156,14 +157,16 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     SingularError
         If the network is singular or unstable at rest.
     MeshError
-        If the material is isotropic and the mesh no full strip, see `springtune.mechanics.moduli.strip_fault`.
+        If the mesh is no strip and the springs go with a lateral stress.
 
     Notes
     -----
-    Young's modulus is F L / (u H t) and Poisson's ratio that of the mean strains where the ends of the mesh are moved
-    apart by u and slide; the shear modulus is the work of the outline, sheared evenly by an angle, over that angle's
-    square and the volume; see `springtune.mechanics.moduli`. They are those of the mesh that is given: rows of
-    triangles that are fitted to a box are stretched, and not isotropic.
+    Young's modulus is F L / (u H t) and Poisson's ratio that of the mean strains where the ends of the mesh are
+    moved apart by u and slide; where the mesh is no strip between straight faces, 1/E and nu/E are means over all
+    directions under affine displacements of the whole outline, holes included; the shear modulus is the work of the
+    outline, sheared evenly by an angle, over that angle's square and the volume; see `springtune.mechanics.moduli`.
+    They are those of the mesh that is given: rows of triangles that are fitted to a box are stretched, and not
+    isotropic.
 
     Examples
     --------

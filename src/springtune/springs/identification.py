@@ -56,6 +56,8 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
     -------
     list of Case
     """
+    from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
+
     x, y = mesh.points.T
     corner = np.argmin(x + y)
     held = np.zeros(mesh.points.shape, dtype=bool)
@@ -87,18 +89,6 @@ def _start(mesh: Mesh, material: AnyMaterial, thickness: float) -> tuple[float, 
         return found.reference, found.relative
     found = energy_fit.springs(mesh, material, thickness)
     return found.reference, np.maximum(found.relative, 0.1 * found.relative.mean())
-
-
-def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
-    """Forces of an even stress on the outline, over the thickness, shape (n_points, 2)."""
-    total = np.zeros(mesh.points.shape)
-    for corners in mesh.cells.values():
-        # Cell by cell; inside they cancel.
-        here = mesh.points[corners]
-        side = np.roll(here, -1, axis=1) - here
-        pull = 0.5 * np.stack([side[..., 1], -side[..., 0]], axis=2) @ stress.T
-        np.add.at(total, corners, pull + np.roll(pull, 1, axis=1))
-    return total
 
 
 class Misfit:

@@ -1,22 +1,27 @@
-"""One scalar from one roller patch test of the very mesh: Young's modulus exact on any mesh, no reference solution.
+"""One scalar from one patch test of the very mesh: Young's modulus exact on any mesh, no reference solution.
 
 ``k_e = s k_e,0`` with ``s = E / E_eff``, where E_eff is what the network of `springtune.springs.lattice` (or of
-`springtune.springs.area`) has between rollers on the ends of the mesh: one linear solve of the mesh, scaled out of all
-later ones. It repairs what disorder costs, in tension along x; bending, shear and nu stay what the springs make them.
-Derived here.
+`springtune.springs.area`) has: one factorization of the mesh, scaled out of all later ones.
+
+A strip between straight faces, such as a beam, is tested between rollers on its ends: E along x. Any other mesh, with
+holes or slanted sides, is tested by three affine displacements of its whole outline, rims of holes included: a
+continuum of any shape has an even strain then. Their forces are a stiffness C, and with ``S = C^-1`` 1/E_eff is the
+mean over all directions of the strain along a unit pull, ``(3 S11 + 3 S22 + 2 S12 + S66) / 8``.
+
+It repairs what disorder costs in tension; bending, shear and nu stay what the springs make them. Derived here.
 """
 
 from dataclasses import replace
 
-from ..mesh import Mesh, MeshError
+from ..mesh import Mesh
 from ..problem.materials import Material
 from . import area, lattice
-from .base import DefinitionError, Springs, definition
+from .base import Springs, definition
 
 
 @definition("patch", order=190)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs of `lattice` scaled once by a roller patch test of the mesh itself: E exact on any mesh, nu is not.
+    """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.
     """
@@ -25,7 +30,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 @definition("patch-area", order=200)
 def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs and area energy of `area` scaled once by a roller patch test of the mesh itself: any nu, any mesh.
+    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.
     """
@@ -36,9 +41,6 @@ def _scaled(found: Springs, mesh: Mesh, material: Material, thickness: float) ->
     from ..mechanics.moduli import axial_moduli  # here: see `springtune.springs`
 
     # The modulus in units of the reference stiffness: the scalar is a ratio of the two.
-    try:
-        stiffness, _ = axial_moduli(mesh, found)
-    except MeshError as error:
-        raise DefinitionError(f"{error}; or take 'lattice' or 'area', which need none") from None
+    stiffness, _ = axial_moduli(mesh, found)
     scalar = material.young_modulus * thickness / (stiffness * found.reference)
     return replace(found, reference=scalar * found.reference, evaluations=1)

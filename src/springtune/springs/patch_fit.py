@@ -1,0 +1,158 @@
+r"""Springs fitted, none negative, to patch tests under even, linear, quadratic and cubic stresses; no reference.
+
+A sheet under no body force, whatever its outline and its holes, has displacements known in closed form where its
+stresses are polynomials (Kolosov and Muskhelishov): with z = x + i y and analytic phi, psi
+
+.. math:: 2 \mu (u + i v) = \kappa \varphi - z \overline{\varphi'} - \overline{\psi}, \qquad
+          \sigma_{xx} + \sigma_{yy} = 4 \, \mathrm{Re} \, \varphi', \qquad
+          \sigma_{yy} - \sigma_{xx} + 2 i \sigma_{xy} = 2 (\bar z \varphi'' + \psi'),
+
+kappa = (3 - nu) / (1 + nu), mu = E / (2 (1 + nu)). phi and psi = z^m, i z^m for m = 1 to 4 give 15 tests: tension and
+shear, 3 of even stress; bending and its like, 4 of linear stress; 4 of quadratic, as under shear forces; 4 of cubic.
+They are combined so that the sheet's own energy under test a with the displacements of test b,
+``G_ab = integral of t_a . u_b along the outline``, is the unit matrix.
+
+Let F have as columns the forces of their tractions on the particles, K(k) be the stiffness of the free network. What
+these tests measure of the network is ``M = F^T K^-1 F``; of the sheet it is 1, the unit matrix. The springs minimise
+
+.. math:: \| M(k) - 1 \|^2 + \frac{\lambda}{n} \sum_e \ln^2 (k_e / k_{e,0})
+
+about those of `springtune.springs.van_gelder`, k0 (form for nu = 0: exact on lattices), with lambda = 0.1. With the
+elongations e = B K^-1 F of a spring, ``d M / d ln k_e = - k_e e e^T``: at most four Gauss-Newton steps, each one
+factorization of the mesh, 15 solves and a system of 120 unknowns. A logarithm keeps every spring above zero, so the
+network of any triangles is stable at rest. Turning, shifting or scaling the mesh leaves the tests' span, hence the
+springs, as they are.
+
+Central springs have nu = 1/3 (Cauchy's relation), so the tests are those of a material of that ratio and of the E
+asked for: the tests say nothing of another nu. Cauchy's relation holds cell by cell where cells repeat: in rows of
+isosceles triangles of base a and height h, whatever their springs are, ``C2222 / C1212 = (2 h / a)^2``, which is 3 if
+isotropic. In rows of h = a, as free meshes of 5 mm have in 20 mm, it is 4: one of the two is off by 1/7 or more, and no
+fit of springs that repeat repairs it. Derived here.
+
+Assumptions: triangles, in one part.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..mesh import Mesh, MeshError
+from ..problem.materials import Material
+from . import van_gelder
+from .base import DefinitionError, Springs, definition, triangles_only
+
+NU = 1 / 3
+"""Poisson's ratio of springs alone [1]."""
+
+DEGREE = 4
+"""Degree of the displacements of the tests, one above that of the stresses."""
+
+TESTS = 4 * DEGREE - 1
+"""Polynomial solutions up to that degree that are no rigid motion."""
+
+LEAST = 1e-12
+"""Energy of a test over the largest one's below which rounding is all that it tells, as in very slender sheets [1]."""
+
+WEIGHT = 0.1
+"""lambda: weight of the mean squared logarithm of a spring's change against the squared misfit of the tests [1]."""
+
+STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.3
+"""Gauss-Newton steps at most; largest change of a logarithm in one of them, and that below which it is the last [1]:
+the next would be some tenth of it."""
+
+
+@definition("patch-fit", order=195, cells=(3,))
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+    """Springs fitted to 15 patch tests of the mesh itself, from even to cubic stresses: none negative, nu = 1/3.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals and on
+    meshes of several parts.
+    """
+    from ..mechanics.moduli import free_body  # here: see `springtune.springs`
+    from ..mechanics.network import Network
+
+    triangles_only(mesh)
+    try:
+        held = free_body(mesh)
+    except MeshError as error:
+        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
+    start = van_gelder.springs(mesh, material, thickness).relative
+    forces = outline_tests(mesh)
+    first, second = np.triu_indices(len(forces))
+    # Entries beside the diagonal stand for two.
+    twice = np.where(first == second, 1.0, np.sqrt(2.0))
+    logarithms, network, evaluations = np.zeros(len(start)), None, 0
+    weight = WEIGHT / len(start)
+    while evaluations < STEPS:
+        evaluations += 1
+        network = Network(mesh, held, start * np.exp(logarithms), like=network)
+        loads = [network.reduce(force) for force in forces]
+        moved = [network.rest_factor.solve(load) for load in loads]
+        normals = network.rest_vectors / network.rest_lengths[:, None]
+        pulled = [(normals * network.stretch(network.expand(field))).sum(axis=1) for field in moved]
+        elongations = np.sqrt(network.stiffness)[:, None] * np.stack(pulled, axis=1)
+        slope = -twice * elongations[:, first] * elongations[:, second]
+        missing = (
+            twice * (np.eye(len(forces)) - np.array(loads) @ np.array(moved).T)[first, second]
+        ) + slope.T @ logarithms
+        normal = slope.T @ slope
+        normal[np.diag_indices(len(normal))] += weight
+        change = slope @ np.linalg.solve(normal, missing) - logarithms
+        largest = np.abs(change).max()
+        logarithms += change * min(1.0, LARGEST_STEP / largest)
+        if largest < ENOUGH:
+            break
+    return Springs(material.young_modulus * thickness, start * np.exp(logarithms), evaluations=evaluations)
+
+
+def outline_tests(mesh: Mesh) -> np.ndarray:
+    """Forces on the particles of tests under polynomial stresses, each of unit work, none on the others' displacements.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of triangles.
+
+    Returns
+    -------
+    ndarray of float, shape (n_tests, n_points, 2)
+        At most `TESTS`. For E t = 1: times the square root of E t they are forces [N] whose work on the sheet's own
+        displacements is 1 J.
+    """
+    x, y = (mesh.points - mesh.points.mean(axis=0)).T
+    places = (x + 1j * y) / np.hypot(x, y).max()
+    # Sides of triangles run counter-clockwise around them: those of the outline have the sheet on their left.
+    sides = np.concatenate([mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]], mesh.triangles[:, [0, 1]]])
+    begin, end = sides[mesh.on_outline[mesh.cell_edges[3].T.ravel()]].T
+    here, along = places[begin], places[end] - places[begin]
+    at_begin, at_end = np.zeros((2, TESTS, len(here)), dtype=complex)
+    work = np.zeros((TESTS, TESTS))
+    # Four points integrate polynomials of degree 7 exactly: cubic stresses times displacements of degree 4.
+    for position, share in zip(*np.polynomial.legendre.leggauss(4)):
+        part = 0.5 * (1 + position)
+        fields, tractions = np.stack(list(_solutions(here + part * along, -1j * along)), axis=1)
+        work += 0.5 * share * np.real(tractions @ fields.conj().T)
+        at_begin += 0.5 * share * (1 - part) * tractions
+        at_end += 0.5 * share * part * tractions
+    forces, particles = [], np.concatenate([begin, end])
+    for pulls in np.concatenate([at_begin, at_end], axis=1):
+        axes = [np.bincount(particles, axis, len(places)) for axis in (pulls.real, pulls.imag)]
+        forces.append(np.stack(axes, axis=1))
+    energies, mixtures = np.linalg.eigh(0.5 * (work + work.T))
+    told = energies > LEAST * energies[-1]
+    return np.einsum("ab,anx->bnx", mixtures[:, told] / np.sqrt(energies[told]), np.array(forces))
+
+
+def _solutions(places: np.ndarray, normals: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Displacement and traction along a normal of each polynomial solution for E = 1, as x + i y."""
+    kappa, shear = (3 - NU) / (1 + NU), 1 / (2 * (1 + NU))
+    for power in range(1, DEGREE + 1):
+        whole, slope = places**power, power * places ** (power - 1)
+        bend = power * (power - 1) * places ** max(power - 2, 0)
+        for phi, psi in ((1, 0), (1j, 0), (0, 1), (0, 1j)):
+            if (power, phi) == (1, 1j):  # a rotation
+                continue
+            moved = kappa * phi * whole - places * np.conj(phi * slope) - np.conj(psi * whole)
+            mean, apart = 2 * np.real(phi * slope), places.conj() * phi * bend + psi * slope
+            # sigma . n of the real matrix as one number: mean part along n, deviatoric part along its conjugate.
+            yield moved / (2 * shear), mean * normals - np.conj(apart * normals)
