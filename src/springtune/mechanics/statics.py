@@ -13,6 +13,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..linalg.factors import Factor, SingularError
 from ..problem.status import Status
+from .continuation import limit_load
 from .expansion import Expansion
 from .follower import FollowerPressure
 from .network import Network
@@ -217,6 +218,13 @@ class StaticProblem:
         negative_pivots : int or float
             Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
         """
+        if found.limit_share < 1:
+            share = f"{100 * found.limit_share:.3g} %"
+            return (
+                Status.UNSTABLE,
+                f"limit point: the path from rest turns back, unstable, at {share} of the load",
+                np.nan,
+            )
         if not found.converged:
             return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
         assert found.factor is not None  # of what converged
@@ -353,6 +361,9 @@ class StaticProblem:
                 step *= 1.5
             elif step <= SMALLEST_STEP and not found.converged:
                 reason = f"{found.reason} beyond {100 * done:.3g} % of the load"
-                return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
+                limit = np.nan if last_step is None else limit_load(self, done * s, last, before) / s
+                return replace(
+                    found, iterations=iterations, reason=reason, load_share=done, last=last, limit_share=limit
+                )
             else:
                 step *= 0.5

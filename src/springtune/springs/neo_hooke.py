@@ -5,9 +5,9 @@ An incompressible sheet in plane stress, nu = 0.5, has the energy
 .. math:: W = \tfrac{\mu t}{2} A_0 (tr C + J^{-2} - 3), \quad \mu = E / 3,
 
 on a triangle whose area was A_0 and is J A_0. There ``tr C A_0`` is half the sum over its sides of the opposite
-angle's cotangent times the length squared, so that the energy is that of springs of zero rest length, from each triangle
-``mu t cot / 2``, and of its area, ``mu t A_0 / 2 (A_0 / A)^2``: exactly linear triangles, on any mesh and at any
-strain. Springs opposite obtuse angles push; no triangle can turn inside out.
+angle's cotangent times the length squared, so that the energy is that of springs of zero rest length, from each
+triangle ``mu t cot / 2``, and of its area, ``mu t A_0 / 2 (A_0 / A)^2``: exactly linear triangles, on any mesh and at
+any strain. Springs opposite obtuse angles push; no triangle can turn inside out.
 
 Below nu = 0.5 it is the law of CalculiX and Abaqus,
 ``mu/2 (J_3^(-2/3) I_1 - 3) + K/2 (J_3 - 1)^2`` per volume with mu = E / (2 (1 + nu)) and K = E / (3 (1 - 2 nu)), whose
