@@ -15,6 +15,7 @@ import numpy as np
 from ..jobs.damage import ASIDE
 from ..output.text import aligned, label_text, without_numbers
 from ..problem.status import Status
+from ..study.model import FINITE_STRAIN_REFERENCE
 from .plan import Plan
 from .workload import clock, computed, keys_of
 
@@ -39,6 +40,10 @@ SCENES = "/"
 """Group of the scenes."""
 
 
+FINITE = "/finite_strain"
+"""Group of references at finite strain, which networks of nonlinear kinematics are compared with."""
+
+
 REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
 """What a group has whose scenes are compared with references of small strain."""
 
@@ -60,10 +65,11 @@ def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
     """
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
-    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES])]
+    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES], groups.get(FINITE))]
     for name, data in groups.items():
         if REFERRED <= set(data):
-            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
+            finite = groups.get(FINITE) if name == SCENES else None
+            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"), finite)
     holes = [(what, found, lost) for what, found, lost in states if lost]
     for what, found, lost in holes:
         for status, cells in lost.items():
@@ -132,10 +138,25 @@ def _named(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - len(shown)} more"
 
 
-def _worst(root: "xr.Dataset") -> Iterator[str]:
+def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":
+    """Errors of networks of nonlinear kinematics against finite strain, NaN for others; None without a reference."""
+    if finite is None or FINITE_STRAIN_REFERENCE not in finite.reference.values:
+        return None
+    errors = finite.deformation_error.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
+    return errors.where(root.kinematics != "linear").transpose(*root.deformation_error.dims)
+
+
+def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
     """The largest error of each definition among the scenes that are solved and whose reference applies."""
-    counted = (root.status == Status.SOLVED) & (root.reference_applies == 1)
-    errors = root.deformation_error.where(counted)
+    counted, errors = (root.status == Status.SOLVED) & (root.reference_applies == 1), root.deformation_error
+    at_finite_strain = _at_finite_strain(root, finite)
+    if at_finite_strain is not None:  # never a nonlinear network against small strain
+        linear = root.kinematics == "linear"
+        errors = errors.where(linear, at_finite_strain)
+        counted = (counted & linear | (root.status == Status.SOLVED) & at_finite_strain.notnull()).transpose(
+            *errors.dims
+        )
+    errors = errors.where(counted)
     axis = errors.dims.index("definition")
     found = []
     for number in range(errors.sizes["definition"]):
@@ -151,20 +172,22 @@ def _worst(root: "xr.Dataset") -> Iterator[str]:
         scenes = "the one scene that has one" if number == 1 else f"the {number} scenes that have one"
         head = "worst deformation error, (network - reference) / |reference|, of each definition"
         yield from ("", f"{head}, of {scenes}; tension is positive")
+        if at_finite_strain is not None:
+            yield "  nonlinear networks against finite strain, linear ones against small strain"
         yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
     if len(found) > WORST:
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
 
 
-def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
+def _unreferenced(root: "xr.Dataset", called: str, finite: "xr.Dataset | None" = None) -> Iterator[str]:
     """References that are missing or do not apply, each with the scenes that have no error of their own for it."""
     requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
+    doubted = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
+    at_finite_strain = _at_finite_strain(root, finite)
+    doubted = doubted if at_finite_strain is None else doubted & at_finite_strain.isnull()
     for scenes, what in (
         (requested & ~there, "without a reference, and so without an error"),
-        (
-            root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0),
-            "beyond small strain, so the error is not the network's alone",
-        ),
+        (doubted, "beyond small strain, so the error is not the network's alone"),
     ):
         if not scenes.any():
             continue
