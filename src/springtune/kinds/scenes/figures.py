@@ -652,7 +652,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_block(tree, beam="200x40", mesh_type="structured", mesh_size=1e-3, material="rubber")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['One stiffness for all loads? (small strain)', 'The pressed face (small strain)']
+    ['One stiffness for all loads? (small strain)', 'The pressed face (finite strain)']
     >>> axes[0].figure.get_suptitle()
     '200x40 mm, structured 1 mm, rubber'
     """
