@@ -97,6 +97,10 @@ class Energy(ABC):
             tangent[:, b, :, b] -= turned
         return tangent.reshape(count, 2 * corners, 2 * corners)
 
+    def objection(self, displacements: np.ndarray) -> str:
+        """What there is against its answer at displacements [m] of shape (n_points, 2); empty where nothing is."""
+        return ""
+
     @property
     def key(self) -> bytes:
         """Bytes that tell energies of one mesh apart."""
@@ -352,16 +356,25 @@ class _SheetEnergy(Energy):
     def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
         """Derivatives of D and of J by each corner's position [1/m], and the law; what is inside out is NaN."""
         moved = moved - moved[:, :1]
-        slopes, area = self._rest_slopes, self._rest_area
-        (x, y), (along, across) = moved, slopes
-        apart = (x * along - y * across).sum(axis=0) / area, (x * across + y * along).sum(axis=0) / area
-        by_x, by_y = apart[0] * along + apart[1] * across, apart[1] * along - apart[0] * across
-        # The area is quadratic in the positions.
-        growth = (dot(slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0) / area
-        growth = np.where(growth > -1.0, growth, np.nan)
+        area, (along, across) = self._rest_area, self._rest_slopes
+        first, second = self._apart(moved)
+        by_x, by_y = first * along + second * across, second * along - first * across
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            law = self._law(apart[0] ** 2 + apart[1] ** 2, growth)
+            law = self._law(*self._invariants(moved))
         return 2 * np.stack([by_x, by_y]) / area, AreaEnergy._slopes(self._rest + moved) / area, law
+
+    def _apart(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The two terms whose squares make D, F11 - F22 and F12 + F21; of displacements less the first corner's."""
+        (x, y), (along, across) = moved, self._rest_slopes
+        area = self._rest_area
+        return (x * along - y * across).sum(axis=0) / area, (x * across + y * along).sum(axis=0) / area
+
+    def _invariants(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """D and J - 1, NaN where a triangle is flat or inside out, of displacements less those of the first corner."""
+        first, second = self._apart(moved)
+        # The area is quadratic in the positions.
+        growth = (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0) / self._rest_area
+        return first**2 + second**2, np.where(growth > -1.0, growth, np.nan)
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
         energy = self._state(moved)[2][0]
@@ -412,14 +425,33 @@ class YeohEnergy(_SheetEnergy):
         As in `Energy`; triangles.
     coefficients : ndarray of float, shape (n_cells, n)
         Coefficients times the thickness over the reference stiffness [1], from the linear one on.
+    largest : float, optional
+        Largest I_1 - 3 of the test that they were fitted to [1]; beyond, they are extrapolated.
     """
 
     points: np.ndarray
     corners: np.ndarray
     coefficients: np.ndarray
+    largest: float = np.inf
 
     def _moduli(self) -> tuple[np.ndarray, ...]:
-        return (self.coefficients,)
+        return self.coefficients, np.array(self.largest)
+
+    def objection(self, displacements: np.ndarray) -> str:
+        """As of `Energy`: how many triangles are stretched beyond the data."""
+        if not np.isfinite(self.largest):
+            return ""
+        with np.errstate(invalid="ignore"):
+            moved = self._at_corners(displacements)
+            distortion, growth = self._invariants(moved - moved[:, :1])
+            excess = distortion + _dilation(growth)[0]
+        beyond = int((excess > self.largest).sum())
+        if not beyond:
+            return ""
+        return (
+            f"extrapolated: {beyond} of {len(excess)} triangles are stretched beyond the test data, to I1 - 3 = "
+            f"{excess.max():.3g} where the data end at {self.largest:.3g}"
+        )
 
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
         dilation, first_j, second_j = _dilation(growth)

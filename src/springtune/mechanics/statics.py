@@ -214,7 +214,7 @@ class StaticProblem:
         status : Status
             Solved, unstable or not converged.
         message : str
-            Why it is not solved; empty where it is.
+            Why it is not solved; where it is, what its energies have against it, mostly nothing.
         negative_pivots : int or float
             Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
         """
@@ -244,7 +244,8 @@ class StaticProblem:
         if found.unstable_share < 1:
             share = f"{100 * found.unstable_share:.3g} %"
             return Status.UNSTABLE, f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
-        return Status.SOLVED, "", pivots
+        objections = (energy.objection(found.displacements) for energy in self.network.energies)
+        return Status.SOLVED, "; ".join(filter(None, objections)), pivots
 
     def nonlinear(self, s: float) -> Equilibrium:
         """Equilibrium of the network with its springs' full length law.
