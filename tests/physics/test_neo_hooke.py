@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 import springtune
 from springtune.mechanics.energies import NeoHookeEnergy, YeohEnergy
 from springtune.mechanics.network import Network
-from springtune.mechanics.newton import Newton
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import Mesh
 from springtune.problem.loads import AXIAL
@@ -101,9 +100,8 @@ def check_derivatives(energy, here, seed):
     ends = [energy.forces(here + sign * step * direction).reshape(each.shape) for sign in (1, -1)]
     exact = np.einsum("nij,nj->ni", tangent, each)
     assert (np.abs((ends[0] - ends[1]) / (2 * step) - exact).max(axis=1) <= 1e-7 * sizes).all()
-    values = [energy._values(energy._at_corners(here + sign * step * direction)) for sign in (1, -1)]
-    exact = (energy.forces(here).reshape(each.shape) * each).sum(axis=1)
-    assert (np.abs((values[0] - values[1]) / (2 * step) - exact) <= 1e-7 * sizes).all()
+    difference = (energy.value(here + step * direction) - energy.value(here - step * direction)) / (2 * step)
+    assert abs(difference - (energy.forces(here).reshape(each.shape) * each).sum()) <= 1e-6 * sizes.sum()
 
 
 @pytest.mark.parametrize("nu", RATIOS)
@@ -198,17 +196,15 @@ def test_newtons_steps_never_turn_a_triangle_inside_out():
     mesh, network = square(0.5)
     taken = []
 
-    class Watched(Newton):
-        def _step(self, step):
-            there = super()._step(step)
-            if there is not None:
-                taken.append(there.displacements)
-            return there
+    class Watched(StaticProblem):
+        def factorize_tangent(self, s, displacements):
+            taken.append(displacements)
+            return super().factorize_tangent(s, displacements)
 
-    problem = StaticProblem(network, np.array([[0.0, 0], [-0.5, 0], [-0.5, 0], [0, 0]]))
+    problem = Watched(network, np.array([[0.0, 0], [-0.5, 0], [-0.5, 0], [0, 0]]))
     for seed in range(20):
         start = 0.3 * np.random.default_rng(seed).standard_normal(mesh.points.shape)
-        Watched(problem, 2.0).solve(start * ~network.held)
+        problem.newton(2.0, start * ~network.held)
     assert len(taken) > 40
     assert all(np.isfinite(network.energy(displacements)) for displacements in taken)
 

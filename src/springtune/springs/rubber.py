@@ -30,13 +30,13 @@ from .base import DefinitionError, Springs, triangles_only, zero
 TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
 """Tests, and the power p of the nominal stress 2 (q - q^-p) W'(I_1) of an incompressible sheet."""
 
-FLOOR = 0.05
+LEAST_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
 
 CHECKED = 400
 """Stretches of each test over the range of the data at which a fitted law has to be stable."""
 
-COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa]'"
+TWO_COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa]'"
 
 
 class TestDataError(ValueError):
@@ -118,15 +118,15 @@ class UniaxialTest:
             lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             why = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error.strerror
-            raise TestDataError(f"'{path}' cannot be read: {why}; {COLUMNS}") from None
+            raise TestDataError(f"'{path}' cannot be read: {why}; {TWO_COLUMNS}") from None
         rows = [(number, row) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
                 for row in csv.reader([line])]  # fmt: skip
         if not rows:
-            raise TestDataError(f"'{path}' is empty; {COLUMNS}")
+            raise TestDataError(f"'{path}' is empty; {TWO_COLUMNS}")
         head = rows[0][1]
         unit = head[1].partition("[")[2].partition("]")[0] if len(head) == 2 else ""
         if "stretch" not in head[0].lower() or not unit:
-            raise TestDataError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a test; {COLUMNS}")
+            raise TestDataError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a test; {TWO_COLUMNS}")
         try:
             scale = positive(f"1 {unit}", "stress", "nominal stress")
         except ValueError as error:
@@ -151,7 +151,7 @@ def _told(test: UniaxialTest | str | Path) -> UniaxialTest:
 def _weights(test: UniaxialTest) -> np.ndarray:
     """Of relative errors."""
     size = np.abs(test.stress)
-    return 1 / np.maximum(size, FLOOR * size.max())
+    return 1 / np.maximum(size, LEAST_SHARE * size.max())
 
 
 def _fit(columns: np.ndarray, test: UniaxialTest) -> tuple[tuple[float, ...], float]:
@@ -257,7 +257,7 @@ class Yeoh:
     def excess(test: str, stretch: np.ndarray | float) -> np.ndarray:
         """I_1 - 3 of a stretch [1] in one of `TESTS`."""
         q = np.asarray(stretch, float)
-        other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": 1.0}[test]
+        other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[test]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
@@ -295,7 +295,7 @@ class Yeoh:
         return Springs(modulus * thickness, zero(mesh), (energy,), linear_springs=zero_length(mesh, 2 * over[0]))
 
 
-POWERS = (2, 5, 8)
+LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""
 
 FLAT = 2.0
@@ -306,12 +306,12 @@ FLAT = 2.0
 class SpringLaw:
     """One law for all springs of an equilateral lattice, alone, and what the lattice then does in the three tests.
 
-    A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per area of the cross-section of its rows, p of `POWERS`.
+    A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per cross-section of its rows, p of `LAW_POWERS`.
 
     Attributes
     ----------
     coefficients : tuple of float
-        a_p [Pa], for as many of `POWERS`.
+        a_p [Pa], for as many of `LAW_POWERS`.
     largest : float
         Largest stretch of a spring in the data that it was fitted to [1], below `FLAT`.
     misfit : float
@@ -350,7 +350,7 @@ class SpringLaw:
             If the test cannot be read, has too few points below `FLAT`, or the fitted law is unstable along it.
         """
         test = _told(test)
-        _terms(terms, len(POWERS))
+        _terms(terms, len(LAW_POWERS))
         below = test.stretch < FLAT
         if below.sum() <= terms:
             raise TestDataError(
@@ -359,7 +359,7 @@ class SpringLaw:
             )
         test = UniaxialTest(test.stretch[below], test.stress[below], test.name)
         q = test.stretch
-        columns = np.stack([q - q**-power for power in POWERS[:terms]], axis=1)
+        columns = np.stack([q - q**-power for power in LAW_POWERS[:terms]], axis=1)
         found, misfit = _fit(columns, test)
         law = cls(found, float(q.max()), misfit)
         if not (np.diff(law.pull(np.linspace(1, q.max(), CHECKED))) > 0).all():
@@ -369,7 +369,7 @@ class SpringLaw:
     def pull(self, stretch: np.ndarray | float) -> np.ndarray:
         """Pull of a spring at its stretch [1], over the cross-section of its rows [Pa]."""
         s = np.asarray(stretch, float)
-        return np.asarray(sum(a * (s - s ** -float(power)) for a, power in zip(self.coefficients, POWERS)))
+        return np.asarray(sum(a * (s - s ** -float(power)) for a, power in zip(self.coefficients, LAW_POWERS)))
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
         """Nominal stress [Pa] along a row, at stretches [1] in one of `TESTS`; NaN where the lattice lies flat."""
