@@ -8,7 +8,10 @@ from ..linalg.factors import Factor, SingularError
 from .network import Network
 from .newton import TOLERANCE
 
-MOST_BEYOND = 12
+BEYOND = 0.25
+"""Increment beyond the last load step, over that step."""
+
+MOST_BEYOND = 24
 """Points of a path beyond the last load step that are looked at for a limit point."""
 
 
@@ -127,12 +130,12 @@ def limit_load(problem: Continued, load: float, last: np.ndarray, before: np.nda
     >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
     >>> before, last = (problem.nonlinear(-share * 3.83e-4).displacements for share in (0.9, 0.95))
     >>> print(f"{limit_load(problem, -0.95 * 3.83e-4, last, before):.3g}")
-    -0.000382
+    -0.000383
     """
     network = problem.network
     direction = network.reduce(last - before)
     point = Point(network.reduce(last), load, 0, 0)
-    length = increment = float(np.linalg.norm(direction))
+    length = increment = BEYOND * float(np.linalg.norm(direction))  # near a limit point two paths may be near
     try:
         pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
     except SingularError:
