@@ -68,8 +68,7 @@ def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
     lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES], groups.get(FINITE))]
     for name, data in groups.items():
         if REFERRED <= set(data):
-            finite = groups.get(FINITE) if name == SCENES else None
-            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"), finite)
+            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
     holes = [(what, found, lost) for what, found, lost in states if lost]
     for what, found, lost in holes:
         for status, cells in lost.items():
@@ -179,15 +178,15 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
 
 
-def _unreferenced(root: "xr.Dataset", called: str, finite: "xr.Dataset | None" = None) -> Iterator[str]:
+def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
     """References that are missing or do not apply, each with the scenes that have no error of their own for it."""
     requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
-    doubted = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
-    at_finite_strain = _at_finite_strain(root, finite)
-    doubted = doubted if at_finite_strain is None else doubted & at_finite_strain.isnull()
     for scenes, what in (
         (requested & ~there, "without a reference, and so without an error"),
-        (doubted, "beyond small strain, so the error is not the network's alone"),
+        (
+            root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0),
+            "beyond small strain, so the error is not the network's alone",
+        ),
     ):
         if not scenes.any():
             continue
