@@ -130,7 +130,7 @@ def _lines(
         for definition in definitions:
             one = f"{definition}_{name}"
             status, message = row.get(f"{one}_status", "not_requested"), row.get(f"{one}_message", "")
-            if status not in ANSWERED:
+            if status not in ANSWERED or not np.isfinite(row[f"{one}_mm"]):  # beyond a limit point there is none
                 said = "not asked" if status == "not_requested" else status.replace("_", " ")
                 cells.append({"words": said, "soft": status == "not_requested", "title": message})
                 continue
