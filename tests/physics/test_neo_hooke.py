@@ -237,3 +237,17 @@ def test_quadrilaterals_are_refused():
     mesh = springtune.make_mesh(beam, "braced", "10 mm")
     with pytest.raises(springtune.DefinitionError, match="needs triangles"):
         DEFINITIONS["neo-hooke"].springs(mesh, springtune.Material("1 MPa", 0.5), 1e-3)
+
+
+def test_the_compressible_law_becomes_the_incompressible_one():
+    """With nu towards 0.5: forces differ by 1 - 2 nu, at any deformation."""
+    points, gradients, _ = random_triangles(5, 3.0)
+    corners = np.arange(3 * len(points)).reshape(-1, 3)
+    moved = moved_by(points, gradients)
+    exact = law_of(0.5, points.reshape(-1, 2), corners).forces(moved)
+    sizes = np.abs(exact).max(axis=(1, 2), keepdims=True)
+    near, nearer = (
+        float((np.abs(law_of(nu, points.reshape(-1, 2), corners).forces(moved) - exact) / sizes).max())
+        for nu in (0.5 - 5e-5, 0.5 - 5e-7)
+    )
+    assert nearer < 1e-4 and near / nearer == pytest.approx(100, rel=0.1)
