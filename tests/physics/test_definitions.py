@@ -64,7 +64,7 @@ def test_springs_alone_on_the_lattice(name, nu):
 
 
 @pytest.mark.parametrize("nu", EVERY_RATIO)
-@pytest.mark.parametrize("name", ["area", "angular", "delingette", "patch-area"])
+@pytest.mark.parametrize("name", ["area", "angular", "delingette", "neo-hooke", "patch-area"])
 def test_any_poisson_ratio_is_exact_on_the_lattice(name, nu):
     young, ratio, shear = errors(name, patch("structured"), nu)
     assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)

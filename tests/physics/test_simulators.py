@@ -463,6 +463,7 @@ def test_what_a_simulator_lacks_is_refused_and_nothing_written(ending, program, 
     for one, message in (
         (scene(definition="area"), f"definition 'area': has energies of areas.*{program} has no such law; .*'patch'"),
         (scene(definition="angular"), f"definition 'angular': has energies of angles.*{program}.*such as 'patch'"),
+        (scene(definition="neo-hooke"), f"definition 'neo-hooke': has energies of rubber.*{program}.*such as 'patch'"),
         (scene(material=weightless), f"density: material 'ideal' has none, and {program} moves masses; give a density"),
         (scene(kinematics="linear"), f"kinematics: 'linear', and springs of {program} keep.*; take 'nonlinear'"),
         (scene(load="follower-pressure", force="1 kN"), "load 'follower-pressure': turns.*; take 'pressure'"),

@@ -63,6 +63,8 @@ def forces_of(net, x):
                 pull[:, i] += 0.5 * (gamma[:, j] * change[:, m] + gamma[:, m] * change[:, j])
             along = 2 * pull[:, :, None] * sides
             part = np.roll(along, -1, axis=1) - np.roll(along, 1, axis=1)
+        elif terms.kind in ("incompressible", "compressible"):
+            part = rubber_forces(terms.kind, corners, value)
         else:
             a, b = after - corners, before - corners
             angle = np.arctan2((a * turned(b)).sum(axis=2), (a * b).sum(axis=2))
@@ -72,6 +74,31 @@ def forces_of(net, x):
             part = np.roll(to_next, 1, axis=1) + np.roll(to_last, -1, axis=1) - to_next - to_last
         np.add.at(total, terms.cells, part)
     return total
+
+
+def rubber_forces(kind, corners, value):
+    """Of T, the trace, and of the area; the stretch across the sheet by bisection, where there is one to be found."""
+    after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
+    sides, slopes = before - after, 0.5 * turned(after - before)
+    here, rest = corners - corners[:, :1], value["rest_area"]
+    ratio = 0.5 * (here * turned(np.roll(here, -1, axis=1))).sum(axis=(1, 2)) / rest
+    trace = (value["rest_weight"] * (sides**2).sum(axis=2)).sum(axis=1) / rest
+    if kind == "incompressible":
+        e = trace + ratio**-2 - 3
+        by_trace = value["c1"] + 2 * value["c2"] * e + 3 * value["c3"] * e**2
+        by_ratio = -2 * by_trace * ratio**-3
+    else:
+        low, high = np.full(len(rest), 0.1), np.full(len(rest), 10.0)
+        for _ in range(60):
+            z = 0.5 * (low + high)
+            volume = z * ratio
+            slope = value["shear"] * volume ** (-2 / 3) * (z - (trace + z**2) / (3 * z))
+            slope += value["bulk"] * (volume - 1) * ratio
+            low, high = np.where(slope < 0, z, low), np.where(slope < 0, high, z)
+        by_trace = value["shear"] / 2 * volume ** (-2 / 3)
+        by_ratio = -2 / 3 * by_trace / ratio * (trace + z**2) + value["bulk"] * (volume - 1) * z
+    along = 2 * (by_trace[:, None] * value["rest_weight"])[:, :, None] * sides
+    return np.roll(along, -1, axis=1) - np.roll(along, 1, axis=1) + by_ratio[:, None, None] * slopes
 
 
 def unbalanced(net, x):
@@ -87,6 +114,7 @@ SCENES = {
     "delingette": ("delingette", "free"),
     "delingette-tensile": ("delingette-tensile", "structured"),
     "angular": ("angular", "structured"),
+    "neo-hooke": ("neo-hooke", "free"),
     "area": ("area", "free"),
     "patch-area": ("patch-area", "structured"),
     "element-fit on quads": ("element-fit", "braced"),

@@ -75,7 +75,7 @@ def fields():
 
 
 def block():
-    labels = LABELS | {"face_position": [0.0, 0.5, 1.0], "reference": ["small-strain", "neo-hooke"]}
+    labels = LABELS | {"face_position": [0.0, 0.5, 1.0], "reference": ["small-strain", "neo-hooke-plane-stress"]}
     data = variables(
         labels, face_profile=(*SCENE, "face_position"),
         reference_face_profile=("beam", "material", "load", "reference", "face_position"),

@@ -223,11 +223,23 @@ def test_a_network_that_is_not_solved_says_so(tree):
 
 def test_the_pressed_face_is_the_datasets(tree):
     chosen = EVERY_PLOT[plot_block][0]
-    left, right = plot_block(tree, **chosen)
-    faces = tree["block"].to_dataset().sel(chosen).sel(load="pressure")
-    for definition, kinematics in (("paper", "nonlinear"), ("area", "linear")):
-        profile = faces.face_profile.sel(definition=definition, kinematics=kinematics)
-        assert drawn(right, f"{definition}, {kinematics}").get_ydata() == pytest.approx(-1e3 * profile.values)
+    faces = tree["block"].to_dataset()
+    small = tree.copy()
+    small["block"] = xr.DataTree(faces.sel(reference=["small-strain"]))
+    # Like with like: networks of nonlinear kinematics over finite strain, without it linear ones over small strain.
+    for data, kinematics, reference in (
+        (small, "linear", "small-strain"),
+        (tree, "nonlinear", "neo-hooke-plane-stress"),
+    ):
+        left, right = plot_block(data, **chosen)
+        shown = faces.sel(chosen).sel(load="pressure")
+        for definition in ("paper", "area"):
+            profile = shown.face_profile.sel(definition=definition, kinematics=kinematics)
+            assert drawn(right, f"{definition}, {kinematics}").get_ydata() == pytest.approx(-1e3 * profile.values)
+        profile = shown.reference_face_profile.sel(reference=reference)
+        line = drawn(right, f"reference, {reference.replace('-', ' ')}")
+        assert line.get_ydata() == pytest.approx(-1e3 * profile.values)
+        assert sum("reference" in line.get_label() for line in right.get_lines()) == 1
     assert {"traction", "compression", "pressure"} <= {line.get_label() for line in left.get_lines()}
 
 

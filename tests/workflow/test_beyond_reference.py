@@ -86,7 +86,16 @@ def test_against_finite_strain_what_is_left_is_the_mesh(tree, run):
     assert other / stress.reference_displacement.item() == pytest.approx(1 - 0.3**2, rel=0.03)
     page = (run.folder / "results/beyond/tables/index.html").read_text()
     assert "Against references at finite strain" in page
-    assert (run.folder / "results/beyond/tables/finite_strain.csv").exists()
+    tables = run.folder / "results/beyond/tables"
+    assert (tables / "finite_strain.csv").exists()
+    # Tables and summary have like with like.
+    with open(tables / "bending_structured_soft.csv", newline="") as file:
+        row = next(row for row in csv.DictReader(file) if row["beam"] == "slender")
+    assert float(row["delingette_nonlinear_error_percent"]) == pytest.approx(100 * against, rel=1e-5)
+    assert float(row["delingette_linear_error_percent"]) == pytest.approx(100 * linear, rel=1e-5)
+    assert float(row["reference_nonlinear_mm"]) == pytest.approx(1e3 * stress.reference_displacement.item(), rel=1e-5)
+    assert row["reference_applies_nonlinear"] == "yes" and "marks a reference at finite strain" in page
+    assert "nonlinear networks against finite strain" in (run.folder / "results/beyond/summary.txt").read_text()
 
 
 def test_nothing_is_calibrated_beyond_the_linear_reference(tree):
@@ -124,4 +133,5 @@ def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
     assert f"no reference: {lost}" in (tmp_path / "index.html").read_text()
     rows = csv.DictReader((tmp_path / written[0]).read_text().splitlines())
     applies = {row["beam"]: (row["reference_applies_nonlinear"], row["reference_applies_linear"]) for row in rows}
-    assert applies == {"slender": ("no", "yes"), "other": ("no", "no")}
+    # Nonlinear networks have a reference of their own, at finite strain.
+    assert applies == {"slender": ("yes", "yes"), "other": ("yes", "no")}

@@ -74,6 +74,7 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
     rows, definitions = table["rows"], table["definitions"]
     there = [name for name in kinematics if any(f"{one}_{name}_status" in row for row in rows for one in definitions)]
     displacements = [row["reference_mm"] for row in rows]
+    displacements += [row[name] for row in rows for name in map(_own_reference, there) if name in row]
     errors = []
     for row in rows:
         for name in (f"{one}_{kind}" for one in definitions for kind in there):
@@ -122,12 +123,14 @@ def _lines(
     objected = [name for name in asked if row[f"reference_applies_{name}"] == "no"]
     marks |= {"r"} if objected else set()
     marks |= {"*"} if row["remark"] else set()
+    own = [name for name in asked if _own_reference(name) in row]
+    marks |= {"f"} if own else set()
     for name in asked:
         cells = []
         for definition in definitions:
             one = f"{definition}_{name}"
             status, message = row.get(f"{one}_status", "not_requested"), row.get(f"{one}_message", "")
-            if status not in ANSWERED:
+            if status not in ANSWERED or not np.isfinite(row[f"{one}_mm"]):  # beyond a limit point there is none
                 said = "not asked" if status == "not_requested" else status.replace("_", " ")
                 cells.append({"words": said, "soft": status == "not_requested", "title": message})
                 continue
@@ -148,10 +151,17 @@ def _lines(
             "printed": [number(row["printed_reference_mm"], 3), number(row["printed_displacement_mm"], 2),
                         number(row["printed_error_percent"], 2)],
             "kinematics": name,
-            "reference": number(row["reference_mm"], length),
+            "reference": number(row[_own_reference(name)] if name in own else row["reference_mm"], length),
+            "shares_reference": not own,
+            "finite": name in own,
             "objection": f"{' and '.join(objected)}: {row['reference_message']}" if objected else "",
             "cells": cells,
         }  # fmt: skip
+
+
+def _own_reference(kinematics: str) -> str:
+    """Column of the reference of networks of these kinematics, where they have one of their own: at finite strain."""
+    return f"reference_{kinematics}_mm"
 
 
 def _stiffnesses(rows: list[Mapping[str, Any]], definitions: list[str], kinematics: list[str]) -> Iterable[str]:

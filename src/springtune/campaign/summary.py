@@ -15,6 +15,7 @@ import numpy as np
 from ..jobs.damage import ASIDE
 from ..output.text import aligned, label_text, without_numbers
 from ..problem.status import Status
+from ..study.model import FINITE_STRAIN_REFERENCE
 from .plan import Plan
 from .workload import clock, computed, keys_of
 
@@ -39,6 +40,10 @@ SCENES = "/"
 """Group of the scenes."""
 
 
+FINITE = "/finite_strain"
+"""Group of references at finite strain, which networks of nonlinear kinematics are compared with."""
+
+
 REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
 """What a group has whose scenes are compared with references of small strain."""
 
@@ -60,7 +65,7 @@ def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
     """
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
-    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES])]
+    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES], groups.get(FINITE))]
     for name, data in groups.items():
         if REFERRED <= set(data):
             lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
@@ -132,10 +137,25 @@ def _named(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - len(shown)} more"
 
 
-def _worst(root: "xr.Dataset") -> Iterator[str]:
+def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":
+    """Errors of networks of nonlinear kinematics against finite strain, NaN for others; None without a reference."""
+    if finite is None or FINITE_STRAIN_REFERENCE not in finite.reference.values:
+        return None
+    errors = finite.deformation_error.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
+    return errors.where(root.kinematics != "linear").transpose(*root.deformation_error.dims)
+
+
+def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
     """The largest error of each definition among the scenes that are solved and whose reference applies."""
-    counted = (root.status == Status.SOLVED) & (root.reference_applies == 1)
-    errors = root.deformation_error.where(counted)
+    counted, errors = (root.status == Status.SOLVED) & (root.reference_applies == 1), root.deformation_error
+    at_finite_strain = _at_finite_strain(root, finite)
+    if at_finite_strain is not None:  # never a nonlinear network against small strain
+        linear = root.kinematics == "linear"
+        errors = errors.where(linear, at_finite_strain)
+        counted = (counted & linear | (root.status == Status.SOLVED) & at_finite_strain.notnull()).transpose(
+            *errors.dims
+        )
+    errors = errors.where(counted)
     axis = errors.dims.index("definition")
     found = []
     for number in range(errors.sizes["definition"]):
@@ -151,6 +171,8 @@ def _worst(root: "xr.Dataset") -> Iterator[str]:
         scenes = "the one scene that has one" if number == 1 else f"the {number} scenes that have one"
         head = "worst deformation error, (network - reference) / |reference|, of each definition"
         yield from ("", f"{head}, of {scenes}; tension is positive")
+        if at_finite_strain is not None:
+            yield "  nonlinear networks against finite strain, linear ones against small strain"
         yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
     if len(found) > WORST:
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"

@@ -23,7 +23,7 @@ import numpy as np
 
 from .. import __version__
 from ..mechanics.dynamics import masses
-from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
+from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import no_cells
@@ -375,6 +375,15 @@ def terms(energy: Energy, reference: float) -> Terms:
             "coupling": reference * coupling,
         }
         return Terms("biquadratic", corners, values)
+    if isinstance(energy, YeohEnergy | NeoHookeEnergy):
+        areas, weights = signed_areas(points, corners), 0.5 / np.tan(corner_angles(points, corners))
+        values = {"rest_area": areas, "rest_weight": weights}
+        if isinstance(energy, NeoHookeEnergy):
+            moduli = {"shear": reference * energy.shear, "bulk": reference * energy.bulk}
+            return Terms("compressible", corners, values | moduli)
+        coefficients = reference * energy.coefficients.T
+        lacking = [np.zeros(len(corners))] * (3 - len(coefficients))
+        return Terms("incompressible", corners, values | dict(zip(("c1", "c2", "c3"), [*coefficients, *lacking])))
     raise DefinitionError(
         f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
     )

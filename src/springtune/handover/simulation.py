@@ -22,7 +22,13 @@ STEP_SHARE = 0.8
 """Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
 fronts of waves stretch springs further."""
 
-WORDS = {"area": "areas", "angle": "angles", "biquadratic": "squared lengths"}
+WORDS = {
+    "area": "areas",
+    "angle": "angles",
+    "biquadratic": "squared lengths",
+    "incompressible": "rubber",
+    "compressible": "rubber",
+}
 """What energies besides springs are of, by their kind."""
 
 

@@ -12,6 +12,16 @@ FORMULAS = {
         "rest_length_i^2 of the side opposite corner i, and j, k the other two: coupling_i joins the sides that meet "
         "in corner i"
     ),
+    "incompressible": (
+        "W = rest_area (c1 e + c2 e^2 + c3 e^3) of each triangle, with e = T + (rest_area / A)^2 - 3, A its area, "
+        "T = sum_i rest_weight_i l_i^2 / rest_area of the side opposite corner i: its first term is that of springs of "
+        "zero rest length with stiffnesses 2 c1 rest_weight_i, and of areas; no triangle turns inside out"
+    ),
+    "compressible": (
+        "W = rest_area (shear/2 (V^(-2/3) (T + z^2) - 3) + bulk/2 (V - 1)^2) of each triangle, with V = z A / "
+        "rest_area, A its area, z > 0 where W has its minimum, T = sum_i rest_weight_i l_i^2 / rest_area of the side "
+        "opposite corner i"
+    ),
 }
 """Energy of a cell by kind of terms."""
 
@@ -19,10 +29,12 @@ VALUES = {
     "area": {"rest_area": "m2", "modulus": "N/m"},
     "angle": {"rest_angle": "rad", "modulus": "J"},
     "biquadratic": {"rest_length": "m", "tensile": "N/m3", "coupling": "N/m3"},
+    "incompressible": {"rest_area": "m2", "rest_weight": "1", "c1": "N/m", "c2": "N/m", "c3": "N/m"},
+    "compressible": {"rest_area": "m2", "rest_weight": "1", "shear": "N/m", "bulk": "N/m"},
 }
 """Names of the values of each kind of terms, and their units."""
 
-OF_CORNERS = ("rest_angle", "rest_length", "tensile", "coupling")
+OF_CORNERS = ("rest_angle", "rest_length", "tensile", "coupling", "rest_weight")
 """Values that each corner of a cell has its own of."""
 
 
@@ -33,12 +45,12 @@ class Terms:
     Attributes
     ----------
     kind : str
-        Key of `FORMULAS`: ``"area"``, ``"angle"`` or ``"biquadratic"``.
+        Key of `FORMULAS`, such as ``"area"``.
     cells : ndarray of int, shape (n_cells, n_corners)
         Particles of each cell, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
     values : dict of str to ndarray of float, shape (n_cells,) or (n_cells, n_corners)
-        By the names of `VALUES`; those of a biquadratic energy are of the side opposite each corner, and `coupling` of
-        the two sides that meet in it.
+        By the names of `VALUES`; those of sides are of the side opposite each corner, and `coupling` of the two
+        sides that meet in it.
     """
 
     kind: str

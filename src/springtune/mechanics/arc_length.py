@@ -1,14 +1,13 @@
 """Equilibrium paths through limit points, and buckling loads."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..linalg.factors import Factor, SingularError
+from ..linalg.factors import Factor
+from .continuation import Point, next_point
 from .network import Network
-from .newton import TOLERANCE
 from .statics import StaticProblem
 
 FEW, MANY = 3, 8
@@ -82,10 +81,10 @@ def follow(
     0.000383
     """
     network, direction = problem.network, None
-    point = _Point(np.zeros(network.unknowns), 0.0, 0, 0)
+    point = Point(np.zeros(network.unknowns), 0.0, 0, 0)
     points, length, message = [point], increment, "too many points"
     while len(points) < most_points:
-        found, length = _next(problem, s, point, direction, length, 1e-6 * increment)
+        found, length = next_point(problem, s, point, direction, length, 1e-6 * increment)
         if found is None:
             message = "no equilibrium near the last point"
             break
@@ -104,60 +103,6 @@ def follow(
         np.array([point.negative_pivots for point in points]),
         message,
     )
-
-
-class _Point(NamedTuple):
-    """A point of a path: unknowns [m], load [m], negative pivots there and the Newton steps that it took."""
-
-    u: np.ndarray
-    load: float
-    negative_pivots: int
-    steps: int
-
-
-def _next(
-    problem: StaticProblem, s: float, last: _Point, direction: np.ndarray | None, length: float, shortest: float
-) -> tuple[_Point | None, float]:
-    """Point after the last one, and the length of the increment, halved where Newton's method fails; None beyond."""
-    displacements = problem.moved(last.load, problem.network.expand(last.u))
-    try:
-        tangent = problem.factorize_tangent(last.load, displacements).solve(problem.rate(displacements))
-        sign = np.sign(s) if direction is None else np.sign(direction @ tangent) or 1.0
-        while length > shortest:
-            rise = float(sign * length / np.linalg.norm(tangent))
-            found = _correct(problem, last, rise * tangent, rise, abs(s) * problem.load_norm)
-            if found is not None:
-                return found, length
-            length *= 0.5
-    except SingularError:  # a point exactly on a limit point
-        pass
-    return None, length
-
-
-def _correct(
-    problem: StaticProblem, last: _Point, du: np.ndarray, ds: float, scale: float, most: int = 12
-) -> _Point | None:
-    """Newton's method in the plane across an increment; None where it does not converge."""
-    network, across = problem.network, du
-    u, at = last.u + du, last.load + ds
-    for step in range(1, most + 1):
-        displacements = problem.moved(at, network.expand(u))
-        load = problem.load_at(displacements)
-        with np.errstate(over="ignore", invalid="ignore"):
-            missing = at * load - network.resistance(displacements)
-            size = np.linalg.norm(missing)
-        if not np.isfinite(size):
-            return None
-        factor = problem.factorize_tangent(at, displacements)
-        if size <= TOLERANCE * scale:
-            return _Point(u, at, problem.stability(at, displacements, factor)[0], step)
-        back, forth = (
-            factor.solve(missing),
-            factor.solve(load if problem.given is None else problem.rate(displacements)),
-        )
-        change = -(across @ back) / (across @ forth)
-        u, at = u + back + change * forth, at + change
-    return None
 
 
 def buckling_load(problem: StaticProblem, guess: float) -> float:

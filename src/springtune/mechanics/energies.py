@@ -1,4 +1,4 @@
-"""Energies that a network may have besides its springs: of areas, of angles, and of squared edge lengths.
+"""Energies that a network may have besides its springs: of areas, of angles, of squared edge lengths, and of rubber.
 
 An energy is a sum over cells of the mesh. It gives its value, the forces with which it resists displacements and its
 exact tangent, cell by cell; a network adds them to those of its springs. Changes of areas, angles and squared lengths
@@ -97,6 +97,10 @@ class Energy(ABC):
             tangent[:, a, :, a] -= block
             tangent[:, b, :, b] -= turned
         return tangent.reshape(count, 2 * corners, 2 * corners)
+
+    def objection(self, displacements: np.ndarray) -> str:
+        """What there is against its answer at displacements [m] of shape (n_points, 2); empty where nothing is."""
+        return ""
 
     @property
     def key(self) -> bytes:
@@ -322,3 +326,233 @@ class BiquadraticEnergy(Energy):
                     if c == d:
                         blocks[i, c, d] -= 2 * pull[i]
         return blocks
+
+
+@dataclass(frozen=True)
+class _SheetEnergy(Energy):
+    r"""Base of isotropic laws of rubber: energies of the trace of C and of the ratio J of the areas of a triangle.
+
+    On a triangle ``tr C A_0`` is half the sum over its sides of the opposite angle's cotangent times the length
+    squared: springs of zero rest length. So each such law is these springs and areas. What is differentiated is a
+    function of J and of
+
+    .. math:: D = tr C - 2 J = (F_{11} - F_{22})^2 + (F_{12} + F_{21})^2,
+
+    the square of the difference of the principal stretches: both terms are linear in the displacements, so that
+    nothing cancels near rest. There is no energy, and no finite force, of a triangle that is flat or inside out.
+    """
+
+    points: np.ndarray
+    corners: np.ndarray
+
+    @abstractmethod
+    def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Energy over the rest area; its derivatives by D and by J; by D twice, by D and J, and by J twice.
+
+        Of D and of J - 1, which is above -1.
+        """
+
+    @cached_property
+    def _rest_slopes(self) -> np.ndarray:
+        return AreaEnergy._slopes(self._rest)
+
+    @cached_property
+    def _rest_area(self) -> np.ndarray:
+        return 0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0)
+
+    def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+        """Derivatives of D and of J by each corner's position [1/m], and the law; what is inside out is NaN."""
+        moved = moved - moved[:, :1]
+        area, (along, across) = self._rest_area, self._rest_slopes
+        first, second = self._apart(moved)
+        by_x, by_y = first * along + second * across, second * along - first * across
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            law = self._law(*self._invariants(moved))
+        return 2 * np.stack([by_x, by_y]) / area, AreaEnergy._slopes(self._rest + moved) / area, law
+
+    def _apart(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The two terms whose squares make D, F11 - F22 and F12 + F21; of displacements less the first corner's."""
+        (x, y), (along, across) = moved, self._rest_slopes
+        area = self._rest_area
+        return (x * along - y * across).sum(axis=0) / area, (x * across + y * along).sum(axis=0) / area
+
+    def _invariants(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """D and J - 1, NaN where a triangle is flat or inside out, of displacements less those of the first corner."""
+        first, second = self._apart(moved)
+        # The area is quadratic in the positions.
+        growth = (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0) / self._rest_area
+        return first**2 + second**2, np.where(growth > -1.0, growth, np.nan)
+
+    def _values(self, moved: np.ndarray) -> np.ndarray:
+        energy = self._state(moved)[2][0]
+        return np.where(np.isnan(energy), np.inf, self._rest_area * energy)
+
+    def _forces(self, moved: np.ndarray) -> np.ndarray:
+        by_distortion, by_area, law = self._state(moved)
+        return self._rest_area * (law[1] * by_distortion + law[2] * by_area)
+
+    def _couplings(self, moved: np.ndarray) -> np.ndarray:
+        d, j, (_, first_d, first_j, dd, dj, jj) = self._state(moved)
+        along, across = self._rest_slopes
+        area = self._rest_area
+        d_pull, j_pull = area * (dd * d + dj * j), area * (dj * d + jj * j)
+        blocks = np.stack([d_pull[:, None, a] * d[None, :, b] + j_pull[:, None, a] * j[None, :, b]
+                           for a, b in self._pairs])  # fmt: skip
+        bend = 2 * first_d / area
+        for (a, b), block in zip(self._pairs, blocks):
+            same, turned = (
+                bend * (along[a] * along[b] + across[a] * across[b]),
+                bend * (across[a] * along[b] - along[a] * across[b]),
+            )
+            block[0, 0] += same
+            block[1, 1] += same
+            block[0, 1] += turned + 0.5 * first_j
+            block[1, 0] -= turned + 0.5 * first_j
+        return blocks
+
+
+def _dilation(growth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The function 2 J + J^-2 - 3 of J - 1, and its derivatives, without cancellation near J = 1."""
+    ratio = 1.0 + growth
+    value = growth * growth * (3.0 + 2.0 * growth) / ratio**2
+    return value, 2.0 * growth * (3.0 + growth * (3.0 + growth)) / ratio**3, 6.0 / ratio**4
+
+
+@dataclass(frozen=True)
+class YeohEnergy(_SheetEnergy):
+    r"""Energy of an incompressible sheet in plane stress, a polynomial of the first invariant in three dimensions.
+
+    .. math:: W = A_0 \sum_{n \ge 1} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2}
+
+    O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990; with the first term alone a neo-Hookean sheet, ``c_1 = mu t / 2``.
+
+    Parameters
+    ----------
+    points, corners
+        As in `Energy`; triangles.
+    coefficients : ndarray of float, shape (n_cells, n)
+        Coefficients times the thickness over the reference stiffness [1], from the linear one on.
+    largest : float, optional
+        Largest I_1 - 3 of the test that they were fitted to [1]; beyond, they are extrapolated.
+    """
+
+    points: np.ndarray
+    corners: np.ndarray
+    coefficients: np.ndarray
+    largest: float = np.inf
+
+    def _moduli(self) -> tuple[np.ndarray, ...]:
+        return self.coefficients, np.array(self.largest)
+
+    def objection(self, displacements: np.ndarray) -> str:
+        """As of `Energy`: how many triangles are stretched beyond the data."""
+        if not np.isfinite(self.largest):
+            return ""
+        with np.errstate(invalid="ignore"):
+            moved = self._at_corners(displacements)
+            distortion, growth = self._invariants(moved - moved[:, :1])
+            excess = distortion + _dilation(growth)[0]
+        beyond = int((excess > self.largest).sum())
+        if not beyond:
+            return ""
+        return (
+            f"extrapolated: {beyond} of {len(excess)} triangles are stretched beyond the test data, to I1 - 3 = "
+            f"{excess.max():.3g} where the data end at {self.largest:.3g}"
+        )
+
+    def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
+        dilation, first_j, second_j = _dilation(growth)
+        excess = distortion + dilation  # I_1 - 3
+        value = first = second = np.zeros_like(excess)
+        for coefficient in self.coefficients.T[::-1]:  # Horner's rule of (I_1 - 3) times the polynomial
+            second = second * excess + 2.0 * first
+            first = first * excess + value
+            value = value * excess + coefficient
+        first, second, value = value + first * excess, 2.0 * first + second * excess, value * excess
+        mixed = second * first_j
+        return value, first, first * first_j, second, mixed, mixed * first_j + first * second_j
+
+
+HALVED = np.log(0.5)
+"""Logarithm of the least volume that `NeoHookeEnergy` has an equilibrium across the sheet for."""
+
+MOST_ITERATIONS = 60
+"""Steps of Newton's method, or halvings, for the volume of a cell: a handful are taken."""
+
+
+@dataclass(frozen=True)
+class NeoHookeEnergy(_SheetEnergy):
+    r"""Energy of a compressible neo-Hookean sheet in plane stress, that of CalculiX and Abaqus.
+
+    .. math:: W = A_0 \min_z \left[ \tfrac{\mu}{2} (J_3^{-2/3} (tr C + z^2) - 3) + \tfrac{K}{2} (J_3 - 1)^2 \right],
+        \quad J_3 = z J
+
+    The stretch z across the sheet has its equilibrium in each cell, to which a scalar Newton's method leads. With
+    ``v = ln J_3`` and ``y = ln J - 2 v / 3`` the bracket is
+
+    .. math:: \tfrac{\mu}{2} (e^{y} / J \, D + 2 e^y + e^{-2 y} - 3) + \tfrac{K}{2} (e^v - 1)^2.
+
+    The law lets a sheet that is pressed to less than half of its volume collapse across its thickness: it has no
+    energy there, as it has none inside out. An incompressible sheet, whose K is infinite, is a `YeohEnergy`.
+
+    Parameters
+    ----------
+    points, corners
+        As in `Energy`; triangles.
+    shear, bulk : ndarray of float, shape (n_cells,)
+        Shear modulus mu and bulk modulus K at small strain times the thickness over the reference stiffness [1].
+    """
+
+    points: np.ndarray
+    corners: np.ndarray
+    shear: np.ndarray
+    bulk: np.ndarray
+
+    def _moduli(self) -> tuple[np.ndarray, ...]:
+        return self.shear, self.bulk
+
+    def _volume(self, distortion: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Logarithm v of the volume, of D and of ln J; NaN where there is no equilibrium across the sheet."""
+        half, bulk = 0.5 * self.shear, self.bulk
+
+        def imbalance(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            """What falls with v and vanishes in equilibrium, and its derivative."""
+            y, grown = area - v / 1.5, np.exp(v)
+            pull = distortion * np.exp(-v / 1.5)
+            off = half * (pull + 4 * np.exp(-0.5 * y) * np.sinh(1.5 * y)) - 1.5 * bulk * grown * np.expm1(v)
+            slope = -half * (pull + 2 * np.exp(y) + 4 * np.exp(-2 * y)) / 1.5 - 1.5 * bulk * grown * (2 * grown - 1)
+            return off, slope
+
+        low, high = np.full_like(area, HALVED), np.full_like(area, 30.0)
+        v = np.clip(3 * self.shear * area / (2 * self.shear + 1.5 * bulk), 0.9 * HALVED, 1.0)
+        for _ in range(MOST_ITERATIONS):
+            off, slope = imbalance(v)
+            low, high = np.where(off > 0, v, low), np.where(off > 0, high, v)
+            step = -off / slope
+            inside = (v + step >= low) & (v + step <= high)
+            step = np.where(inside, step, 0.5 * (low + high) - v)
+            v = v + step
+            if not (np.abs(step) > 1e-15 + 1e-14 * np.abs(v)).any():
+                break
+        return np.where(imbalance(np.full_like(area, HALVED))[0] > 0, v, np.nan)
+
+    def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
+        area = np.log1p(growth)
+        v = self._volume(distortion, area)
+        y, grown, half = area - v / 1.5, np.exp(v), 0.5 * self.shear
+        pull = half * np.exp(-v / 1.5)
+        value = pull * distortion + half * _dilation(np.expm1(y))[0] + 0.5 * self.bulk * np.expm1(v) ** 2
+        # By ln J, y eliminated; in equilibrium what changes with the volume has no part in the first derivative.
+        first = half * 4 * np.exp(-0.5 * y) * np.sinh(1.5 * y)
+        bend = half * (2 * np.exp(y) + 4 * np.exp(-2 * y))
+        press = pull * distortion + 2.25 * self.bulk * grown * (2 * grown - 1)
+        total, ratio = press + bend, 1.0 + growth
+        second = press * bend / total
+        return (
+            value,
+            pull,
+            first / ratio,
+            -(pull**2) / total,
+            -pull * bend / total / ratio,
+            (second - first) / ratio**2,
+        )

@@ -62,6 +62,9 @@ class Equilibrium:
         Largest share of the load at which there is a good equilibrium [1]; 1 where it converged.
     last : ndarray of float, shape (n_points, 2), or None
         Displacements at that share, where it is below 1.
+    limit_share : float
+        Share of the load at which the path from rest turns back, unstable from there on [1]; NaN where no such place
+        is known.
     """
 
     displacements: np.ndarray
@@ -74,6 +77,7 @@ class Equilibrium:
     unstable_share: float = np.nan
     load_share: float = 1.0
     last: np.ndarray | None = None
+    limit_share: float = np.nan
 
 
 class Iterate(NamedTuple):

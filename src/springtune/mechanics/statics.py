@@ -15,6 +15,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..linalg.factors import Factor, SingularError
 from ..problem.status import Status
+from .continuation import limit_load
 from .expansion import Expansion
 from .follower import FollowerPressure
 from .network import Network
@@ -239,10 +240,17 @@ class StaticProblem:
         status : Status
             Solved, unstable or not converged.
         message : str
-            Why it is not solved; empty where it is.
+            Why it is not solved; where it is, what its energies have against it, mostly nothing.
         negative_pivots : int or float
             Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
         """
+        if found.limit_share < 1:
+            share = f"{100 * found.limit_share:.3g} %"
+            return (
+                Status.UNSTABLE,
+                f"limit point: the path from rest turns back, unstable, at {share} of the load",
+                np.nan,
+            )
         if not found.converged:
             return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
         assert found.factor is not None  # of what converged
@@ -262,7 +270,8 @@ class StaticProblem:
         if found.unstable_share < 1:
             share = f"{100 * found.unstable_share:.3g} %"
             return Status.UNSTABLE, f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
-        return Status.SOLVED, "", pivots
+        objections = (energy.objection(found.displacements) for energy in self.network.energies)
+        return Status.SOLVED, "; ".join(filter(None, objections)), pivots
 
     def nonlinear(self, s: float) -> Equilibrium:
         """Equilibrium of the network with its springs' full length law.
@@ -401,6 +410,9 @@ class StaticProblem:
                 step *= 1.5
             elif step <= SMALLEST_STEP and not found.converged:
                 reason = f"{found.reason} beyond {100 * done:.3g} % of the load"
-                return replace(found, iterations=iterations, reason=reason, load_share=done, last=last)
+                limit = np.nan if last_step is None else limit_load(self, done * s, last, before) / s
+                return replace(
+                    found, iterations=iterations, reason=reason, load_share=done, last=last, limit_share=limit
+                )
             else:
                 step *= 0.5

@@ -12,7 +12,10 @@ from ..problem.geometry import Beam
 from ..problem.materials import Material
 from .messages import Problems
 
-FURTHER_REFERENCES = ("neo-hooke-plane-stress", "neo-hooke-plane-strain")
+FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
+"""Reference of sheets at finite strain: networks of nonlinear kinematics are compared with it where a study has it."""
+
+FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, "neo-hooke-plane-strain")
 """Kinds of reference besides the small-strain one."""
 
 

@@ -9,6 +9,7 @@ from ...output.dataset import NO_NODE, STATUS
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
 from ...problem.loads import LOADS
 from ...problem.parameters import with_unit
+from ...study.model import FINITE_STRAIN_REFERENCE
 from ..base import distinct
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
@@ -593,7 +594,7 @@ def _round(value):
 # -- the pressed block -------------------------------------------------------------------------------------------------
 
 ENERGIES = ("area", "delingette")
-BLOCK_SHOWN = ("uniform", "paper", "lattice", "patch", "area", "delingette")
+BLOCK_SHOWN = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
 """Definitions whose pressed faces are shown before others."""
 
 MOST_FACES = 5
@@ -651,7 +652,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_block(tree, beam="200x40", mesh_type="structured", mesh_size=1e-3, material="rubber")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['One stiffness for all loads? (small strain)', 'The pressed face']
+    ['One stiffness for all loads? (small strain)', 'The pressed face (finite strain)']
     >>> axes[0].figure.get_suptitle()
     '200x40 mm, structured 1 mm, rubber'
     """
@@ -769,38 +770,49 @@ def _marks(panel, curves, root):
 
 
 def _profile(panel, block, root, load):
-    """The pressed face: networks with their full length law over references; returned as by `_stiffness`."""
+    """The pressed face, like with like; returned as by `_stiffness`.
+
+    Networks with their full length law over the reference at finite strain, where there are both; else those of linear
+    kinematics over the one of small strain.
+    """
     x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
-    panel.set_title("The pressed face", pad=13)
-    for number, kind in enumerate(block.reference.values):
-        profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
-        if np.isfinite(profile).any():
-            shade = ("0.62", "0.8", "0.72")[number % 3]
-            name = f"reference, {str(kind).replace('-', ' ')}"
-            panel.plot(x, profile, color=shade, linewidth=3, label=name)
-            ends.append((x[-1], profile[-1], name, "0.35"))
-            highest.append(profile)
+    of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])
+    finite = FINITE_STRAIN_REFERENCE in block.reference.values and bool(
+        of_networks.sel(kinematics=of_networks.kinematics != "linear").any()
+        and pressed.reference_face_profile.sel(reference=FINITE_STRAIN_REFERENCE).notnull().any()
+    )
+    kind = FINITE_STRAIN_REFERENCE if finite else str(block.reference.values[0])
+    panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)", pad=13)
+    profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
+    if np.isfinite(profile).any():
+        name = f"reference, {kind.replace('-', ' ')}"
+        panel.plot(x, profile, color="0.72", linewidth=3, label=name)
+        ends.append((x[-1], profile[-1], name, "0.35"))
+        highest.append(profile)
     order = [name for name in BLOCK_SHOWN if name in block.definition.values]
     order += [name for name in block.definition.values if name not in order]
     asked = [name for name in order if (root.status.sel(load=load, definition=name) != 0).any()]
     shown = []
     for definition in asked:
         profiles = pressed.face_profile.sel(definition=definition)
-        usual = ("linear", "nonlinear") if definition in ENERGIES else ("nonlinear", "linear")
+        usual = ("nonlinear",) if finite else ("linear", "nonlinear")
         solved = [one for one in usual if one in profiles.kinematics.values
                   and np.isfinite(profiles.sel(kinematics=one).values).any()]  # fmt: skip
         if solved:
             shown.append((definition, solved[0], -1e3 * profiles.sel(kinematics=solved[0]).values))
         else:
-            flags = root.status.sel(load=load, definition=definition).values
-            words = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])]
+            flags = root.status.sel(load=load, definition=definition)
+            flags = flags.where(flags.kinematics.isin(usual), 0).values
+            words = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])] or ["not asked for"]
             said.append(f"{definition}: {', '.join(words)}")
     for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
         look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
         panel.plot(x, profile, label=name, **look)
         ends.append((x[-1], profile[-1], name, look["color"]))
         highest.append(profile)
+    if not finite and any(kinematics != "linear" for _, kinematics, _ in shown[:MOST_FACES]):
+        said.append("the reference is of small strain, not all networks are: add further_references")
     if len(shown) > MOST_FACES:
         said.append(f"in the dataset, too: {', '.join(name for name, _, _ in shown[MOST_FACES:])}")
     room = panel.get_window_extent().width / panel.figure.dpi

@@ -6,6 +6,7 @@ from ...output.dataset import STATUS
 from ...output.tables import cells_with_values
 from ...problem.loads import LOADS
 from ...problem.parameters import SWEPT
+from ...study.model import FINITE_STRAIN_REFERENCE
 from .outputs import TABLE, stem
 
 ROW = ("beam", "mesh_size")
@@ -25,7 +26,8 @@ def tables(tree):
         of what is ``swept``; the others with ``title`` and ``note``.
     """
     root = tree.to_dataset()
-    found = [_table(root.sel(selection), selection) for selection in _selections(root)]
+    finite = _finite(tree)
+    found = [_table(root.sel(selection), selection, finite) for selection in _selections(root)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
     groups = {"finite_strain": _finite_strain, "block": _block}
     return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree]
@@ -37,11 +39,22 @@ def _selections(root):
     return [dict(zip(TABLE, map(str, cell))) for cell in requested.cell.values[requested.values]]
 
 
-def _table(cells, selection):
+def _finite(tree):
+    """References at finite strain, and errors of networks of nonlinear kinematics against them; None without any."""
+    found = tree["finite_strain"].to_dataset() if "finite_strain" in tree else None
+    if found is None or FINITE_STRAIN_REFERENCE not in found.reference.values:
+        return None
+    found = found.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
+    names = ("reference_displacement", "deformation_error", "reference_message")
+    return found[list(names)].rename({name: f"finite_{name}" for name in names})
+
+
+def _table(cells, selection, finite=None):
     numbers = np.unique(cells.paper_table.values[np.isfinite(cells.paper_table.values)])
     number = int(numbers[0]) if len(numbers) == 1 else None
     # Plain arrays: selecting each cell of a dataset takes a thousand times as long.
     swept = [name for name in SWEPT if name in cells.status.dims]
+    cells = cells if finite is None else cells.merge(finite.sel(selection), join="exact", compat="override")
     order = (*ROW, *swept, "kinematics", "definition")
     arrays = {name: array.transpose(..., *(one for one in order if one in array.dims)) for name, array in cells.items()}
     values = {name: (array.dims, array.values) for name, array in arrays.items()}
@@ -86,8 +99,15 @@ def _row(values, labels, place, swept, sign):
         "reference_mm": 1e3 * float(value("reference_displacement")),
         "reference_message": str(value("reference_message")),
     }
+    against = {}  # finite strain, by kinematics
     for k, kinematics in enumerate(labels["kinematics"]):
         row[f"reference_applies_{kinematics}"] = "yes" if value("reference_applies", kinematics=k) == 1 else "no"
+        if kinematics != "linear" and "finite_reference_displacement" in values:
+            reference = 1e3 * float(value("finite_reference_displacement"))
+            against[kinematics] = row[f"reference_{kinematics}_mm"] = reference
+            row[f"reference_applies_{kinematics}"] = "yes" if np.isfinite(reference) else "no"
+            if np.isfinite(row["reference_mm"]):  # else it says why there is none
+                row["reference_message"] = str(value("finite_reference_message"))
         for d, definition in enumerate(labels["definition"]):
             one = {"kinematics": k, "definition": d}
             status = STATUS[int(value("status", **one))]
@@ -96,7 +116,8 @@ def _row(values, labels, place, swept, sign):
             name = f"{definition}_{kinematics}"
             row[f"{name}_stiffness_N_per_m"] = float(value("stiffness", **one))
             row[f"{name}_mm"] = 1e3 * float(value("displacement", **one))
-            row[f"{name}_error_percent"] = 100 * float(value("deformation_error", **one))
+            error = "finite_deformation_error" if kinematics in against else "deformation_error"
+            row[f"{name}_error_percent"] = 100 * float(value(error, **one))
             row[f"{name}_status"] = status
             row[f"{name}_message"] = str(value("message", **one))
     row["remark"] = str(value("paper_remark"))
@@ -144,9 +165,11 @@ def _block(block, root):
     swept = [name for name in SWEPT if name in block.face_displacement.dims]
     for place in cells_with_values(block.face_displacement, (*dimensions, *swept)):
         cell = block.sel(place)
-        reference = cell.isel(reference=0)
+        finite = place["kinematics"] != "linear" and FINITE_STRAIN_REFERENCE in cell.reference.values
+        reference = cell.sel(reference=FINITE_STRAIN_REFERENCE) if finite else cell.isel(reference=0)
         rows.append(
             {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
+            | {"reference": str(reference.reference.values)}
             | _swept(place)
             | {
                 "mesh_size_mm": 1e3 * place["mesh_size"],
@@ -156,7 +179,8 @@ def _block(block, root):
             }
         )
     note = (
-        "Displacement of the middle of the pressed face along the load, against small strain; other references are in "
-        "the dataset."
+        "Displacement of the middle of the pressed face along the load. Networks of nonlinear kinematics are compared "
+        "with the reference at finite strain in plane stress where the study has it, linear ones with that of small "
+        "strain; all pairs are in the dataset."
     )
     return {"stem": "block", "title": "The pressed face", "note": note, "rows": rows}

@@ -440,8 +440,8 @@ def plot_stability_strains(data, ax=None):
         panel.set_xticks(np.arange(len(strains)) + 0.5, [f"{100 * x:g}".replace("-", "−") for x in strains])
         panel.set_yticks(np.arange(len(names)) + 0.5, names)
     axes[-1].set_xlabel("Strain of a linear sheet under the load [%]")
-    kinds = {1: "solved", 4: "unstable: negative pivots, f: flutter, path: on the way",
-             3: "no equilibrium: share of the load reached"}  # fmt: skip
+    kinds = {1: "solved", 4: "unstable: negative pivots; 0.5: limit point there; f: flutter; path: on the way",
+             3: "none found: share reached"}  # fmt: skip
     kinds |= {flag: STATUS[flag].replace("_", " ") for flag in sorted(seen) if flag not in kinds}
     keys = [Patch(facecolor=STATUS_COLOURS[flag], edgecolor="0.3", linewidth=0.4, label=text)
             for flag, text in kinds.items() if flag in seen]  # fmt: skip

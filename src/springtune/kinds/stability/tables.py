@@ -151,7 +151,8 @@ def _strains(data):
     lines = [
         "### Large loads",
         "",
-        "Status, in brackets the share of the load that is reached, or the negative pivots, or flutter.",
+        "Status, in brackets the negative pivots, or flutter, or the share of the load that is reached: beyond it the "
+        "path turns back at a limit point where it is unstable, else Newton's method found nothing.",
         "",
     ]
     for load in data.strain_load.values:

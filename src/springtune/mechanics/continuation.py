@@ -1,0 +1,156 @@
+"""Points of an equilibrium path, one after the other by arc length."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..linalg.factors import Factor, SingularError
+from .network import Network
+from .newton import TOLERANCE
+
+BEYOND = 0.25
+"""Increment beyond the last load step, over that step."""
+
+MOST_BEYOND = 24
+"""Points of a path beyond the last load step that are looked at for a limit point."""
+
+
+class Continued(Protocol):
+    """What has a path: a network under a load, as `springtune.mechanics.statics.StaticProblem`."""
+
+    network: Network
+    load_norm: float
+
+    def load_at(self, displacements: np.ndarray) -> np.ndarray:
+        """Load pattern at displacements."""
+
+    def rate(self, displacements: np.ndarray) -> np.ndarray:
+        """As `load_at`, with what prescribed displacements pull as they grow."""
+
+    def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
+        """Displacements with those that are prescribed at a load in their places."""
+
+    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
+        """Factor of the tangent of resistance less load."""
+
+    def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
+        """Negative eigenvalues of the tangent, and whether the equilibrium flutters."""
+
+
+class Point(NamedTuple):
+    """A point of a path: unknowns [m], load [m], negative pivots there and the Newton steps that it took."""
+
+    u: np.ndarray
+    load: float
+    negative_pivots: int
+    steps: int
+
+
+def next_point(
+    problem: Continued, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
+) -> tuple[Point | None, float]:
+    """Point after the last one, and the length of the increment, halved where Newton's method fails; None beyond.
+
+    Parameters
+    ----------
+    problem : Continued
+    s : float
+        A load, whose sign is the way the path begins [m].
+    last : Point
+    direction : ndarray of float, shape (unknowns,), or None
+        From the point before the last to it [m]; None at rest.
+    length : float
+        Of the increment, norm of the displacements of all unknowns [m].
+    shortest : float
+        Length down to which it is halved [m].
+
+    Returns
+    -------
+    found : Point or None
+    length : float
+        Of its increment [m].
+    """
+    displacements = problem.moved(last.load, problem.network.expand(last.u))
+    try:
+        tangent = problem.factorize_tangent(last.load, displacements).solve(problem.rate(displacements))
+        sign = np.sign(s) if direction is None else np.sign(direction @ tangent) or 1.0
+        while length > shortest:
+            rise = float(sign * length / np.linalg.norm(tangent))
+            found = _correct(problem, last, rise * tangent, rise, abs(s) * problem.load_norm)
+            if found is not None:
+                return found, length
+            length *= 0.5
+    except SingularError:  # a point exactly on a limit point
+        pass
+    return None, length
+
+
+def _correct(problem: Continued, last: Point, du: np.ndarray, ds: float, scale: float, most: int = 12) -> Point | None:
+    """Newton's method in the plane across an increment; None where it does not converge."""
+    network, across = problem.network, du
+    u, at = last.u + du, last.load + ds
+    for step in range(1, most + 1):
+        displacements = problem.moved(at, network.expand(u))
+        load = problem.load_at(displacements)
+        with np.errstate(over="ignore", invalid="ignore"):
+            missing = at * load - network.resistance(displacements)
+            size = np.linalg.norm(missing)
+        if not np.isfinite(size):
+            return None
+        factor = problem.factorize_tangent(at, displacements)
+        if size <= TOLERANCE * scale:
+            return Point(u, at, problem.stability(at, displacements, factor)[0], step)
+        back, forth = factor.solve(missing), factor.solve(problem.rate(displacements))
+        change = -(across @ back) / (across @ forth)
+        u, at = u + back + change * forth, at + change
+    return None
+
+
+def limit_load(problem: Continued, load: float, last: np.ndarray, before: np.ndarray) -> float:
+    """Load at which a path turns back shortly beyond an equilibrium: the largest that it carries.
+
+    Parameters
+    ----------
+    problem : Continued
+    load : float
+        Of the equilibrium, over the reference stiffness [m].
+    last, before : ndarray of float, shape (n_points, 2)
+        Displacements there, and in equilibrium shortly before [m].
+
+    Returns
+    -------
+    float
+        Largest load of the points that were found, where the tangent has one more negative eigenvalue behind it [m];
+        NaN where the path does not turn back within `MOST_BEYOND` increments.
+
+    Examples
+    --------
+    The arch of `springtune.mechanics.arc_length.follow`, from equilibria at 90 and 95 % of its largest load on:
+
+    >>> from springtune.mechanics.network import Network
+    >>> from springtune.mechanics.statics import StaticProblem
+    >>> from springtune.mesh.cells import Mesh
+    >>> mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.1]]), np.array([[0, 1, 2]]))
+    >>> held = np.array([[True, True], [True, True], [True, False]])
+    >>> network = Network(mesh, held, (mesh.edges != [0, 1]).any(axis=1).astype(float))
+    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
+    >>> before, last = (problem.nonlinear(-share * 3.83e-4).displacements for share in (0.9, 0.95))
+    >>> print(f"{limit_load(problem, -0.95 * 3.83e-4, last, before):.3g}")
+    -0.000383
+    """
+    network = problem.network
+    direction = network.reduce(last - before)
+    point = Point(network.reduce(last), load, 0, 0)
+    length = increment = BEYOND * float(np.linalg.norm(direction))  # near a limit point two paths may be near
+    try:
+        pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
+    except SingularError:
+        return np.nan
+    for _ in range(MOST_BEYOND):
+        found, length = next_point(problem, load, point, direction, length, 1e-6 * increment)
+        if found is None or network.inverted(problem.moved(found.load, network.expand(found.u))):
+            return np.nan
+        if abs(found.load) < abs(point.load) and found.negative_pivots > pivots:
+            return point.load
+        direction, point = found.u - point.u, found
+    return np.nan

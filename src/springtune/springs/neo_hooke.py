@@ -1,0 +1,55 @@
+r"""Neo-Hookean sheets: linear triangles of rubber, written as springs of zero rest length and areas.
+
+An incompressible sheet in plane stress, nu = 0.5, has the energy
+
+.. math:: W = \tfrac{\mu t}{2} A_0 (tr C + J^{-2} - 3), \quad \mu = E / 3,
+
+on a triangle whose area was A_0 and is J A_0. There ``tr C A_0`` is half the sum over its sides of the opposite
+angle's cotangent times the length squared, so that the energy is that of springs of zero rest length, from each
+triangle ``mu t cot / 2``, and of its area, ``mu t A_0 / 2 (A_0 / A)^2``: exactly linear triangles, on any mesh and at
+any strain. Springs opposite obtuse angles push; no triangle can turn inside out.
+
+Below nu = 0.5 it is the law of CalculiX and Abaqus,
+``mu/2 (J_3^(-2/3) I_1 - 3) + K/2 (J_3 - 1)^2`` per volume with mu = E / (2 (1 + nu)) and K = E / (3 (1 - 2 nu)), whose
+stretch across the sheet is eliminated triangle by triangle: a function of tr C and J as well. With nu towards 0.5 it
+becomes the former. It is that of the references at finite strain (`springtune.reference.finite_strain`) for any nu;
+derived here, checked against linear triangles of the deformation gradient. At small strain both are linear triangles,
+as `delingette` is.
+"""
+
+import numpy as np
+
+from ..mesh import Mesh, corner_angles
+from ..problem.materials import Material
+from .base import Springs, definition, triangles_only, zero
+
+
+@definition("neo-hooke", order=240, cells=(3,))
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+    """Springs of zero rest length and areas: equal to linear triangles of neo-Hookean rubber, any nu, any strain.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    """
+    from ..mechanics.energies import NeoHookeEnergy, YeohEnergy  # here: see `springtune.springs`
+
+    triangles_only(mesh)
+    nu = material.poisson_ratio
+    ones = np.ones(len(mesh.triangles))
+    shear = 1 / (2 * (1 + nu))  # over E
+    energy: NeoHookeEnergy | YeohEnergy
+    if nu >= 0.5:
+        energy = YeohEnergy(mesh.points, mesh.triangles, 0.5 * shear * ones[:, None])
+    else:
+        energy = NeoHookeEnergy(mesh.points, mesh.triangles, shear * ones, ones / (3 * (1 - 2 * nu)))
+    return Springs(
+        material.young_modulus * thickness,
+        zero(mesh),
+        (energy,),
+        linear_springs=zero_length(mesh, shear),
+    )
+
+
+def zero_length(mesh: Mesh, shear: float) -> np.ndarray:
+    """Stiffnesses of the springs of zero rest length over a shear modulus's unit, shape (n_edges,)."""
+    cotangents = 1 / np.tan(corner_angles(mesh.points, mesh.triangles))
+    return mesh.sum_to_edges({3: 0.5 * shear * cotangents})
