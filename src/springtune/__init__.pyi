@@ -26,6 +26,7 @@ from .kinds.stability.figures import plot_stability_meshes as plot_stability_mes
 from .kinds.stability.figures import plot_stability_rest as plot_stability_rest
 from .kinds.stability.figures import plot_stability_strains as plot_stability_strains
 from .mesh import MESH_TYPES as MESH_TYPES
+from .mesh import GroupedMesh as GroupedMesh
 from .mesh import Mesh as Mesh
 from .mesh import MeshError as MeshError
 from .mesh import mesh_type as mesh_type
@@ -41,10 +42,19 @@ from .prediction import predict as predict
 from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS
 from .problem.materials import Material as Material
+from .problem.shapes import Hole as Hole
+from .problem.shapes import LoadCase as LoadCase
+from .problem.shapes import Pressure as Pressure
+from .problem.shapes import Quantity as Quantity
+from .problem.shapes import Segment as Segment
+from .problem.shapes import Shape as Shape
+from .problem.shapes import Support as Support
+from .problem.shapes import Traction as Traction
 from .problem.status import Status as Status
 from .scene.curve import Curve as Curve
 from .scene.curve import sensitivity as sensitivity
 from .scene.meshes import make_mesh as make_mesh
+from .scene.meshes import mesh_shape as mesh_shape
 from .scene.meshes import read_mesh as read_mesh
 from .scene.moduli import Moduli as Moduli
 from .scene.moduli import moduli as moduli

@@ -18,6 +18,8 @@ Examples
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh
 from .free import free
+from .groups import GroupedMesh
+from .outlines import mesh_shape
 from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
 from .squares import alternating, braced, right
 from .types import MESH_TYPES, MeshType, mesh_type
@@ -25,6 +27,7 @@ from .types import MESH_TYPES, MeshType, mesh_type
 __all__ = [
     "MESH_TYPES",
     "ROW_HEIGHT",
+    "GroupedMesh",
     "Mesh",
     "MeshError",
     "MeshType",
@@ -34,6 +37,7 @@ __all__ = [
     "free",
     "isosceles",
     "lattice",
+    "mesh_shape",
     "mesh_type",
     "quality",
     "read_beam_mesh",

@@ -41,6 +41,29 @@ def check_box(length: float, height: float, size: float) -> None:
         raise MeshError(f"size: {size!r} makes too many particles of {length:g} x {height:g} m; give at least {least}")
 
 
+def too_many(count: float, size: float, side: float, body: str) -> str:
+    """Why no mesh of so many particles is made, with the remedy; empty where one is.
+
+    Parameters
+    ----------
+    count : float
+        Particles, about.
+    size, side : float
+        Mesh size and smaller extent of the body [m].
+    body : str
+        What it is, such as ``"beam '200x40'"``.
+
+    Returns
+    -------
+    str
+    """
+    if count <= MOST_MESHED:
+        return ""
+    least = 1.1 * size * math.sqrt(count / MOST_MESHED)
+    remedy = f"at least {1e3 * least:.2g} mm" if least < side else f"a shorter {body.partition(' ')[0]}"
+    return f"makes some {count:.2g} particles of {body}, more than can be meshed ({MOST_MESHED:,}); give {remedy}"
+
+
 def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
     """Whole numbers of cells along a box and of rows over its height that come nearest to a size.
 
@@ -150,12 +173,7 @@ class MeshType(Declared):
         side = min(length, height)
         if size > side:
             return f"is larger than {box}; give at most its smaller side"
-        count = self.particles(length, height, size)
-        if count <= MOST_MESHED:
-            return ""
-        least = 1.1 * size * math.sqrt(count / MOST_MESHED)
-        remedy = f"at least {1e3 * least:.2g} mm" if least < side else "a shorter beam"
-        return f"makes some {count:.2g} particles of {box}, more than can be meshed ({MOST_MESHED:,}); give {remedy}"
+        return too_many(self.particles(length, height, size), size, side, box)
 
 
 MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type")

@@ -13,110 +13,350 @@ r"""Shapes: bodies of any outline with named groups, and what is done to them.
 Nothing here knows a mesh: `springtune.mesh.groups` has the groups of one.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-Point = tuple[float, float]
-"""Coordinates [m]."""
+from ..registry import NAME, NAME_RULE
+from .geometry import beam_label
+from .outlines import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
+from .quantities import nearest, positive, quantity
+
+Place = tuple[float | str, float | str]
+"""Coordinates [m], or texts with their unit."""
+
+ON_SIDE = 1e-6
+"""Distance from a side at which a named point is put on it, over the extent of the shape: coordinates are rounded."""
+
+
+def _vector(value: Any, kind: str, name: str, example: str) -> tuple[float, float]:
+    """Components of a vector of a kind of quantity."""
+    if isinstance(value, str) or not (hasattr(value, "__len__") and len(value) == 2):
+        raise ValueError(f"{name}: {value!r} is not x and y; give two such as {example}")
+    x, y = value
+    return quantity(x, kind, f"{name}, x"), quantity(y, kind, f"{name}, y")
+
+
+def _place(value: Any, name: str) -> Point:
+    """Coordinates of a point."""
+    return _vector(value, "length", name, "('20 mm', '5 mm')")
+
+
+def _named(value: object, what: str, *, empty: bool = False) -> None:
+    """Refuse what cannot name something."""
+    if not (isinstance(value, str) and (NAME.fullmatch(value) or (empty and not value))):
+        raise ValueError(f"{what}: {value!r} cannot be a name; {NAME_RULE}")
+
+
+def _all_of(values: Any, wanted: type, name: str) -> tuple[Any, ...]:
+    """Tuple of values of a type."""
+    try:
+        found = tuple(values)
+    except TypeError:
+        found = (values,)
+    for one in found:
+        if not isinstance(one, wanted):
+            raise ValueError(f"{name}: {one!r} is not a {wanted.__name__}; give springtune.{wanted.__name__}(...)")
+    return found
 
 
 @dataclass(frozen=True)
 class Segment:
     """A side of an outline, from its corner to that of the next one.
 
-    Attributes
+    Parameters
     ----------
-    start : tuple of float
-        Its corner [m].
-    centre : tuple of float or None
+    start : tuple of float or str
+        Its corner [m], or texts with their unit.
+    centre : tuple of float or str, optional
         Of the arc that it is: of a circle, or of an ellipse with its axes along x and y where its ends are not equally
         far from it; the way of less than half a turn. Straight without.
-    group : str
+    group : str, optional
         Name of the group that it belongs to; none where it is empty.
+
+    Raises
+    ------
+    ValueError
+        If coordinates are no lengths, or the group's name cannot be one.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> st.Segment(("20 mm", 0), group="lower")
+    Segment(start=(0.02, 0.0), centre=None, group='lower')
     """
 
     start: Point
     centre: Point | None = None
     group: str = ""
 
+    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
+
+        def __init__(self, start: Place, centre: Place | None = None, group: str = "") -> None: ...
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", _place(self.start, "start of a segment"))
+        if self.centre is not None:
+            object.__setattr__(self, "centre", _place(self.centre, "centre of a segment"))
+        _named(self.group, "group of a segment", empty=True)
+
+
+def _round(segments: Sequence[Segment], what: str) -> tuple[OutlineSide, ...]:
+    """Sides of a round of segments, checked by themselves."""
+    least = 2 if any(segment.centre for segment in segments) else 3
+    if len(segments) < least:
+        raise ValueError(f"{what}: has {len(segments)} sides, and a round has 3 or more, with arcs 2; add sides")
+    sides = []
+    for number, segment in enumerate(segments):
+        end = segments[(number + 1) % len(segments)].start
+        try:
+            sides.append(OutlineSide(segment.start, end, segment.centre, segment.group))
+        except ValueError as error:
+            raise ValueError(f"{what}, side {number + 1}: {error}") from None
+    return tuple(sides)
+
 
 @dataclass(frozen=True)
 class Hole:
     """A hole, or what fills it.
 
-    Attributes
+    Parameters
     ----------
     outline : tuple of Segment
         A closed round, in either sense.
-    part : str
+    part : str, optional
         Part of the body that fills it, of a material of its own; nothing does where it is empty.
+
+    Raises
+    ------
+    ValueError
+        If the round is none, the part's name cannot be one, or sides of what is filled have a group: they are inside
+        the body.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> hole = st.Hole.circle(("50 mm", "20 mm"), "8 mm")
+    >>> len(hole.outline), hole.outline[0].group
+    (4, 'hole')
     """
 
     outline: tuple[Segment, ...]
     part: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outline", _all_of(self.outline, Segment, "outline of a hole"))
+        _named(self.part, "part of a hole", empty=True)
+        what = f"part {self.part!r}" if self.part else "hole"
+        _round(self.outline, what)
+        groups = [segment.group for segment in self.outline if segment.group]
+        if self.part and groups:
+            raise ValueError(
+                f"{what}: a side has the group {groups[0]!r}, but is inside the body, and groups are of its outline; "
+                "leave the group out"
+            )
+
+    @classmethod
+    def circle(cls, centre: Place, radius: float | str, group: str | None = None, part: str = "") -> "Hole":
+        """A circle, of four arcs.
+
+        Parameters
+        ----------
+        centre : tuple of float or str
+            [m], or texts with their unit.
+        radius : float or str
+            [m]
+        group : str, optional
+            Of its sides; ``"hole"`` without, none where a part fills it.
+        part : str, optional
+            As of `Hole`.
+
+        Returns
+        -------
+        Hole
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Hole.circle((0, 0), "5 mm", part="core").outline[1]
+        Segment(start=(0.0, 0.005), centre=(0.0, 0.0), group='')
+        """
+        return cls.ellipse(centre, radius, radius, group, part)
+
+    @classmethod
+    def ellipse(
+        cls,
+        centre: Place,
+        across: float | str,
+        along: float | str,
+        group: str | None = None,
+        part: str = "",
+    ) -> "Hole":
+        """An ellipse, of four arcs.
+
+        Parameters
+        ----------
+        centre : tuple of float or str
+            [m], or texts with their unit.
+        across, along : float or str
+            Semi-axes along x and y [m].
+        group, part : str, optional
+            As of `circle`.
+
+        Returns
+        -------
+        Hole
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> slot = st.Hole.ellipse(("50 mm", "20 mm"), "10 mm", "2 mm", group="slot")
+        >>> [round(segment.start[0], 6) for segment in slot.outline]
+        [0.06, 0.05, 0.04, 0.05]
+        """
+        x, y = _place(centre, "centre")
+        a, b = positive(across, "length", "radius"), positive(along, "length", "radius")
+        group = ("" if part else "hole") if group is None else group
+        corners = [(x + a, y), (x, y + b), (x - a, y), (x, y - b)]
+        return cls(tuple(Segment(corner, (x, y), group) for corner in corners), part)
 
 
 @dataclass(frozen=True)
 class Support:
     """What a group's displacement is.
 
-    Attributes
+    Parameters
     ----------
     group : str
         Sides or a point.
-    x, y : float or None
-        Prescribed displacement [m], zero where it is held; free without.
+    x, y : float or str, optional
+        Prescribed displacement [m], or a text with its unit; zero where it is held; free without.
+
+    Raises
+    ------
+    ValueError
+        If it holds nothing, or a displacement is no length.
+
+    Examples
+    --------
+    Held along x, free along y:
+
+    >>> import springtune as st
+    >>> st.Support("left", x=0)
+    Support(group='left', x=0.0, y=None)
     """
 
     group: str
     x: float | None = None
     y: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(self, group: str, x: float | str | None = None, y: float | str | None = None) -> None: ...
+
+    def __post_init__(self) -> None:
+        _named(self.group, "group of a support")
+        for axis in ("x", "y"):
+            if getattr(self, axis) is not None:
+                value = quantity(getattr(self, axis), "length", f"support on {self.group!r}, {axis}")
+                object.__setattr__(self, axis, value)
+        if self.x is None and self.y is None:
+            raise ValueError(f"support on {self.group!r}: holds neither x nor y; give x=0, y=0 or both")
+
 
 @dataclass(frozen=True)
 class Traction:
     """A force that is spread evenly over a group, by length.
 
-    Attributes
+    Parameters
     ----------
     group : str
         Sides, or a point.
-    force : tuple of float
-        Total force along x and y [N].
+    force : tuple of float or str
+        Total force along x and y [N], or texts with their unit.
+
+    Raises
+    ------
+    ValueError
+        If it is no force.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> st.Traction("right", ("4 kN", 0))
+    Traction(group='right', force=(4000.0, 0.0))
     """
 
     group: str
     force: tuple[float, float]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, group: str, force: tuple[float | str, float | str]) -> None: ...
+
+    def __post_init__(self) -> None:
+        _named(self.group, "group of a traction")
+        force = _vector(self.force, "force", f"traction on {self.group!r}, force", "('4 kN', 0)")
+        object.__setattr__(self, "force", force)
 
 
 @dataclass(frozen=True)
 class Pressure:
     """A pressure on a group, positive towards the body.
 
-    Attributes
+    Parameters
     ----------
     group : str
         Sides.
-    pressure : float
-        [Pa]
-    follower : bool
+    pressure : float or str
+        [Pa], or a text with its unit.
+    follower : bool, optional
         Whether it turns and grows with the sides, in nonlinear kinematics.
+
+    Raises
+    ------
+    ValueError
+        If it is no pressure.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> st.Pressure("hole", "10 MPa")
+    Pressure(group='hole', pressure=10000000.0, follower=False)
     """
 
     group: str
     pressure: float
     follower: bool = False
 
+    if TYPE_CHECKING:
 
-QUANTITY_KINDS = ("displacement", "reaction", "stress", "area", "energy")
-"""What a quantity of interest may be of."""
+        def __init__(self, group: str, pressure: float | str, follower: bool = False) -> None: ...
+
+    def __post_init__(self) -> None:
+        _named(self.group, "group of a pressure")
+        object.__setattr__(self, "pressure", quantity(self.pressure, "stress", f"pressure on {self.group!r}"))
+        if not isinstance(self.follower, bool):
+            raise ValueError(f"pressure on {self.group!r}, follower: {self.follower!r}; give True or False")
+
+
+COMPONENTS = {
+    "displacement": ("x", "y"),
+    "reaction": ("x", "y"),
+    "stress": ("xx", "yy", "xy"),
+    "area": (),
+    "energy": (),
+}
+"""What a quantity of interest may be of, and its components."""
 
 
 @dataclass(frozen=True)
 class Quantity:
     """A quantity of interest.
 
-    Attributes
+    Parameters
     ----------
     name : str
         Label in the dataset.
@@ -124,14 +364,25 @@ class Quantity:
         ``"displacement"``: of a point, or the mean one of sides, by length [m]; ``"reaction"``: force of the supports
         on a group [N]; ``"stress"``: at a point, recovered from cells [Pa]; ``"area"``: growth of the area of the body
         [m2]; ``"energy"``: strain energy [J].
-    of : str
+    of : str, optional
         Group, or point; empty for area and energy.
-    component : str
+    component : str, optional
         ``"x"`` or ``"y"``; of stress ``"xx"``, ``"yy"`` or ``"xy"``; empty for area and energy.
-    expected : float or None
-        Value that others give, in SI units.
-    source : str
+    expected : float or str, optional
+        Value that others give, in SI units, or a text with its unit.
+    source : str, optional
         Who gives it.
+
+    Raises
+    ------
+    ValueError
+        If the kind is none, or it lacks what its kind needs or has what it does not.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> st.Quantity("tip", "displacement", of="right", component="y", expected="23.96 mm").expected
+    0.02396
     """
 
     name: str
@@ -141,20 +392,70 @@ class Quantity:
     expected: float | None = None
     source: str = ""
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            name: str,
+            kind: str,
+            of: str = "",
+            component: str = "",
+            expected: float | str | None = None,
+            source: str = "",
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        _named(self.name, "quantity")
+        what = f"quantity {self.name!r}"
+        if self.kind not in COMPONENTS:
+            raise ValueError(f"{what}: unknown kind {self.kind!r}; {nearest(str(self.kind), COMPONENTS)}")
+        components: tuple[str, ...] = COMPONENTS[self.kind]
+        if components:
+            _named(self.of, f"{what}, of")
+            if self.component not in components:
+                raise ValueError(f"{what}: component {self.component!r}; give one of {', '.join(components)}")
+        elif self.of or self.component:
+            raise ValueError(f"{what}: {self.kind} is of the entire body; leave 'of' and 'component' out")
+        if self.expected is not None:
+            kind = {"displacement": "length", "reaction": "force", "stress": "stress"}.get(self.kind)
+            if kind is None and isinstance(self.expected, str):
+                raise ValueError(f"{what}, expected: {self.expected!r}; give a number in SI units")
+            object.__setattr__(self, "expected", quantity(self.expected, kind or "length", f"{what}, expected"))
+        if not isinstance(self.source, str):
+            raise ValueError(f"{what}, source: {self.source!r} is not a text; give one")
+
 
 @dataclass(frozen=True)
 class LoadCase:
     """What is done to a shape, and what is asked of it; the first quantity stands for all where one is wanted.
 
-    Attributes
+    Parameters
     ----------
     name : str
     supports : tuple of Support
-    tractions : tuple of Traction
-    pressures : tuple of Pressure
-    gravity : tuple of float
+    tractions : tuple of Traction, optional
+    pressures : tuple of Pressure, optional
+    gravity : tuple of float, optional
         Acceleration along x and y [m/s2]; needs densities.
-    quantities : tuple of Quantity
+    quantities : tuple of Quantity, optional
+
+    Raises
+    ------
+    ValueError
+        If there are no supports or nothing is done, a direction of a group is held twice, or two quantities have one
+        name.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> pull = st.LoadCase(
+    ...     "pull",
+    ...     supports=(st.Support("left", x=0), st.Support("corner", y=0)),
+    ...     tractions=(st.Traction("right", ("4 kN", 0)),),
+    ...     quantities=(st.Quantity("elongation", "displacement", "right", "x"),),
+    ... )
+    >>> pull.quantities[0].of
+    'right'
     """
 
     name: str
@@ -164,26 +465,135 @@ class LoadCase:
     gravity: tuple[float, float] = (0.0, 0.0)
     quantities: tuple[Quantity, ...] = ()
 
+    def __post_init__(self) -> None:
+        _named(self.name, "load")
+        what = f"load {self.name!r}"
+        for name, kind in (
+            ("supports", Support),
+            ("tractions", Traction),
+            ("pressures", Pressure),
+            ("quantities", Quantity),
+        ):
+            object.__setattr__(self, name, _all_of(getattr(self, name), kind, f"{what}, {name}"))
+        try:
+            gravity = tuple(float(one) for one in self.gravity)
+        except (TypeError, ValueError):
+            gravity = ()
+        if len(gravity) != 2 or not all(map(math.isfinite, gravity)):
+            raise ValueError(f"{what}, gravity: {self.gravity!r}; give x and y such as (0, -9.81), in m/s2")
+        object.__setattr__(self, "gravity", gravity)
+        if not self.supports:
+            raise ValueError(f"{what}: has no supports, so nothing keeps the body in its place; add some")
+        for axis in ("x", "y"):
+            held = [support.group for support in self.supports if getattr(support, axis) is not None]
+            twice = [group for group in held if held.count(group) > 1]
+            if twice:
+                raise ValueError(f"{what}: supports hold {twice[0]!r} along {axis} twice; remove one of them")
+        moved = any(support.x or support.y for support in self.supports)
+        if not (self.tractions or self.pressures or any(gravity) or moved):
+            raise ValueError(
+                f"{what}: does nothing; give tractions, pressures, gravity, or a support with a displacement"
+            )
+        names = [one.name for one in self.quantities]
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            raise ValueError(f"{what}: two quantities are named {twice[0]!r}; rename one")
+
+    def check_names(
+        self, sides: Iterable[str], points: Iterable[str], unusable: Mapping[str, str] | None = None
+    ) -> None:
+        """Refuse names that are not those of groups of the kind that they are used for.
+
+        Parameters
+        ----------
+        sides, points : iterable of str
+            Names of groups of sides, and of points.
+        unusable : mapping of str to str, optional
+            Names that a mesh file has, and why they are no groups.
+
+        Raises
+        ------
+        ValueError
+            With what is there.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> pull = st.LoadCase("pull", (st.Support("lfet", x=0, y=0),), (st.Traction("right", (1, 0)),))
+        >>> try:
+        ...     pull.check_names(["left", "right"], [])
+        ... except ValueError as error:
+        ...     print(error)
+        load 'pull', support: no group is named 'lfet'; did you mean 'left'? known: left, right
+        """
+        sides, points, unusable = tuple(sides), tuple(points), unusable or {}
+        both, where = (*sides, *points), f"load {self.name!r}"
+        uses = [("support", one.group, both) for one in self.supports]
+        uses += [("traction", one.group, both) for one in self.tractions]
+        uses += [("pressure", one.group, sides) for one in self.pressures]
+        of = {"displacement": both, "reaction": both, "stress": points}
+        uses += [(f"quantity {one.name!r}", one.of, of[one.kind]) for one in self.quantities if one.kind in of]
+        for what, name, known in uses:
+            if name in known:
+                continue
+            if name in unusable:
+                raise ValueError(f"{where}, {what}: {name!r} {unusable[name]}")
+            if name in both:
+                wrong = "is a point, and needs sides" if name in points else "is sides, and needs a point"
+                raise ValueError(f"{where}, {what}: {name!r} {wrong}; {nearest(name, known)}")
+            there = nearest(name, known) if known else "there are none; name some"
+            raise ValueError(f"{where}, {what}: no group is named {name!r}; {there}")
+        for one in self.quantities:
+            held = [
+                support.group for support in self.supports if getattr(support, one.component[:1] or "x") is not None
+            ]
+            if one.kind == "reaction" and one.of not in held:
+                raise ValueError(
+                    f"load {self.name!r}, quantity {one.name!r}: no support holds {one.of!r} along {one.component}; "
+                    f"held: {', '.join(held) or 'none'}"
+                )
+
 
 @dataclass(frozen=True)
 class Shape:
     """A plane body.
 
-    Attributes
+    Parameters
     ----------
     name : str
-    thickness : float
-        [m]
+    thickness : float or str
+        [m], or a text with its unit.
     outline : tuple of Segment
-        Counter-clockwise; nothing where the body is that of a mesh file.
-    holes : tuple of Hole
-    points : mapping of str to tuple of float
-        Named points [m]; those in supports and loads become particles of every mesh.
-    loads : mapping of str to LoadCase
-    file : str
+        A closed round that does not meet itself; a clockwise one is turned. Nothing where the body is that of a mesh
+        file.
+    holes : tuple of Hole, optional
+        In the body, apart from its outline and from each other; one may be in what fills another.
+    points : mapping of str to tuple of float, optional
+        Named points of the body [m]: particles of every mesh. Those within a millionth of its extent from a side are
+        put on that side.
+    loads : mapping of str to LoadCase, optional
+    file : str, optional
         Mesh file whose cells are the body; empty where it has an outline.
-    unit : float
+    unit : float or str, optional
         Unit of the coordinates in the file [m].
+
+    Raises
+    ------
+    ValueError
+        If there is neither an outline nor a file, sides meet where they are not to, holes or points are not in the
+        body, or names cannot be some, are of two things, or of nothing.
+
+    Examples
+    --------
+    A plate with a hole:
+
+    >>> import math
+    >>> import springtune as st
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+    >>> plate.label, plate.groups
+    ('100x40 mm', ('lower', 'right', 'upper', 'left', 'hole'))
+    >>> math.isclose(plate.area, 0.1 * 0.04 - math.pi * 0.008**2)
+    True
     """
 
     name: str
@@ -194,3 +604,257 @@ class Shape:
     loads: Mapping[str, LoadCase] = field(default_factory=dict)
     file: str = ""
     unit: float = 1.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            name: str,
+            thickness: float | str,
+            outline: Iterable[Segment] = (),
+            holes: Iterable[Hole] = (),
+            points: Mapping[str, Place] = ...,
+            loads: Mapping[str, LoadCase] = ...,
+            file: str = "",
+            unit: float | str = 1.0,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        _named(self.name, "shape")
+        what = f"shape {self.name!r}"
+        object.__setattr__(self, "thickness", positive(self.thickness, "length", f"{what}, thickness"))
+        object.__setattr__(self, "unit", positive(self.unit, "length", f"{what}, unit"))
+        object.__setattr__(self, "outline", _all_of(self.outline, Segment, f"{what}, outline"))
+        object.__setattr__(self, "holes", _all_of(self.holes, Hole, f"{what}, holes"))
+        points = {name: _place(point, f"{what}, point {name!r}") for name, point in dict(self.points).items()}
+        object.__setattr__(self, "points", points)
+        for name, load in dict(self.loads).items():
+            _all_of([load], LoadCase, f"{what}, loads")
+            if name != load.name:
+                raise ValueError(f"{what}, loads: {name!r} has a load that is named {load.name!r}; give both one name")
+        if not isinstance(self.file, str):
+            raise ValueError(f"{what}, file: {self.file!r} is not a text; give the path of a mesh file")
+        if bool(self.outline) == bool(self.file):
+            both = "both an outline and a file" if self.file else "neither an outline nor a file"
+            raise ValueError(f"{what}: has {both}; give one of them")
+        if self.file:
+            if self.holes or self.points:
+                raise ValueError(f"{what}: holes and points are those of the file; leave them out")
+            return
+        try:
+            self._check_rounds()
+            object.__setattr__(self, "points", {name: self._placed(name, point) for name, point in points.items()})
+            for load in self.loads.values():
+                load.check_names(self.groups, self.points)
+        except ValueError as error:
+            raise ValueError(f"{what}: {error}") from None
+
+    def _check_rounds(self) -> None:
+        """Refuse rounds that meet each other or themselves, or are at a wrong place; turn a clockwise outline."""
+        sides = _round(self.outline, "outline")
+        if enclosed(sides) < 0:
+            back = turned(sides)
+            object.__setattr__(self, "outline", tuple(Segment(one.start, one.centre, one.group) for one in back))
+            sides = back
+        (left, low), (right, high) = extent(sides)
+        size = max(right - left, high - low)
+        rounds = [("outline", sides)]
+        for number, hole in enumerate(self.holes, start=1):
+            rounds.append(
+                (f"{'part ' + repr(hole.part) if hole.part else 'hole'} {number}", _round(hole.outline, "hole"))
+            )
+        for what, one in rounds:
+            short = [number for number, side in enumerate(one, start=1) if side.length < ON_SIDE * size]
+            if short:
+                raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
+            for before, side in zip((one[-1], *one[:-1]), one):
+                (x, y), (u, v) = before.tangent(1.0), side.tangent(0.0)
+                if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6:
+                    raise ValueError(f"{what}: turns back on itself at {in_mm(side.start)}; move a corner")
+            met = meeting(one)
+            if met:
+                raise ValueError(f"{what}: sides {met[0] + 1} and {met[1] + 1} meet at {in_mm(met[2])}; move a corner")
+        for number, (what, one) in enumerate(rounds):
+            for other_what, other in rounds[:number]:
+                met = meeting(one, other)
+                if met:
+                    raise ValueError(f"{what} meets {other_what} at {in_mm(met[2])}; keep them apart")
+            if number and not winds_about(sides, one[0].start):
+                raise ValueError(f"{what}: is outside the outline, at {in_mm(one[0].start)}; move it")
+        for number, (what, one) in enumerate(rounds[1:], start=1):
+            for other_number, (other_what, other) in enumerate(rounds[1:], start=1):
+                empty = not self.holes[other_number - 1].part
+                if number != other_number and empty and winds_about(other, one[0].start):
+                    raise ValueError(f"{what}: is inside {other_what}, where nothing is; remove one of them")
+        names = set(self.groups) & set(self.points)
+        if names:
+            raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")
+
+    def _placed(self, name: str, point: Point) -> Point:
+        """A named point, on the side that it is next to."""
+        _named(name, "point")
+        (left, low), (right, high) = self.extent
+        size = max(right - left, high - low)
+        for one in self.rounds:
+            for side in one.sides:
+                parameter, distance = side.nearest(point)
+                if distance <= ON_SIDE * size:
+                    ends = {0.0: side.start, 1.0: side.end}
+                    close = [end for end in ends.values() if math.dist(end, point) <= ON_SIDE * size]
+                    return close[0] if close else side.at(parameter)
+        if self.part_at(point) is None:
+            raise ValueError(f"point {name!r}: {in_mm(point)} is not in the body; move it")
+        return point
+
+    @cached_property
+    def rounds(self) -> tuple[Round, ...]:
+        """The outline and those of holes, each counter-clockwise; none where the body is that of a file.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+        >>> [(len(one.sides), one.inner, one.outer) for one in plate.rounds]
+        [(4, '', None), (4, None, '')]
+        """
+        if not self.outline:
+            return ()
+        holes = []
+        for hole in self.holes:
+            sides = _round(hole.outline, "hole")
+            holes.append(turned(sides) if enclosed(sides) < 0 else sides)
+        found = [Round(_round(self.outline, "outline"), "", None)]
+        for hole, sides in zip(self.holes, holes):
+            around = [
+                (enclosed(other_sides), other.part)
+                for other, other_sides in zip(self.holes, holes)
+                if other is not hole and other.part and winds_about(other_sides, sides[0].start)
+            ]
+            found.append(Round(sides, hole.part or None, min(around)[1] if around else ""))
+        return tuple(found)
+
+    def part_at(self, point: Point) -> str | None:
+        """Part of the body at a point that is on no side; None where there is nothing.
+
+        Parameters
+        ----------
+        point : tuple of float
+            [m]
+
+        Returns
+        -------
+        str or None
+            Empty in the main part.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+        >>> plate.part_at((0.01, 0.01)), plate.part_at((0.05, 0.02))
+        ('', None)
+        """
+        around = [one for one in self.rounds if winds_about(one.sides, point)]
+        return min(around, key=lambda one: one.area).inner if around else None
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the body [m2], of arcs in closed form; NaN where it is that of a file.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Shape.rectangle("100 mm", "40 mm").area
+        0.004
+        """
+        return sum(one.area * (one.outer is None) - one.area * (one.inner is None) for one in self.rounds) or math.nan
+
+    @cached_property
+    def extent(self) -> tuple[Point, Point]:
+        """Lower left and upper right corner of the box around it [m]; NaN where the body is that of a file.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Shape.rectangle("100 mm", "40 mm").extent
+        ((0.0, 0.0), (0.1, 0.04))
+        """
+        nowhere = math.nan, math.nan
+        return extent(self.rounds[0].sides) if self.rounds else (nowhere, nowhere)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups of its sides, each once; none where they are those of a file.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Shape.rectangle("100 mm", "40 mm").groups
+        ('lower', 'right', 'upper', 'left')
+        """
+        rounds = [self.outline, *(hole.outline for hole in self.holes)]
+        return tuple(dict.fromkeys(one.group for sides in rounds for one in sides if one.group))
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the parts that fill holes, each once.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> core = st.Hole.circle(("50 mm", "20 mm"), "8 mm", part="core")
+        >>> st.Shape.rectangle("100 mm", "40 mm", holes=[core]).parts
+        ('core',)
+        """
+        return tuple(dict.fromkeys(hole.part for hole in self.holes if hole.part))
+
+    @property
+    def label(self) -> str:
+        """Name with what it measures, for titles; the name alone where the body is that of a file.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Shape.rectangle("100 mm", "40 mm", name="plate").label
+        'plate (100 x 40 mm)'
+        """
+        (left, low), (right, high) = self.extent
+        return beam_label(self.name, right - left, high - low)
+
+    @classmethod
+    def rectangle(
+        cls,
+        length: float | str,
+        height: float | str,
+        thickness: float | str = 1e-3,
+        name: str = "",
+        holes: Iterable[Hole] = (),
+        points: Mapping[str, Place] | None = None,
+        loads: Mapping[str, LoadCase] | None = None,
+    ) -> "Shape":
+        """A rectangle with its lower left corner at the origin, its sides ``lower``, ``right``, ``upper``, ``left``.
+
+        Parameters
+        ----------
+        length, height, thickness : float or str
+            [m], or texts with their unit.
+        name : str, optional
+            Its length and height in mm without, e.g. ``"200x40"``.
+        holes, points, loads
+            As of `Shape`.
+
+        Returns
+        -------
+        Shape
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.Shape.rectangle("200 mm", "40 mm").outline[2]
+        Segment(start=(0.2, 0.04), centre=None, group='upper')
+        """
+        x, y = positive(length, "length", "length"), positive(height, "length", "height")
+        corners = {"lower": (0.0, 0.0), "right": (x, 0.0), "upper": (x, y), "left": (0.0, y)}
+        outline = tuple(Segment(corner, group=group) for group, corner in corners.items())
+        return cls(
+            name or f"{1e3 * x:g}x{1e3 * y:g}", thickness, outline, tuple(holes), dict(points or {}), dict(loads or {})
+        )

@@ -1,0 +1,416 @@
+"""Sides of an outline, straight or along an arc: where they run, how long they are, and whether they meet."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+Point = tuple[float, float]
+"""Coordinates [m]."""
+
+SAME = 1e-9
+"""What the distances of two ends from a centre differ by at most on a circle, over these: coordinates are rounded."""
+
+APART = 1e-9
+"""What sides are apart at least, over the extent of the shape; nearer ones touch."""
+
+PANELS = 64
+"""Panels of an ellipse's arc on which its length is integrated."""
+
+GAUSS = (
+    (0.5, 64 / 225),
+    *(
+        (0.5 + sign * math.sqrt(5 + root * 2 * math.sqrt(10 / 7)) / 6, (322 - root * 13 * math.sqrt(70)) / 1800)
+        for root in (-1, 1)
+        for sign in (-1, 1)
+    ),
+)
+"""Abscissae and weights of five points on (0, 1): polynomials of degree 9 are exact."""
+
+
+@dataclass(frozen=True)
+class OutlineSide:
+    """A side of an outline: straight, or an arc of less than half a turn.
+
+    Parameters run from 0 at the start to 1 at the end; along an arc they go with the angle, of an ellipse the eccentric
+    one. The body is on the left of the sides of an outline that runs counter-clockwise.
+
+    Attributes
+    ----------
+    start, end : tuple of float
+        [m]
+    centre : tuple of float or None
+        As of `Segment`.
+    group : str
+
+    Raises
+    ------
+    ValueError
+        If it has no length, or no such arc goes through both ends.
+
+    Examples
+    --------
+    A quarter of a circle and one of an ellipse:
+
+    >>> quarter = OutlineSide((1.0, 0.0), (0.0, 1.0), centre=(0.0, 0.0))
+    >>> print(f"{quarter.length:.6f}", "({:.6f}, {:.6f})".format(*quarter.at(0.5)))
+    1.570796 (0.707107, 0.707107)
+    >>> print(f"{OutlineSide((2.0, 0.0), (0.0, 1.0), centre=(0.0, 0.0)).length:.6f}")
+    2.422112
+    """
+
+    start: Point
+    end: Point
+    centre: Point | None = None
+    group: str = ""
+
+    def __post_init__(self) -> None:
+        if self.start == self.end:
+            raise ValueError(
+                f"from {in_mm(self.start)} to itself; leave it out, and split an entire circle into four arcs"
+            )
+        if self.centre is not None:
+            vars(self)["_arc"] = self._found_arc(self.centre)
+
+    def _found_arc(self, centre: Point) -> tuple[float, float, float, float]:
+        """Semi-axes along x and y [m], angle at the start and angle that it turns by, counter-clockwise [rad]."""
+        (x, y), (u, v) = ((end[0] - centre[0], end[1] - centre[1]) for end in (self.start, self.end))
+        first, second = math.hypot(x, y), math.hypot(u, v)
+        about = f"arc from {in_mm(self.start)} to {in_mm(self.end)} about {in_mm(centre)}"
+        if not min(first, second) > SAME * max(first, second):
+            raise ValueError(f"{about}: an end is at the centre; move one of them")
+        if abs(first - second) <= SAME * first:
+            across = along = 0.5 * (first + second)
+        else:
+            # 1 / a^2 and 1 / b^2 of x^2 / a^2 + y^2 / b^2 = 1 at both ends, scaled.
+            large = max(first, second)
+            x2, y2, u2, v2 = ((one / large) ** 2 for one in (x, y, u, v))
+            determinant = x2 * v2 - u2 * y2
+            shares = [(v2 - y2) / determinant, (x2 - u2) / determinant] if abs(determinant) > SAME else [-1.0, -1.0]
+            if not min(shares) > 1e-12:
+                raise ValueError(
+                    f"{about}: the ends are {1e3 * first:.9g} and {1e3 * second:.9g} mm from it, and no ellipse with "
+                    "axes along x and y about it goes through both; correct the centre or an end"
+                )
+            across, along = (large / math.sqrt(share) for share in shares)
+        begin, finish = math.atan2(y / along, x / across), math.atan2(v / along, u / across)
+        turn = math.remainder(finish - begin, 2 * math.pi)
+        if abs(abs(turn) - math.pi) < 1e-6:
+            raise ValueError(f"{about}: is half a turn, and could go either way; split it into two arcs")
+        if abs(turn) < 1e-9:
+            raise ValueError(f"{about}: turns by no angle; correct the centre, or leave it out for a straight side")
+        return across, along, begin, turn
+
+    @property
+    def arc(self) -> tuple[float, float, float, float] | None:
+        """Of an arc: semi-axes along x and y [m], angle at the start and by which it turns, counter-clockwise [rad]."""
+        found: tuple[float, float, float, float] | None = vars(self).get("_arc")
+        return found
+
+    @property
+    def circular(self) -> bool:
+        """Whether it is an arc of a circle."""
+        return self.arc is not None and self.arc[0] == self.arc[1]
+
+    def reversed(self) -> "OutlineSide":
+        """The same side from its end to its start."""
+        return OutlineSide(self.end, self.start, self.centre, self.group)
+
+    def at(self, parameter: float) -> Point:
+        """Point at a parameter [m]."""
+        if parameter in (0.0, 1.0):
+            return self.end if parameter else self.start
+        if self.arc is None or self.centre is None:
+            (x, y), (u, v) = self.start, self.end
+            return x + parameter * (u - x), y + parameter * (v - y)
+        across, along, begin, turn = self.arc
+        angle = begin + parameter * turn
+        return self.centre[0] + across * math.cos(angle), self.centre[1] + along * math.sin(angle)
+
+    def slope(self, parameter: float) -> Point:
+        """Derivative of the point by the parameter [m]."""
+        if self.arc is None:
+            return self.end[0] - self.start[0], self.end[1] - self.start[1]
+        across, along, begin, turn = self.arc
+        angle = begin + parameter * turn
+        return -across * turn * math.sin(angle), along * turn * math.cos(angle)
+
+    def tangent(self, parameter: float) -> Point:
+        """Unit vector along the side at a parameter."""
+        x, y = self.slope(parameter)
+        norm = math.hypot(x, y)
+        return x / norm, y / norm
+
+    def normal(self, parameter: float) -> Point:
+        """Unit vector to the right of the side at a parameter: out of the body on the sides of an outline."""
+        x, y = self.tangent(parameter)
+        return y, -x
+
+    def _length(self, low: float, high: float) -> float:
+        """Length between two parameters that are near each other."""
+        return (high - low) * sum(
+            weight * math.hypot(*self.slope(low + where * (high - low))) for where, weight in GAUSS
+        )
+
+    @cached_property
+    def _lengths(self) -> list[float]:
+        """Lengths from the start to the end of each panel of an ellipse's arc."""
+        found = [0.0]
+        for panel in range(PANELS):
+            found.append(found[-1] + self._length(panel / PANELS, (panel + 1) / PANELS))
+        return found
+
+    @cached_property
+    def length(self) -> float:
+        """Length [m]."""
+        if self.arc is None:
+            return math.dist(self.start, self.end)
+        if self.circular:
+            return self.arc[0] * abs(self.arc[3])
+        return self._lengths[-1]
+
+    def length_to(self, parameter: float) -> float:
+        """Length from the start to a parameter [m]."""
+        if self.arc is None or self.circular:
+            return parameter * self.length
+        panel = min(int(parameter * PANELS), PANELS - 1)
+        return self._lengths[panel] + self._length(panel / PANELS, parameter)
+
+    def parameter_of(self, length: float) -> float:
+        """Parameter that is so far from the start, along the side [m]."""
+        if self.arc is None or self.circular:
+            return length / self.length
+        from bisect import bisect_right
+
+        panel = min(max(bisect_right(self._lengths, length) - 1, 0), PANELS - 1)
+        parameter = (panel + 0.5) / PANELS
+        for _ in range(20):
+            missing = length - self.length_to(parameter)
+            parameter = min(max(parameter + missing / math.hypot(*self.slope(parameter)), 0.0), 1.0)
+            if abs(missing) <= 1e-15 * self.length:
+                break
+        return parameter
+
+    def divided(self, count: int, low: float = 0.0, high: float = 1.0) -> list[float]:
+        """Parameters that divide it, or a stretch of it, into parts of equal length; both ends are among them."""
+        first, last = self.length_to(low), self.length_to(high)
+        inner = (self.parameter_of(first + (last - first) * i / count) for i in range(1, count))
+        return [low, *inner, high]
+
+    def swept(self, origin: Point = (0.0, 0.0)) -> float:
+        """Signed area between the side and a point [m2]: the sum over an outline is the area within."""
+        (x, y), (u, v) = ((end[0] - origin[0], end[1] - origin[1]) for end in (self.start, self.end))
+        if self.arc is None or self.centre is None:
+            return 0.5 * (x * v - u * y)
+        across, along, _, turn = self.arc
+        centre = self.centre[0] - origin[0], self.centre[1] - origin[1]
+        return 0.5 * (centre[0] * (v - y) - centre[1] * (u - x) + across * along * turn)
+
+    def aside(self, low: float, high: float) -> float:
+        """Bound on the distance of points between two parameters from the chord between these [m]."""
+        if self.arc is None:
+            return 0.0
+        return max(self.arc[:2]) * (1 - math.cos(0.5 * abs(self.arc[3]) * (high - low)))
+
+    @property
+    def extremes(self) -> list[Point]:
+        """Ends and points farthest along the axes: the box around these is that around the side [m]."""
+        found = [self.start, self.end]
+        if self.arc is not None:
+            _, _, begin, turn = self.arc
+            for quarter in range(-8, 9):
+                parameter = (quarter * math.pi / 2 - begin) / turn
+                if 0 < parameter < 1:
+                    found.append(self.at(parameter))
+        return found
+
+    def nearest(self, point: Point) -> tuple[float, float]:
+        """Parameter at which it is nearest to a point, and the distance there [m]."""
+        if self.arc is None:
+            x, y = self.slope(0.0)
+            share = ((point[0] - self.start[0]) * x + (point[1] - self.start[1]) * y) / (x * x + y * y)
+            share = min(max(share, 0.0), 1.0)
+            return share, math.dist(self.at(share), point)
+        # The best of some stretches, then halving of the angle between the way to the point and the tangent.
+        count = 32
+        tries = [i / count for i in range(count + 1)]
+        distances = [math.dist(self.at(one), point) for one in tries]
+        best = min(range(count + 1), key=distances.__getitem__)
+        low, high = tries[max(best - 1, 0)], tries[min(best + 1, count)]
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            (x, y), (u, v) = self.at(middle), self.slope(middle)
+            if (point[0] - x) * u + (point[1] - y) * v > 0:
+                low = middle
+            else:
+                high = middle
+        parameter = min((0.0, 1.0, 0.5 * (low + high)), key=lambda one: math.dist(self.at(one), point))
+        return parameter, math.dist(self.at(parameter), point)
+
+
+@dataclass(frozen=True)
+class Round:
+    """A closed round of sides, counter-clockwise, and what is on both sides of it.
+
+    Attributes
+    ----------
+    sides : tuple of OutlineSide
+    inner, outer : str or None
+        Part of the body on the left and on the right; None where there is nothing.
+    """
+
+    sides: tuple[OutlineSide, ...]
+    inner: str | None
+    outer: str | None
+
+    @property
+    def area(self) -> float:
+        """Area within [m2]."""
+        return enclosed(self.sides)
+
+    def winds_about(self, point: Point) -> bool:
+        """Whether it winds about a point that is not on it."""
+        return winds_about(self.sides, point)
+
+
+def enclosed(sides: Sequence[OutlineSide]) -> float:
+    """Signed area within a round of sides [m2], positive where it runs counter-clockwise."""
+    # About a corner: coordinates far from the origin would cost digits.
+    return sum(side.swept(sides[0].start) for side in sides)
+
+
+def turned(sides: Sequence[OutlineSide]) -> tuple[OutlineSide, ...]:
+    """The same round the other way, from the same corner."""
+    return tuple(side.reversed() for side in sides[::-1])
+
+
+def extent(sides: Sequence[OutlineSide]) -> tuple[Point, Point]:
+    """Lower left and upper right corner of the box around sides [m]."""
+    xs, ys = zip(*(point for side in sides for point in side.extremes))
+    return (min(xs), min(ys)), (max(xs), max(ys))
+
+
+def winds_about(sides: Sequence[OutlineSide], point: Point) -> bool:
+    """Whether a round winds about a point that is not on it."""
+    total = 0.0
+    for side in sides:
+        stretches = [(0.0, 1.0)]
+        while stretches:
+            low, high = stretches.pop()
+            first, second = side.at(low), side.at(high)
+            if _to_chord(point, first, second) <= side.aside(low, high) and high - low > 1e-12:
+                middle = 0.5 * (low + high)
+                stretches += [(low, middle), (middle, high)]
+                continue
+            (a, b), (c, d) = ((end[0] - point[0], end[1] - point[1]) for end in (first, second))
+            total += math.atan2(a * d - b * c, a * c + b * d)
+    return abs(total) > math.pi
+
+
+def meeting(sides: Sequence[OutlineSide], others: Sequence[OutlineSide] | None = None) -> tuple[int, int, Point] | None:
+    """Where two sides of a round meet that are not neighbours, or neighbours away from their corner.
+
+    Parameters
+    ----------
+    sides : sequence of OutlineSide
+        A round.
+    others : sequence of OutlineSide, optional
+        Another round, whose sides are then the second ones.
+
+    Returns
+    -------
+    tuple or None
+        Number of both sides, and where [m].
+    """
+    (left, low), (right, high) = extent([*sides, *(others or ())])
+    small = APART * max(right - left, high - low)
+    for i, j in _near(sides, others, small):
+        for one, other in _away_from_corners(i, j, len(sides) if others is None else 0):
+            where = _meet(sides[i], (sides if others is None else others)[j], one, other, small)
+            if where is not None:
+                return i, j, where
+    return None
+
+
+Span = tuple[float, float]
+"""Parameters between which a stretch of a side is."""
+
+
+def _away_from_corners(i: int, j: int, count: int) -> list[tuple[Span, Span]]:
+    """Stretches of two sides of a round of so many that are not to meet: all of one and of the other but its corner."""
+    whole, without_start, without_end = (0.0, 1.0), (1e-3, 1.0), (0.0, 1 - 1e-3)
+    if count == 2:
+        return [((1e-3, 1 - 1e-3), whole), (whole, (1e-3, 1 - 1e-3))]
+    if count and (i + 1) % count == j:
+        return [(without_end, whole), (whole, without_start)]
+    if count and (j + 1) % count == i:
+        return [(without_start, whole), (whole, without_end)]
+    return [(whole, whole)]
+
+
+def _near(
+    sides: Sequence[OutlineSide], others: Sequence[OutlineSide] | None, small: float
+) -> Iterator[tuple[int, int]]:
+    """Pairs of sides whose boxes are not apart, each once."""
+    boxes = [(*extent([side]), 0, i) for i, side in enumerate(sides)]
+    if others is not None:
+        boxes += [(*extent([side]), 1, i) for i, side in enumerate(others)]
+    boxes.sort()
+    active: list[tuple[Point, Point, int, int]] = []
+    for box in boxes:
+        low, high, which, number = box
+        active = [one for one in active if one[1][0] >= low[0] - small]
+        for other_low, other_high, other_which, other in active:
+            if (others is not None and which == other_which) or other_low[1] > high[1] + small:
+                continue
+            if other_high[1] < low[1] - small:
+                continue
+            yield (number, other) if (which, number) < (other_which, other) else (other, number)
+        active.append(box)
+
+
+def _meet(side: OutlineSide, other: OutlineSide, span: Span, other_span: Span, small: float) -> Point | None:
+    """Where stretches of two sides come nearer than a distance to each other; None where they do not."""
+    pairs = [(span, other_span)]
+    while pairs:
+        one, two = pairs.pop()
+        bounds = side.aside(*one), other.aside(*two)
+        distance, where = _chords_apart(side.at(one[0]), side.at(one[1]), other.at(two[0]), other.at(two[1]))
+        if distance > bounds[0] + bounds[1] + small:
+            continue
+        if max(bounds) <= 0.1 * small:
+            return where
+        if bounds[0] >= bounds[1]:
+            middle = 0.5 * (one[0] + one[1])
+            pairs += [((one[0], middle), two), ((middle, one[1]), two)]
+        else:
+            middle = 0.5 * (two[0] + two[1])
+            pairs += [(one, (two[0], middle)), (one, (middle, two[1]))]
+    return None
+
+
+def _to_chord(point: Point, start: Point, end: Point) -> float:
+    """Distance of a point from a straight stretch [m]."""
+    along = end[0] - start[0], end[1] - start[1]
+    square = along[0] ** 2 + along[1] ** 2
+    share = ((point[0] - start[0]) * along[0] + (point[1] - start[1]) * along[1]) / square if square else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.dist((start[0] + share * along[0], start[1] + share * along[1]), point)
+
+
+def _chords_apart(a: Point, b: Point, c: Point, d: Point) -> tuple[float, Point]:
+    """Distance between the straight stretches from a to b and from c to d [m], and where it is."""
+
+    def left(one: Point, two: Point, three: Point) -> float:
+        return (two[0] - one[0]) * (three[1] - one[1]) - (two[1] - one[1]) * (three[0] - one[0])
+
+    on_left, other_on_left = left(c, d, a), left(c, d, b)
+    if left(a, b, c) * left(a, b, d) < 0 and on_left * other_on_left < 0:
+        share = on_left / (on_left - other_on_left)
+        return 0.0, (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
+    return min((_to_chord(a, c, d), a), (_to_chord(b, c, d), b), (_to_chord(c, a, b), c), (_to_chord(d, a, b), d))
+
+
+def in_mm(point: Point) -> str:
+    """A point, in words."""
+    return f"({1e3 * point[0]:.9g}, {1e3 * point[1]:.9g}) mm"
