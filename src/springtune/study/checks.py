@@ -322,7 +322,7 @@ def check_files(
         (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
         (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
     ):
-        for name, count in Counter(name.casefold() for name in names).most_common(1):
-            if count > 1:
-                problems.add(path, f"{count} different {what} are all named '{name}'; {remedy}")
+        for name, number in Counter(name.casefold() for name in names).most_common(1):
+            if number > 1:
+                problems.add(path, f"{number} different {what} are all named '{name}'; {remedy}")
                 return

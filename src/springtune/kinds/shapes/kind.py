@@ -159,9 +159,7 @@ def _check_names(shape, path, problems):
     groups, points = _groups(shape), list(shape.points)
     for number, hole in enumerate(shape.holes):
         if hole.part and (hole.group or any(side.group for side in hole.outline or ())):
-            message = (
-                f"what part '{hole.part}' fills is inside of the body, and groups are of its outline; leave it out"
-            )
+            message = f"part '{hole.part}' is inside of the body, and groups are of its outline; leave the group out"
             problems.add((*path, "holes", number), message)
     for point in points:
         if point in groups:
@@ -324,10 +322,9 @@ def _axes(part):
         name: tuple(dict.fromkeys(getattr(one, name) for one in part.scenes))
         for name in ("shape", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
     }
-    cases = [
-        part.shape[shape].loads[load] for shape, load in dict.fromkeys((one.shape, one.load) for one in part.scenes)
-    ]
-    return labels | {"quantity": tuple(dict.fromkeys(one.name for case in cases for one in case.quantities))}
+    pairs = dict.fromkeys((one.shape, one.load) for one in part.scenes)
+    asked = [one.name for shape, load in pairs for one in part.shape[shape].loads[load].quantities]
+    return labels | {"quantity": tuple(dict.fromkeys(asked))}
 
 
 def _summary(part):

@@ -8,7 +8,6 @@ from pathlib import Path
 from ...jobs import store
 from ...mesh import quality
 from ...mesh.outlines import mesh_shape
-from ...mesh.shape_files import read_shape
 from . import stored
 from .described import shape_of
 
@@ -62,13 +61,23 @@ def _made(source):
 
 
 def make(source):
-    """Mesh with its groups, from what `springtune.kinds.shapes.described.geometry` gives.
+    """Mesh with its groups.
 
-    With ``mesh_type``, ``mesh_size`` and ``refined``, sizes by group, point or part, or with ``file``, its ``unit`` and the hash of its ``content``.
+    Parameters
+    ----------
+    source : dict
+        What `springtune.kinds.shapes.described.geometry` gives, with ``mesh_type``, ``mesh_size`` and ``refined``,
+        sizes by group, point or part; or with ``file``, its ``unit`` and the hash of its ``content``.
+
+    Returns
+    -------
+    GroupedMesh
     """
     if "file" not in source:
         return mesh_shape(shape_of(source), source["mesh_size"], source["mesh_type"], source["refined"])
     content = hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest()
     if content != source["content"]:
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
+    from ...mesh.shape_files import read_shape
+
     return read_shape(source["file"], source["unit"])

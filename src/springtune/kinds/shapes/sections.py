@@ -116,8 +116,8 @@ class SegmentConfig(Section):
     start: Place = Field(alias="from", description="Its corner.")
     centre: Place | None = Field(
         None,
-        description="Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse with "
-        "its axes along x and y where its ends are not equally far from it. It is straight without.",
+        description="Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse "
+        "with its axes along x and y where its ends are not equally far from it. It is straight without.",
     )
     group: GroupName = Field("", description="Group that it belongs to, for supports, loads and quantities.")
 

@@ -41,7 +41,6 @@ def run(tasks, spent):
             store.add(path, {key: _hole(grouped) for scene in missing for key in _keys(scene)})
             spent.add(WITHOUT_MESH, 0, 0.0, len(missing))
             continue
-        sheet = None
         with store.Keeper(path) as keeper:
             for task in missing:
                 begin = time.perf_counter()
