@@ -39,11 +39,29 @@ def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray)
     middle = [(displacements[:, 1:] + displacements[:, :-1]) / 2, (displacements[1:] + displacements[:-1]) / 2]
     by_x = np.diff(middle[0], axis=0) / np.diff(x)[:, None, None]
     by_y = np.diff(middle[1], axis=1) / np.diff(y)[None, :, None]
+    areas = np.multiply.outer(np.diff(x), np.diff(y)).ravel()
+    return most_rotation_and_strain(np.stack([by_x, by_y], axis=-1).reshape(-1, 2, 2), areas)
+
+
+def most_rotation_and_strain(gradients: np.ndarray, areas: np.ndarray) -> tuple[float, float]:
+    """As `rotation_and_strain`, of displacement gradients.
+
+    Parameters
+    ----------
+    gradients : ndarray of float, shape (n, 2, 2)
+        By component of the displacement, then by coordinate [1].
+    areas : ndarray of float, shape (n,)
+        That they stand for [m2].
+
+    Returns
+    -------
+    rotation, strain : float
+    """
+    by_x, by_y = gradients[..., 0], gradients[..., 1]
     rotation = np.abs(by_x[..., 1] - by_y[..., 0]) / 2
     mean, half = (by_x[..., 0] + by_y[..., 1]) / 2, (by_x[..., 0] - by_y[..., 1]) / 2
     strain = np.abs(mean) + np.hypot(half, (by_x[..., 1] + by_y[..., 0]) / 2)
-    areas = np.multiply.outer(np.diff(x), np.diff(y)).ravel()
-    return _exceeded_rarely(rotation.ravel(), areas), _exceeded_rarely(strain.ravel(), areas)
+    return _exceeded_rarely(rotation, areas), _exceeded_rarely(strain, areas)
 
 
 def _exceeded_rarely(values: np.ndarray, areas: np.ndarray) -> float:

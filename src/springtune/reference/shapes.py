@@ -1,0 +1,814 @@
+r"""Reference for a shape: linear elasticity at small strain, plane stress, by finite elements on the shape itself.
+
+Triangles follow straight and curved sides. Their polynomial degree rises from level to level, and with it the number of
+layers that shrink towards corners at which the solution may be singular: where the outline is re-entrant, supports or
+loads begin or end, materials meet. The error then falls exponentially (hp version), as in
+`springtune.reference.small_strain`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from ..linalg.factors import SingularError, factorize
+from ..mesh.cells import MeshError, signed_areas
+from ..mesh.groups import GroupedMesh
+from ..problem.materials import Material
+from ..problem.shapes import LoadCase, Quantity, Shape
+from .coarse_meshes import LARGEST_TURN, CoarseMesh, Side, grouped_mesh, outline_mesh, singular_corners
+from .limits import most_rotation_and_strain
+from .small_strain import ReferenceNotConvergedError
+from .triangles import SIDE_CORNERS, function_counts, shape_functions, side_fit, side_functions, tabulated
+
+#: Degrees of the first level and of the last one tried.
+LOWEST_DEGREE, HIGHEST_DEGREE = 2, 10
+
+#: Error of a stress that is accepted, over that of other quantities.
+STRESS_SHARE = 10.0
+
+#: Quantities below this share of the largest one of their kind are judged by that share.
+SMALLEST_SHARE = 1e-3
+
+#: Turn of an outline made of straight sides that is taken for none [rad]: a polygon that stands for a circle.
+SMOOTH_TURN = np.radians(12)
+
+#: Most unknowns of a level.
+LARGEST_LEVEL = 600_000
+
+Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Vectors, shape (n, 2), at points of sides and their outward normals, shape (n, 2) each."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeReference:
+    """Converged displacements of a shape under a load case.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        Quantities of interest, in SI units.
+    error_estimates : dict of str to float
+        Bounds on their errors, relative [1]: to the value itself, or to a thousandth of what is largest of its kind in
+        the body where the value is less.
+    energy : float
+        Strain energy [J].
+    rotation, strain : float
+        Rotation [rad] and strain [1] by which the solution is judged, see `springtune.reference.limits`.
+    unknowns : int
+        Number of unknowns of the finest level.
+    degree : int
+        Of its polynomials.
+    """
+
+    values: dict[str, float]
+    error_estimates: dict[str, float]
+    energy: float
+    rotation: float
+    strain: float
+    unknowns: int
+    degree: int
+    _level: "_Level" = field(repr=False)
+    _kinds: dict[str, str] = field(repr=False)
+    _factor: float = 1.0
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Displacements at points of the body; those a little outside get what its nearest triangle goes on with.
+
+        Parameters
+        ----------
+        points : ndarray of float, shape (n, 2)
+            [m]
+
+        Returns
+        -------
+        ndarray of float, shape (n, 2)
+            [m]
+        """
+        return self._factor * self._level.displacements(points)
+
+    def stress_at(self, points: np.ndarray) -> np.ndarray:
+        """Stresses at points of the body, see `at`.
+
+        Parameters
+        ----------
+        points : ndarray of float, shape (n, 2)
+            [m]
+
+        Returns
+        -------
+        ndarray of float, shape (n, 3)
+            xx, yy and xy [Pa].
+        """
+        return self._factor * self._level.stresses(points)
+
+    def scaled(self, factor: float) -> "ShapeReference":
+        """The solution under so many times the load, prescribed displacements included: small strain is linear.
+
+        Parameters
+        ----------
+        factor : float
+
+        Returns
+        -------
+        ShapeReference
+        """
+        values = {
+            name: value * (factor**2 if self._kinds[name] == "energy" else factor)
+            for name, value in self.values.items()
+        }
+        return replace(
+            self,
+            values=values,
+            energy=self.energy * factor**2,
+            rotation=self.rotation * abs(factor),
+            strain=self.strain * abs(factor),
+            _factor=self._factor * factor,
+        )
+
+
+def solve_shape(
+    shape: Shape,
+    load: LoadCase,
+    materials: Material | Mapping[str, Material],
+    grouped: GroupedMesh | None = None,
+    tolerance: float = 1e-4,
+) -> ShapeReference:
+    r"""Displacements of a shape under a load case, at small strain in plane stress.
+
+    Parameters
+    ----------
+    shape : Shape
+    load : LoadCase
+    materials : Material or mapping of str to Material
+        By part; that of the main part is ``""``.
+    grouped : GroupedMesh, optional
+        The mesh as read, of a shape whose body is that of a file: the polygon around its cells is then the geometry.
+    tolerance : float
+        Largest relative error estimate to accept [1]; ten times as much of stresses.
+
+    Returns
+    -------
+    ShapeReference
+
+    Raises
+    ------
+    ValueError
+        If a group or part has no support, side, point or material that it needs, supports contradict each other or
+        leave the body free to move, or a quantity has no finite value.
+    ReferenceNotConvergedError
+        If an estimate of the last level does not meet the tolerance.
+
+    Notes
+    -----
+    A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` there
+    one more layer takes the energy that the innermost triangles cannot represent down by :math:`.2^{2\lambda}`, and one
+    more degree that of the others by much the same, so that steps from level to level fall geometrically: as long as
+    each is at most half of the one before, all later ones together are at most the last one. Quantities other than the
+    energy need not approach their limit from one side and may take a step that is small by chance: the estimate is the
+    last step, or a quarter of the one before it where that is more, and a level is taken only where the steps are seen
+    to halve.
+
+    Curves are followed by polynomials of the level's degree (isoparametric), reactions are the work of the solution on
+    a unit displacement of their group, and stresses are those of the displacements, not smoothed.
+    """
+    by_part = {"": materials} if isinstance(materials, Material) else dict(materials)
+    return converge(shape, load, {name: by_part[name] for name in by_part}, grouped, tolerance)
+
+
+def converge(
+    shape: Shape,
+    load: LoadCase,
+    materials: Mapping[str, Material],
+    grouped: GroupedMesh | None = None,
+    tolerance: float = 1e-4,
+    tractions: Mapping[str, Field] | None = None,
+    displacements: Mapping[str, Field] | None = None,
+) -> ShapeReference:
+    """As `solve_shape`, also with tractions [Pa] and displacements [m] that vary along groups: closed forms need them.
+
+    Parameters
+    ----------
+    shape, load, materials, grouped, tolerance
+        As in `solve_shape`.
+    tractions, displacements : mapping of str to callable, optional
+        By group: vectors of points and outward normals.
+
+    Returns
+    -------
+    ShapeReference
+
+    Raises
+    ------
+    ValueError, ReferenceNotConvergedError
+        As `solve_shape`.
+    """
+    problem = _Problem(shape, load, materials, grouped, tractions or {}, displacements or {})
+    names = [quantity.name for quantity in load.quantities]
+    judged = names + ([] if problem.infinite_energy else [""])
+    values: list[dict[str, float]] = []
+    estimates: dict[str, float] = {}
+    complaint = ""
+    for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
+        unknowns = problem.size(degree)
+        if unknowns > LARGEST_LEVEL and complaint:
+            complaint += f"; the next level has {unknowns} unknowns, the most are {LARGEST_LEVEL}"
+            break
+        level = _Level(problem, degree)
+        values.append(level.values())
+        if len(values) < 3:
+            complaint = "of three levels"
+            continue
+        complaint = ""
+        for name in judged:
+            kind = problem.kinds[name]
+            scale = max(abs(values[-1][name]), SMALLEST_SHARE * level.scale(kind)) or 1.0
+            before, last = (abs(values[i][name] - values[i - 1][name]) / scale for i in (-2, -1))
+            estimates[name] = max(last, before / 4) + level.round_off
+            accepted = tolerance * (STRESS_SHARE if kind == "stress" else 1.0)
+            falls = last <= before / 2 or before <= accepted / 10
+            if not (estimates[name] <= accepted and falls) and not complaint:
+                shown = repr(name) if name else "the energy"
+                complaint = (
+                    f"{shown}{problem.place(name)}: relative error estimate {estimates[name]:.1e} at degree {degree} "
+                    f"({level.unknowns} unknowns), the tolerance is {accepted:.1e}{problem.reason(name)}"
+                )
+        if not complaint:
+            rotation, strain = level.rotation_and_strain()
+            return ShapeReference(
+                {name: values[-1][name] for name in names},
+                {name: estimates[name] for name in names},
+                energy=values[-1][""],
+                rotation=rotation,
+                strain=strain,
+                unknowns=level.unknowns,
+                degree=degree,
+                _level=level,
+                _kinds=problem.kinds,
+            )
+    raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
+
+
+class _Problem:
+    """What all levels share: coarse triangles, stiffnesses, supports and loads by group, corners."""
+
+    def __init__(
+        self,
+        shape: Shape,
+        load: LoadCase,
+        materials: Mapping[str, Material],
+        grouped: GroupedMesh | None,
+        tractions: Mapping[str, Field],
+        displacements: Mapping[str, Field],
+    ) -> None:
+        self.shape, self.load, self.tractions, self.displacements = shape, load, tractions, displacements
+        self.points = {name: np.array(point, dtype=float) for name, point in shape.points.items()}
+        if grouped is not None:
+            self.points |= {name: np.array(point, dtype=float) for name, point in grouped.points.items()}
+        elif not shape.outline:
+            raise ValueError(f"shape {shape.name!r} has no outline; give the mesh of its file")
+        held = [support.group for support in load.supports]
+        used = {*held, *(traction.group for traction in load.tractions)} & set(self.points)
+        if grouped is not None:
+            self.mesh = grouped_mesh(grouped, {name: tuple(self.points[name]) for name in used})
+        else:
+            turn = LARGEST_TURN
+            for _ in range(5):
+                self.mesh = outline_mesh(shape, used, turn)
+                if _unfolded(self.mesh):
+                    break
+                turn /= 2
+            else:
+                raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
+
+        missing = [name for name in self.mesh.names if name not in materials]
+        present = {self.mesh.names[part] for part in np.unique(self.mesh.parts)}
+        if missing := [name for name in missing if name in present]:
+            raise ValueError(
+                f"parts without a material: {', '.join(repr(name) for name in missing)}; there are materials of "
+                f"{', '.join(repr(name) for name in materials)}"
+            )
+        absent = np.zeros((3, 3))
+        self.stiffness = np.array([materials[n].plane_stress if n in present else absent for n in self.mesh.names])
+        self.density = np.zeros(len(self.mesh.names))
+        if any(load.gravity):
+            for i, name in enumerate(self.mesh.names):
+                if name in present:
+                    density = materials[name].density
+                    if density is None:
+                        raise ValueError(f"material {materials[name].name!r} has no density; gravity needs one")
+                    self.density[i] = density
+
+        groups = {group for side in self.mesh.sides.values() for group in side.groups}
+        on_sides = [*held, *(t.group for t in load.tractions), *(p.group for p in load.pressures)]
+        for group in [*on_sides, *(q.of for q in load.quantities if q.of)]:
+            if group not in groups and group not in self.points:
+                known = ", ".join(repr(name) for name in sorted(groups | set(self.points)))
+                raise ValueError(f"load {load.name!r}: group {group!r} is not there; shape {shape.name!r} has {known}")
+        for pressure in load.pressures:
+            if pressure.group not in groups:
+                raise ValueError(f"load {load.name!r}: a pressure needs sides, and {pressure.group!r} is a point")
+
+        loads: dict[str, list[object]] = {}
+        for number, traction in enumerate(load.tractions):
+            loads.setdefault(traction.group, []).append(("traction", number))
+        for group in tractions:
+            loads.setdefault(group, []).append(("traction", group))
+        for pressure in load.pressures:
+            loads.setdefault(pressure.group, []).append(("pressure", pressure.pressure))
+        supported: dict[str, list[object]] = {}
+        for support in load.supports:
+            supported.setdefault(support.group, []).append((support.x, support.y))
+        for group in displacements:
+            supported.setdefault(group, []).append(group)
+
+        def condition(side: Side) -> object:
+            found = [(group, supported.get(group, []), loads.get(group, [])) for group in side.groups]
+            return sorted((repr(item[1]), repr(item[2])) for item in found if item[1] or item[2])
+
+        def mirror(side: Side, way: np.ndarray) -> bool:
+            if side.arc is not None or np.abs(self.stiffness[:, :2, 2]).max() > 1e-12 * self.stiffness.max():
+                return False
+            conditions = [value for group in side.groups for value in supported.get(group, [])]
+            if any(group in loads for group in side.groups):
+                return False
+            if len(conditions) != 1 or not isinstance(conditions[0], tuple):
+                return False
+            x, y = conditions[0]
+            flat = np.abs(way) < 1e-12
+            return bool(flat[1] and x is None and y is not None or flat[0] and y is None and x is not None)
+
+        smooth = SMOOTH_TURN if grouped is not None else 1e-6
+        self.corners = singular_corners(self.mesh, condition, lambda side: not condition(side), mirror, smooth)
+        at_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
+        for name in used:
+            point = self.mesh.named[name]
+            self.corners.setdefault(point, "a force at a point" if name in at_points else "a support at a point")
+        self.loaded_points = at_points
+        self.infinite_energy = bool(at_points)
+        self.kinds = {quantity.name: quantity.kind for quantity in load.quantities} | {"": "energy"}
+        self._quantities = {quantity.name: quantity for quantity in load.quantities}
+        for quantity in load.quantities:
+            self._check(quantity, groups)
+        self._graded = self.mesh.copy()
+        self._graded.isolate(self.corners)
+        self._layers = 0
+
+    def _check(self, quantity: Quantity, groups: set[str]) -> None:
+        name, kind, of = quantity.name, quantity.kind, quantity.of
+        if kind in ("stress",) and of not in self.points:
+            raise ValueError(f"quantity {name!r}: stress is that of a point, and {of!r} is a group of sides")
+        if kind == "reaction":
+            axis = "xy".index(quantity.component)
+            if not any(
+                support.group == of and (support.x, support.y)[axis] is not None for support in self.load.supports
+            ):
+                raise ValueError(f"quantity {name!r}: no support holds {of!r} along {quantity.component}")
+        infinite = {"displacement": "the displacement", "stress": "the stress"}.get(kind)
+        if infinite:
+            for point in self.loaded_points if of in self.points else ():
+                if np.allclose(self.points[point], self.points[of], rtol=0, atol=1e-9 * np.ptp(self.mesh.points)):
+                    raise ValueError(
+                        f"quantity {name!r}: {infinite} under a point force is infinite in a continuum: spread the "
+                        f"force on {point!r} over a side"
+                    )
+        if kind == "energy" and self.infinite_energy:
+            raise ValueError(
+                f"quantity {name!r}: the energy of a point force is infinite in a continuum: spread the force on "
+                f"{', '.join(sorted(self.loaded_points))} over a side"
+            )
+
+    def place(self, name: str) -> str:
+        """Of what a quantity is."""
+        of = self._quantities[name].of if name else ""
+        return f" of {of!r}" if of else ""
+
+    def reason(self, name: str) -> str:
+        """Why a quantity may not converge."""
+        quantity = self._quantities.get(name)
+        if quantity is None or quantity.of not in self.points:
+            return ""
+        where = self.points[quantity.of]
+        extent = np.ptp(self.mesh.points, axis=0).max()
+        for corner, what in self.corners.items():
+            if np.linalg.norm(self.mesh.points[corner] - where) <= 1e-9 * extent:
+                finite = "stress" if quantity.kind == "stress" else "displacement"
+                return f"; {quantity.of!r} is a corner where {what}, and {finite} may be infinite there"
+        return ""
+
+    def graded(self, layers: int) -> CoarseMesh:
+        """The mesh with so many layers at its corners; asked for in rising order."""
+        while self._layers < layers:
+            self._graded.grade(self.corners)
+            self._layers += 1
+        return self._graded.copy()
+
+    def size(self, degree: int) -> int:
+        """Number of unknowns of a level, about."""
+        return int((len(self._graded.triangles)) * degree**2)
+
+
+def _unfolded(mesh: CoarseMesh) -> bool:
+    """Whether triangles along arcs are the right way round everywhere."""
+    space = _Space(mesh, 4)
+    _, _, _, gradients = tabulated(4, 10)
+    corners = shape_functions(4, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]]))[1]
+    return bool((space.jacobians(np.concatenate([gradients, corners]))[1] * space.sense[:, None] > 0).all())
+
+
+class _Space:
+    """Polynomials of one degree on the triangles of a mesh."""
+
+    def __init__(self, mesh: CoarseMesh, degree: int) -> None:
+        self.mesh, self.degree = mesh, degree
+        self.corners = corners = np.sort(mesh.triangles, axis=1)
+        one, two = (mesh.points[corners[:, i]] - mesh.points[corners[:, 0]] for i in (1, 2))
+        self.sense = np.sign(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+        n_points = len(mesh.points)
+        pairs = np.concatenate([corners[:, pair] for pair in SIDE_CORNERS])
+        codes, places = np.unique(pairs[:, 0] * n_points + pairs[:, 1], return_inverse=True)
+        self.edges = np.stack(np.divmod(codes, n_points), axis=1)
+        of_triangles = places.reshape(3, -1).T
+        per_side, inside = function_counts(degree)
+        self.n_outer = n_points + len(codes) * per_side
+        self.n_functions = self.n_outer + len(corners) * inside
+        on_sides = n_points + of_triangles[:, :, None] * per_side + np.arange(per_side)
+        within = self.n_outer + np.arange(len(corners))[:, None] * inside + np.arange(inside)
+        self.n_local_outer = 3 + 3 * per_side
+        self.numbers = np.concatenate([corners, on_sides.reshape(len(corners), -1), within], axis=1)
+        # Where the triangles are: coefficients of the same functions (isoparametric).
+        self.places = np.zeros((self.n_functions, 2))
+        self.places[:n_points] = mesh.points
+        self.codes = codes
+        along, inverse = side_fit(degree)
+        curved = [ends for ends, side in mesh.sides.items() if side.arc is not None]
+        for ends in curved:
+            start, end = mesh.points[ends[0]], mesh.points[ends[1]]
+            straight = (start + end) / 2 + along[:, None] * (end - start) / 2
+            self.places[self.on_side(ends)[2:]] = inverse @ (mesh.curve(ends, along) - straight)
+        bent = np.zeros(len(codes), dtype=bool)
+        bent[[self._edge(ends) for ends in curved]] = True
+        self.curved = bent[of_triangles].any(axis=1)
+
+    def _edge(self, ends: tuple[int, int]) -> int:
+        return int(np.searchsorted(self.codes, ends[0] * len(self.mesh.points) + ends[1]))
+
+    def on_side(self, ends: tuple[int, int]) -> np.ndarray:
+        """Functions on a side, as in `side_functions`."""
+        per_side = self.degree - 1
+        first = len(self.mesh.points) + self._edge(ends) * per_side
+        return np.concatenate([np.array(ends), np.arange(first, first + per_side)])
+
+    def jacobians(self, gradients: np.ndarray, rows: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the places, shape (n, points, 2, 2), last by reference coordinate, and their determinants."""
+        at = self.places[self.numbers[rows]]
+        derivatives = np.einsum("eic,qia->eqca", at, gradients, optimize=True)
+        determinants = derivatives[..., 0, 0] * derivatives[..., 1, 1] - derivatives[..., 0, 1] * derivatives[..., 1, 0]
+        return derivatives, determinants
+
+    def side_points(self, ends: tuple[int, int], outwards: float, count: int) -> tuple[np.ndarray, ...]:
+        """Functions, points, outward normals times length, and weights at Gauss points of a side."""
+        along, weights = np.polynomial.legendre.leggauss(count)
+        values, slopes = side_functions(self.degree, along)
+        at = self.places[self.on_side(ends)]
+        tangents = slopes @ at
+        return values, values @ at, outwards * np.stack([tangents[:, 1], -tangents[:, 0]], axis=1), weights
+
+
+def _inverse(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
+    """Inverses of 2 x 2 matrices, shape (..., 2, 2)."""
+    inverse = np.empty_like(matrices)
+    inverse[..., 0, 0], inverse[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
+    inverse[..., 0, 1], inverse[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
+    return inverse / determinants[..., None, None]
+
+
+VOIGT = np.array([[0, 2], [2, 1]])
+"""Place of a pair of axes among xx, yy and xy."""
+
+
+class _Level:
+    """A shape solved on one level."""
+
+    def __init__(self, problem: _Problem, degree: int) -> None:
+        self.problem = problem
+        mesh = problem.graded(degree)
+        self.space = _Space(mesh, degree)
+        self.outlines = mesh.part_sides()
+        thickness = problem.shape.thickness
+        # Stiffness by axes: of strain d u_c / d x_a on stress along d, b.
+        self._tensor = thickness * problem.stiffness[:, VOIGT[:, :, None, None], VOIGT[None, None]]
+        matrices = self._matrices()
+        forces = self._forces()
+        held, prescribed = self._supports()
+        solution, self.residual, self.energy = self._solve(matrices, forces, held, prescribed)
+        self.field = solution
+        self.held = held
+        free = ~held
+        forcing = max(np.abs(self.residual[held]).max(initial=0.0), np.abs(forces).max(initial=0.0))
+        self.round_off = float(np.abs(self.residual[free]).max(initial=0.0) / forcing) if forcing else 0.0
+        self.unknowns = int(free.sum())
+
+    # Unknowns are numbered by function, then axis.
+    def _matrices(self) -> np.ndarray:
+        """Stiffness matrices of the triangles, shape (n, 2 n_functions, 2 n_functions), axes last."""
+        space, degree = self.space, self.space.degree
+        n, count = len(space.corners), space.numbers.shape[1]
+        result = np.empty((n, count, 2, count, 2))
+        tensors = self._tensor[space.mesh.parts]
+        straight = np.flatnonzero(~space.curved)
+        _, weights, _, gradients = tabulated(degree, 2 * degree - 2)
+        jacobian, determinant = space.jacobians(gradients[:1], straight)
+        inverse = _inverse(jacobian[:, 0], determinant[:, 0])
+        products = np.einsum("q,qia,qjb->abij", weights, gradients, gradients, optimize=True)
+        area = np.abs(determinant[:, 0])
+        metric = np.einsum("eua,ecadb,evb,e->ecduv", inverse, tensors[straight], inverse, area, optimize=True)
+        blocks = metric.reshape(-1, 4) @ products.reshape(4, -1)
+        result[straight] = blocks.reshape(len(straight), 2, 2, count, count).transpose(0, 3, 1, 4, 2)
+        curved = np.flatnonzero(space.curved)
+        _, weights, _, gradients = tabulated(degree, 2 * degree + 4)
+        for rows in np.array_split(curved, max(1, len(curved) * gradients.size // 4_000_000)) if len(curved) else ():
+            jacobian, determinant = space.jacobians(gradients, rows)
+            inverse = _inverse(jacobian, determinant)
+            slopes = np.einsum("qiu,equa->eaqi", gradients, inverse, optimize=True)
+            weighted = slopes * (weights * np.abs(determinant))[:, None, :, None]
+            flat = slopes.reshape(len(rows), -1, count)
+            for c in range(2):
+                for d in range(2):
+                    mixed = np.einsum("eab,ebqj->eaqj", tensors[rows][:, c, :, d, :], weighted)
+                    result[rows, :, c, :, d] = flat.transpose(0, 2, 1) @ mixed.reshape(len(rows), -1, count)
+        return result.reshape(n, 2 * count, 2 * count)
+
+    def _group_sides(self, group: str) -> list[tuple[tuple[int, int], float]]:
+        """Sides of a group, and 1 where the body is to the left of them from the lower number, else -1."""
+        return [
+            (ends, 1.0 if self.outlines[ends][0][1] else -1.0)
+            for ends, side in self.space.mesh.sides.items()
+            if group in side.groups
+        ]
+
+    def _integral(self, group: str, given: Field) -> np.ndarray:
+        """Integral over a group of the functions times vectors."""
+        total = np.zeros((self.space.n_functions, 2))
+        for ends, sense in self._group_sides(group):
+            values, points, normals, weights = self.space.side_points(ends, sense, self.space.degree + 3)
+            lengths = np.linalg.norm(normals, axis=1)
+            total[self.space.on_side(ends)] += values.T @ (
+                given(points, normals / lengths[:, None]) * (weights * lengths)[:, None]
+            )
+        return total
+
+    def _shares(self, group: str) -> np.ndarray:
+        """Integral of the functions over a group, by its length."""
+        whole = self._integral(group, lambda points, _: np.ones_like(points))[:, 0]
+        return whole / whole[: len(self.space.mesh.points)].sum()
+
+    def _forces(self) -> np.ndarray:
+        """Forces on the functions [N], shape (n_functions, 2)."""
+        problem, space = self.problem, self.space
+        load, thickness = problem.load, problem.shape.thickness
+        total = np.zeros((space.n_functions, 2))
+        for traction in load.tractions:
+            if traction.group in space.mesh.named:
+                total[space.mesh.named[traction.group]] += traction.force
+            else:
+                shares = self._shares(traction.group)
+                total += shares[:, None] * traction.force
+        for pressure in load.pressures:
+            total -= pressure.pressure * thickness * self._integral(pressure.group, lambda _, normals: normals)
+        for group, given in problem.tractions.items():
+            total += thickness * self._integral(group, given)
+        if any(load.gravity):
+            _, weights, values, gradients = tabulated(space.degree, 3 * space.degree)
+            volume = weights * np.abs(space.jacobians(gradients)[1])
+            shares = (volume @ values) * (thickness * problem.density[space.mesh.parts])[:, None]
+            by_function = np.bincount(space.numbers.ravel(), shares.ravel(), space.n_functions)
+            total += by_function[:, None] * load.gravity
+        return total
+
+    def _supports(self) -> tuple[np.ndarray, np.ndarray]:
+        """What is held, and the coefficients that are prescribed, shape (n_functions, 2)."""
+        problem, space = self.problem, self.space
+        held, values = np.zeros((space.n_functions, 2), dtype=bool), np.zeros((space.n_functions, 2))
+        for support in problem.load.supports:
+            for axis, value in enumerate((support.x, support.y)):
+                if value is None:
+                    continue
+                if support.group in space.mesh.named:
+                    corners = np.array([space.mesh.named[support.group]])
+                    functions = corners
+                else:
+                    sides = [ends for ends, _ in self._group_sides(support.group)]
+                    functions = np.unique(np.concatenate([space.on_side(ends) for ends in sides]))
+                    corners = np.unique(sides)
+                other = np.asarray(held[corners, axis] & (values[corners, axis] != value))
+                if other.any():
+                    where = space.mesh.points[corners[np.argmax(other)]]
+                    raise ValueError(
+                        f"load {problem.load.name!r}: supports prescribe {values[corners, axis][other][0]:g} and "
+                        f"{value:g} m along {'xy'[axis]} at ({1e3 * where[0]:.6g}, {1e3 * where[1]:.6g}) mm; the "
+                        "energy is infinite: leave a gap between them"
+                    )
+                held[functions, axis], values[corners, axis] = True, value
+        along, inverse = side_fit(space.degree)
+        for group, given in problem.displacements.items():
+            for ends, _ in self._group_sides(group):
+                functions = space.on_side(ends)
+                at = side_functions(space.degree, np.concatenate([[-1.0, 1.0], along]))[0] @ space.places[functions]
+                wanted = given(at, np.zeros_like(at))
+                values[functions[:2]] = wanted[:2]
+                straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
+                values[functions[2:]] = inverse @ (wanted[2:] - straight)
+                held[functions] = True
+        self._check_rigid(held)
+        return held, values
+
+    def _check_rigid(self, held: np.ndarray) -> None:
+        """Refuse supports that leave a piece of the body free to move."""
+        space, problem = self.space, self.problem
+        n = len(space.mesh.points)
+        ends = space.edges
+        count, piece = connected_components(csr_array((np.ones(len(ends)), ends.T), shape=(n, n)), directed=False)
+        middle, extent = space.mesh.points.mean(axis=0), np.ptp(space.mesh.points, axis=0).max()
+        x, y = ((space.mesh.points - middle) / extent).T
+        ones, zeros = np.ones(n), np.zeros(n)
+        modes = np.stack([[ones, zeros], [zeros, ones], [-y, x]]).transpose(2, 1, 0)  # points, axes, modes
+        for number in range(count):
+            rows = modes[(piece == number)][held[:n][piece == number]]
+            if len(rows) < 3 or np.linalg.matrix_rank(rows, tol=1e-9 * np.sqrt(len(rows))) < 3:
+                what = "the body" if count == 1 else f"a piece of the body that is joined to no other, of {count},"
+                raise ValueError(
+                    f"load {problem.load.name!r} of shape {problem.shape.name!r}: supports leave {what} free to move "
+                    "or turn; hold it in both directions, at two points at least"
+                )
+
+    def _solve(
+        self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Coefficients and residual forces, shape (n_functions, 2), and the strain energy.
+
+        What is inside of triangles is eliminated triangle by triangle.
+        """
+        space = self.space
+        n, outer = len(space.corners), 2 * space.n_local_outer
+        numbers = (2 * space.numbers[:, :, None] + np.arange(2)).reshape(n, -1)
+        free = ~held.ravel()
+        solution, load = np.where(held, prescribed, 0.0).ravel(), forces.ravel()
+        inner = numbers[:, outer:]
+        coupled, stiff = matrices[:, outer:, :outer], matrices[:, outer:, outer:]
+        if inner.shape[1]:
+            right = np.concatenate([coupled, load[inner][:, :, None]], axis=2)
+            eliminated = np.linalg.solve(stiff, right)
+            reduced = matrices[:, :outer, :outer] - coupled.transpose(0, 2, 1) @ eliminated[:, :, :outer]
+            passed = coupled.transpose(0, 2, 1) @ eliminated[:, :, outer:]
+        else:
+            reduced, passed = matrices, np.zeros((n, outer, 1))
+        rows = numbers[:, :outer]
+        right_side = load[: 2 * space.n_outer] - np.bincount(rows.ravel(), passed.ravel(), 2 * space.n_outer)
+        known = solution[rows]
+        if known.any():
+            right_side -= np.bincount(rows.ravel(), (reduced @ known[:, :, None]).ravel(), 2 * space.n_outer)
+        free_outer = free[: 2 * space.n_outer]
+        order = np.cumsum(free_outer) - 1
+        keep = (free_outer[rows][:, :, None] & free_outer[rows][:, None, :]).ravel()
+        i = np.broadcast_to(rows[:, :, None], reduced.shape).ravel()[keep]
+        j = np.broadcast_to(rows[:, None, :], reduced.shape).ravel()[keep]
+        size = int(free_outer.sum())
+        if size:
+            matrix = coo_array((reduced.ravel()[keep], (order[i], order[j])), shape=(size, size)).tocsc()
+            try:
+                factor = factorize(matrix)
+            except SingularError as error:
+                raise ValueError(f"shape {self.problem.shape.name!r}: {error}; look at its supports") from error
+            found = factor.solve(right_side[free_outer])
+            found += factor.solve(right_side[free_outer] - matrix @ found)
+            solution[: 2 * space.n_outer][free_outer] = found
+        if inner.shape[1]:
+            solution[inner] = eliminated[:, :, outer] - (eliminated[:, :, :outer] @ solution[rows][:, :, None])[:, :, 0]
+        local = solution[numbers]
+        internal = (matrices @ local[:, :, None])[:, :, 0]
+        residual = np.bincount(numbers.ravel(), internal.ravel(), 2 * space.n_functions) - load
+        energy = float((local * internal).sum() / 2)
+        return solution.reshape(-1, 2), residual.reshape(-1, 2), energy
+
+    def values(self) -> dict[str, float]:
+        """Quantities of interest by name, and the energy by none."""
+        return {quantity.name: self._value(quantity) for quantity in self.problem.load.quantities} | {"": self.energy}
+
+    def _value(self, quantity: Quantity) -> float:
+        problem, space = self.problem, self.space
+        if quantity.kind == "energy":
+            return self.energy
+        if quantity.kind == "area":
+            return self._area_growth()
+        if quantity.kind == "stress":
+            place = ("xx", "yy", "xy").index(quantity.component)
+            return float(self.stresses(problem.points[quantity.of][None])[0, place])
+        axis = "xy".index(quantity.component)
+        if quantity.kind == "reaction":
+            return self._reaction(quantity.of, axis)
+        if quantity.of in space.mesh.named:
+            return float(self.field[space.mesh.named[quantity.of], axis])
+        if quantity.of in problem.points:
+            return float(self.displacements(problem.points[quantity.of][None])[0, axis])
+        return float(self._shares(quantity.of) @ self.field[:, axis])
+
+    def _reaction(self, group: str, axis: int) -> float:
+        space, problem = self.space, self.problem
+        if group in space.mesh.named:
+            return float(self.residual[space.mesh.named[group], axis])
+        corners = np.unique([ends for ends, _ in self._group_sides(group)])
+        # A corner where two supports meet has a share in both; layers make its force vanish.
+        claims = np.zeros(len(space.mesh.points))
+        for support in problem.load.supports:
+            if (support.x, support.y)[axis] is not None and support.group not in space.mesh.named:
+                claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
+        return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
+
+    def _area_growth(self) -> float:
+        """Integral of the divergence of the displacements."""
+        space = self.space
+        _, weights, _, gradients = tabulated(space.degree, 2 * space.degree)
+        jacobian, determinant = space.jacobians(gradients)
+        slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
+        # The determinant cancels: cofactors of the map, with its sense.
+        by_x = slopes[..., 0, 0] * jacobian[..., 1, 1] - slopes[..., 0, 1] * jacobian[..., 1, 0]
+        by_y = slopes[..., 1, 1] * jacobian[..., 0, 0] - slopes[..., 1, 0] * jacobian[..., 0, 1]
+        return float(((by_x + by_y) * np.sign(determinant) * weights).sum())
+
+    def scale(self, kind: str) -> float:
+        """What is largest of a kind of quantity."""
+        mesh = self.space.mesh
+        motion = float(np.abs(self.field[: len(mesh.points)]).max())
+        if kind == "displacement":
+            return motion
+        if kind == "area":
+            return motion * float(np.ptp(mesh.points, axis=0).max())
+        if kind == "reaction":
+            points = self.residual[: len(mesh.points)]
+            return float(np.abs(points[self.held[: len(mesh.points)]]).sum())
+        if kind == "stress":
+            volume = self.problem.shape.thickness * float(signed_areas(mesh.points, mesh.triangles).sum())
+            return float(np.sqrt(2 * max(self.energy, 0.0) * self.problem.stiffness.max() / volume))
+        return self.energy
+
+    def rotation_and_strain(self) -> tuple[float, float]:
+        """Rotation [rad] and strain [1] by which the solution is judged."""
+        space = self.space
+        _, weights, _, gradients = tabulated(space.degree, 4)
+        jacobian, determinant = space.jacobians(gradients)
+        slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
+        slopes = slopes @ _inverse(jacobian, determinant)
+        return most_rotation_and_strain(slopes.reshape(-1, 2, 2), (weights * np.abs(determinant)).ravel())
+
+    def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles of points, and their reference coordinates there."""
+        space = self.space
+        corners = space.mesh.points[space.corners]
+        sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        inverse = np.linalg.inv(sides)
+        heights = 1 / np.linalg.norm(np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1), axis=2)
+        found, local = np.empty(len(points), dtype=int), np.empty((len(points), 2))
+        for rows in np.array_split(np.arange(len(points)), max(1, len(points) * len(corners) // 2_000_000)):
+            shares = np.einsum("eua,pea->peu", inverse, points[rows, None] - corners[None, :, 0])
+            depth = np.concatenate([(1 - shares.sum(axis=2))[..., None], shares], axis=2) * heights
+            found[rows] = np.argmax(depth.min(axis=2), axis=1)
+            local[rows] = shares[np.arange(len(rows)), found[rows]]
+        curved = np.flatnonzero(space.curved[found])
+        for _ in range(20):
+            if not len(curved):
+                break
+            values, gradients = shape_functions(space.degree, local[curved])
+            at = space.places[space.numbers[found[curved]]]
+            off = np.einsum("pi,pic->pc", values, at) - points[curved]
+            jacobian = np.einsum("pic,pia->pca", at, gradients)
+            step = np.linalg.solve(jacobian, off[:, :, None])[:, :, 0]
+            local[curved] -= step
+            curved = curved[np.flatnonzero(np.abs(step).max(axis=1) > 1e-13)]
+        return found, local
+
+    def displacements(self, points: np.ndarray) -> np.ndarray:
+        """Displacements at points [m], shape (n, 2)."""
+        points = np.asarray(points, dtype=float)
+        result = np.empty((len(points), 2))
+        for rows in np.array_split(np.arange(len(points)), max(1, len(points) // 4000)):
+            found, local = self._located(points[rows])
+            values, _ = shape_functions(self.space.degree, local)
+            result[rows] = np.einsum("pi,pic->pc", values, self.field[self.space.numbers[found]])
+        return result
+
+    def stresses(self, points: np.ndarray) -> np.ndarray:
+        """Stresses at points [Pa], shape (n, 3)."""
+        points = np.asarray(points, dtype=float)
+        result = np.empty((len(points), 3))
+        for rows in np.array_split(np.arange(len(points)), max(1, len(points) // 4000)):
+            found, local = self._located(points[rows])
+            _, gradients = shape_functions(self.space.degree, local)
+            numbers = self.space.numbers[found]
+            jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
+            slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
+            strains = np.stack([slopes[:, 0, 0], slopes[:, 1, 1], slopes[:, 0, 1] + slopes[:, 1, 0]], axis=1)
+            result[rows] = np.einsum("pij,pj->pi", self.problem.stiffness[self.space.mesh.parts[found]], strains)
+        return result
