@@ -25,6 +25,8 @@ def tables(tree):
         of what is ``swept``; the others with ``title`` and ``note``.
     """
     root = tree.to_dataset()
+    if "status" not in root:  # a study without scenes
+        return []
     found = [_table(root.sel(selection), selection) for selection in _selections(root)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
     groups = {"finite_strain": _finite_strain, "block": _block}

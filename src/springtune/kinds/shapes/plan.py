@@ -12,7 +12,7 @@ from .described import geometry, load
 from .names import FILE
 from .outputs import SHOWING
 
-MOST_SHOWN = 4000
+MOST_SHOWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
 
 USUAL_PARTICLES = 2000.0
