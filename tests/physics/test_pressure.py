@@ -24,7 +24,7 @@ def block(definition, nu=0.5, size=2e-3, stiffness=None, mesh_type="structured",
     mesh = MESH_TYPES[mesh_type](0.2, 0.04, size)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="rubber"), 1e-3, stiffness)
     network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
-    turning = FollowerPressure(mesh, *loaded_edges(mesh, FACE)) if follower else None
+    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, FACE)) if follower else None
     return StaticProblem(network, weights(mesh, FACE), turning), FORCE / springs.reference, measured(mesh, FACE)
 
 
@@ -73,7 +73,7 @@ def test_softer_network_snaps_at_its_corners_and_keeps_the_last_good_step():
 def test_follower_pressure_has_its_derivative(seed, axis):
     mesh = MESH_TYPES["free"](0.02, 0.01, 2.5e-3)
     edges = mesh.outline_edges(1 - axis, mesh.points[:, 1 - axis].max())
-    load = FollowerPressure(mesh, edges, axis)
+    load = FollowerPressure.of_side(mesh, edges, axis)
     generator = np.random.default_rng(seed)
     here, direction = 1e-3 * generator.standard_normal((2, *mesh.points.shape))
     # Linear in the displacements: differences are exact but for rounding.
@@ -112,7 +112,7 @@ def column(definition, length, height, size, follower, mesh_type="structured"):
     mesh = MESH_TYPES[mesh_type](length, height, size)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="rubber"), 1e-3)
     network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
-    turning = FollowerPressure(mesh, *loaded_edges(mesh, FACE)) if follower else None
+    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, FACE)) if follower else None
     return StaticProblem(network, weights(mesh, FACE), turning), -1e6 * 1e-3 * length / springs.reference
 
 

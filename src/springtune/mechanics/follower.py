@@ -6,27 +6,48 @@ from ..mesh.cells import Mesh
 
 
 class FollowerPressure:
-    """A pressure that turns and grows with the edges that it acts on, of total force 1 at rest.
+    """A pressure that turns and grows with the edges that it acts on.
 
-    Each edge of vector e carries ``e`` turned by a right angle, over the length of the side, half of it on either end.
+    Each edge of vector e carries ``e`` turned to the left by a right angle, times the pressure on it, half of it on
+    either end.
 
     Parameters
     ----------
     mesh : Mesh
     edges : ndarray of int, shape (n, 2)
-        Edges of a straight side.
-    axis : int
-        Axis along the side; the force is along the other one.
+        Edges of the outline, the body to the left; of one side or of several.
+    pressure : float or ndarray of float, shape (n,)
+        Force over length on each of them, towards the body [1/m].
     """
 
-    def __init__(self, mesh: Mesh, edges: np.ndarray, axis: int) -> None:
+    def __init__(self, mesh: Mesh, edges: np.ndarray, pressure: float | np.ndarray) -> None:
+        self.edges = edges
+        self.rest = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
+        self.half = 0.5 * np.broadcast_to(pressure, len(edges))[:, None]
+        turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+        on_either = np.block([-turn, turn])
+        self.derivative = self.half[:, :, None] * np.vstack([on_either, on_either])
+
+    @classmethod
+    def of_side(cls, mesh: Mesh, edges: np.ndarray, axis: int) -> "FollowerPressure":
+        """Pressure on a straight side, of total force 1 at rest.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        edges : ndarray of int, shape (n, 2)
+            Edges of the side, either way round.
+        axis : int
+            Axis along the side; the force is along the other one.
+
+        Returns
+        -------
+        FollowerPressure
+        """
         along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
-        self.edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)
-        self.rest = mesh.points[self.edges[:, 1]] - mesh.points[self.edges[:, 0]]
-        turn = np.array([[0.0, -1.0], [1.0, 0.0]]) * (1 if axis == 0 else -1)
-        self.turn = 0.5 * turn / np.abs(along).sum()
-        half = np.block([-self.turn, self.turn])
-        self.derivative = np.broadcast_to(np.vstack([half, half]), (len(edges), 4, 4))
+        wanted = 1 if axis == 0 else -1
+        turned = np.where((wanted * along < 0)[:, None], edges[:, ::-1], edges)
+        return cls(mesh, turned, 1.0 / np.abs(along).sum())
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
         """Forces on the particles.
@@ -43,5 +64,5 @@ class FollowerPressure:
         """
         sides = self.rest + displacements[self.edges[:, 1]] - displacements[self.edges[:, 0]]
         field = np.zeros(displacements.shape)
-        np.add.at(field, self.edges, (sides @ self.turn.T)[:, None, :])
+        np.add.at(field, self.edges, (self.half * np.stack([-sides[:, 1], sides[:, 0]], axis=1))[:, None, :])
         return field

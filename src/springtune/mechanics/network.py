@@ -154,6 +154,15 @@ class Network:
             resistance += self.reduce(self._pattern.sum_cells(energy.corners, energy.forces(displacements)))
         return resistance
 
+    def forces(self, displacements: np.ndarray) -> np.ndarray:
+        """As `resistance`, of held directions, too [m], shape (n_points, 2)."""
+        total = np.zeros(self.held.shape)
+        if self.has_springs:
+            total -= self._pattern.sum_springs(self._pulls(displacements))
+        for energy in self.energies:
+            total += self._pattern.sum_cells(energy.corners, energy.forces(displacements))
+        return total
+
     def _pulls(self, displacements: np.ndarray) -> np.ndarray:
         """Force of each spring on its first end, over the reference stiffness [m], shape (n_springs, 2).
 

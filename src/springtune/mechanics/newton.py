@@ -107,6 +107,9 @@ class Balance(Protocol):
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
         """Factor of the tangent of resistance less load."""
 
+    def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
+        """Displacements with those that are prescribed."""
+
 
 class Newton:
     """Newton's method with the exact tangent, under one load.
@@ -143,7 +146,8 @@ class Newton:
         Parameters
         ----------
         start : ndarray of float, shape (n_points, 2)
-            [m]; rest takes its place where forces are not finite or cells are inside out.
+            [m]; rest takes its place where forces are not finite or cells are inside out. Displacements that are
+            prescribed are in their places.
 
         Returns
         -------
@@ -151,11 +155,15 @@ class Newton:
         """
         here = self._at(start)
         if not np.isfinite(here.residual) or self.network.inverted(start):
-            here = Iterate(np.zeros_like(start), self.s * self.problem.load, 1.0)
+            rest = np.zeros_like(start)
+            begin = self.problem.moved(self.s, rest)
+            here = Iterate(rest, self.s * self.problem.load, 1.0) if begin is rest else self._at(begin)
         self._here = self._best = here
         self._factor: Factor | None = None
         self._factorizations = self._steps = self._since_best = 0
         self._keep, self._watched = False, True
+        if not np.isfinite(here.residual):
+            return self._failed("no forces where it begins")
         while not self._balanced():
             reason = self._iterate()
             if reason:

@@ -1,7 +1,9 @@
 """Equilibria of a network under a growing load: linear, nonlinear, and the whole path of them.
 
 The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is the force over the reference stiffness
-[m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh.
+[m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh. Where
+displacements are prescribed they are ``s`` times a pattern of their own: with a pattern of forces in N, ``s = 1 / k``
+and displacements times k, forces and displacements grow together.
 """
 
 from collections.abc import Callable
@@ -56,13 +58,18 @@ class StaticProblem:
         Forces on the particles [1]; scaled by ``s``.
     follower : FollowerPressure, optional
         What the forces become as the particles move; they stay as they are without.
+    dead : ndarray of float, shape (n_points, 2), optional
+        Forces besides those of the follower, that stay as they are [1]; the pattern is both together.
+    given : ndarray of float, shape (n_points, 2), optional
+        Prescribed displacements of held directions over ``s`` [1]; zero without, and in all other directions.
 
     Attributes
     ----------
     load : ndarray of float, shape (unknowns,)
         The pattern's part on free directions [1].
     load_norm : float
-        [1]
+        What residuals are over: the norm of the load [1]; where displacements are prescribed, of the load and of the
+        forces that they take of the linear network.
 
     Examples
     --------
@@ -78,11 +85,26 @@ class StaticProblem:
     (array([0.1, 0. ]), True, (0, False))
     """
 
-    def __init__(self, network: Network, pattern: np.ndarray, follower: FollowerPressure | None = None) -> None:
+    def __init__(
+        self,
+        network: Network,
+        pattern: np.ndarray,
+        follower: FollowerPressure | None = None,
+        *,
+        dead: np.ndarray | None = None,
+        given: np.ndarray | None = None,
+    ) -> None:
         self.network = network
         self.follower = follower
+        self.given = given
         self.load = network.reduce(pattern)
         self.load_norm = float(np.linalg.norm(self.load))
+        self._dead = None if dead is None or follower is None else network.reduce(dead)
+        if given is not None:
+            # A first scale, to refine the linear solution, whose own forces are the final one.
+            self.load_norm += float(np.linalg.norm(network.linear_resistance(given)))
+            forces = np.where(network.held, network.linear_forces(self.slope), 0.0)
+            self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
 
     @property
     def rest_factor(self) -> Factor:
@@ -97,7 +119,11 @@ class StaticProblem:
             missing = self.load - self.network.linear_resistance(slope)
             return missing, norm(missing) / self.load_norm
 
-        first = self.network.expand(self.rest_factor.solve(self.load))
+        if self.given is None:
+            first = self.network.expand(self.rest_factor.solve(self.load))
+        else:
+            pull = self.load - self.network.linear_resistance(self.given)
+            first = self.given + self.network.expand(self.rest_factor.solve(pull))
         here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
         return here.displacements, here.residual, error
 
@@ -257,7 +283,8 @@ class StaticProblem:
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
-        if not self.network.energies and self.follower is None:  # the series is of springs under dead loads
+        if not self.network.energies and self.follower is None and self.given is None:
+            # The series is of springs under dead loads.
             starts.insert(0, lambda s: self.start.predict(s))
         for start in starts:
             found = self.newton(s, start(s))
@@ -299,7 +326,14 @@ class StaticProblem:
 
     def load_at(self, displacements: np.ndarray) -> np.ndarray:
         """Load pattern at displacements [m] of shape (n_points, 2), a follower's turned with them: [1], (unknowns,)."""
-        return self.load if self.follower is None else self.network.reduce(self.follower.forces(displacements))
+        if self.follower is None:
+            return self.load
+        turned = self.network.reduce(self.follower.forces(displacements))
+        return turned if self._dead is None else self._dead + turned
+
+    def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
+        """Displacements [m] with those that are prescribed at ``s`` in their places, shape (n_points, 2)."""
+        return displacements if self.given is None else np.where(self.network.held, s * self.given, displacements)
 
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
         """Factor of the tangent of resistance less load, see `Network.factorize_tangent`.
@@ -327,7 +361,7 @@ class StaticProblem:
 
         Parameters are those of `springtune.mechanics.newton.Newton`.
         """
-        return Newton(self, s, max_factorizations, keep_tangent).solve(start)
+        return Newton(self, s, max_factorizations, keep_tangent).solve(self.moved(s, start))
 
     def _in_steps(self, s: float, iterations: int) -> Equilibrium:
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""

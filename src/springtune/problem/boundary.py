@@ -1,19 +1,52 @@
-"""How a load holds and pulls a mesh."""
+"""How a load holds and pulls a mesh, and what is read from it, by its groups.
 
-from typing import TYPE_CHECKING
+A load case speaks of groups of sides and of points; here each becomes directions that are held, displacements that are
+prescribed there, forces on particles, and weights of displacements or of reactions. Beams are the special case whose
+groups are the sides of their box.
+"""
+
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from .loads import LoadKind, Side
-
-if TYPE_CHECKING:
-    from ..mesh import Mesh
+from ..mesh.cells import Mesh, signed_areas
+from ..mesh.groups import GroupedMesh
+from .loads import MIDDLE, LoadKind, Side
+from .quantities import nearest
+from .shapes import LoadCase, Quantity
 
 FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
 """Where the profile of a pressed face is given, over its length [1]."""
 
+ON_POINT = 1e-9
+"""Distance from a particle below which a point is that particle, over the extent of the mesh [1]."""
 
-def side_edges(mesh: "Mesh", side: Side) -> np.ndarray:
+OUTSIDE = 0.25
+"""How far a point may lie beyond the nearest cell, as on the arc that a straight edge cuts short, over its size [1]."""
+
+MAX_ITERATIONS = 50
+"""Newton steps that look for a point in a quadrilateral."""
+
+
+def box(mesh: Mesh, sides: Iterable[Side]) -> GroupedMesh:
+    """Groups of the mesh of a box.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of a box with its lower left corner at the origin.
+    sides : iterable of Side
+        Those that are wanted.
+
+    Returns
+    -------
+    GroupedMesh
+        Edges either way round.
+    """
+    return GroupedMesh(mesh, {side.name: side_edges(mesh, side) for side in dict.fromkeys(sides)})
+
+
+def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
     """Edges on a side of a box with its lower left corner at the origin.
 
     Parameters
@@ -28,49 +61,8 @@ def side_edges(mesh: "Mesh", side: Side) -> np.ndarray:
     return mesh.outline_edges(side.axis, side.place(*mesh.points.max(axis=0)))
 
 
-def held(mesh: "Mesh", kind: LoadKind) -> np.ndarray:
-    """Directions that a kind of load holds, see `springtune.problem.loads`.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    kind : LoadKind
-
-    Returns
-    -------
-    ndarray of bool, shape (n_points, 2)
-    """
-    directions = np.zeros(mesh.points.shape, dtype=bool)
-    for side, axes in kind.held:
-        for axis in axes:
-            directions[side_edges(mesh, side), axis] = True
-    return directions
-
-
-def weights(mesh: "Mesh", kind: LoadKind) -> np.ndarray:
-    """Weight of each particle in an even distribution over the loaded side, along the force: the pattern of a load.
-
-    Each edge of the side gives half of its share of the length to either particle.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    kind : LoadKind
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        Sum 1 along the force, zero across.
-    """
-    field = np.zeros(mesh.points.shape)
-    field[:, kind.axis] = mesh.side_shares(*loaded_edges(mesh, kind))
-    return field / field.sum()
-
-
-def loaded_edges(mesh: "Mesh", kind: LoadKind) -> tuple[np.ndarray, int]:
-    """Edges of the loaded side.
+def loaded_edges(mesh: Mesh, kind: LoadKind) -> tuple[np.ndarray, int]:
+    """Edges of the loaded side of a box.
 
     Parameters
     ----------
@@ -87,7 +79,40 @@ def loaded_edges(mesh: "Mesh", kind: LoadKind) -> tuple[np.ndarray, int]:
     return side_edges(mesh, kind.loaded), kind.along
 
 
-def measured(mesh: "Mesh", kind: LoadKind) -> np.ndarray:
+def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
+    """Directions that a kind of load holds, see `springtune.problem.loads`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of a box with its lower left corner at the origin.
+    kind : LoadKind
+
+    Returns
+    -------
+    ndarray of bool, shape (n_points, 2)
+    """
+    return supported(box(mesh, (side for side, _ in kind.held)), kind.case)[0]
+
+
+def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
+    """Weight of each particle in an even distribution over the loaded side, along the force: the pattern of a load.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of a box with its lower left corner at the origin.
+    kind : LoadKind
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+        Sum 1 along the force, zero across.
+    """
+    return even(box(mesh, [kind.loaded]), kind.loaded.name, kind.axis)
+
+
+def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Weights of the displacements that make the displacement of a load.
 
     Parameters
@@ -104,11 +129,453 @@ def measured(mesh: "Mesh", kind: LoadKind) -> np.ndarray:
     """
     if not kind.pressed:
         return weights(mesh, kind)
-    edges, along = loaded_edges(mesh, kind)
-    ends = mesh.points[edges, along]
-    middle = 0.5 * (mesh.points[:, along].min() + mesh.points[:, along].max())
-    found = int(np.argmax((ends.min(axis=1) <= middle) & (middle <= ends.max(axis=1))))
-    share = (middle - ends[found, 0]) / (ends[found, 1] - ends[found, 0])
-    field = np.zeros(mesh.points.shape)
-    field[edges[found], kind.axis] = 1 - share, share
+    middle = np.zeros(2)
+    middle[kind.normal] = kind.loaded.place(*mesh.points.max(axis=0))
+    middle[kind.along] = 0.5 * (mesh.points[:, kind.along].min() + mesh.points[:, kind.along].max())
+    return displacement_weights(GroupedMesh(mesh, points={MIDDLE: middle}), kind.case.quantities[0])
+
+
+def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
+    """Directions that a load case holds, and by how much they are moved.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    case : LoadCase
+
+    Returns
+    -------
+    held : ndarray of bool, shape (n_points, 2)
+    given : ndarray of float, shape (n_points, 2)
+        Prescribed displacements [m]; zero in all other directions.
+
+    Raises
+    ------
+    ValueError
+        If a group is not there, or two supports want different displacements of one particle.
+    """
+    points = grouped.mesh.points
+    held, given = np.zeros(points.shape, dtype=bool), np.zeros(points.shape)
+    for support in case.supports:
+        particles = particles_of(grouped, support.group)
+        for axis, value in enumerate((support.x, support.y)):
+            if value is None:
+                continue
+            clash = held[particles, axis] & (given[particles, axis] != value)
+            if clash.any():
+                particle = particles[np.argmax(clash)]
+                shown = f"{1e3 * points[particle, 0]:.6g}, {1e3 * points[particle, 1]:.6g}"
+                raise ValueError(
+                    f"load {case.name!r}: support of {support.group!r} moves the particle at ({shown}) mm by "
+                    f"{value:g} m along {'xy'[axis]}, and another one by {given[particle, axis]:g} m; let one of the "
+                    "two end before it, or prescribe the same displacement"
+                )
+            held[particles, axis] = True
+            given[particles, axis] = value
+    return held, given
+
+
+def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
+    """Weights of an even distribution over a group, by length: each edge gives half of its share to either particle.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    group : str
+        Sides; or a point, which has all of it.
+    axis : int
+        Direction: 0 for x, 1 for y.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+        Sum 1 along the direction, zero across.
+
+    Raises
+    ------
+    ValueError
+        If the group is not there.
+    """
+    mesh, field = grouped.mesh, np.zeros(grouped.mesh.points.shape)
+    if group not in grouped.sides:
+        field[particles_of(grouped, group), axis] = 1.0
+        return field
+    edges = grouped.sides[group]
+    apart = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
+    halves = 0.5 * np.sqrt(apart[:, 0] ** 2 + apart[:, 1] ** 2)
+    np.add.at(field[:, axis], edges, halves[:, None])
+    return field / field.sum()
+
+
+def forces(
+    grouped: GroupedMesh,
+    case: LoadCase,
+    thickness: float = 1.0,
+    densities: Mapping[str, float | None] | None = None,
+    followers: bool = True,
+) -> np.ndarray:
+    """Forces of a load case on the particles, at rest.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    case : LoadCase
+    thickness : float, optional
+        Of the sheet [m].
+    densities : mapping of str to float, optional
+        Density of each part [kg/m3], of the main one at ``""``; for gravity.
+    followers : bool, optional
+        Whether pressures that follow their sides count.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+        [N]
+
+    Raises
+    ------
+    ValueError
+        If a group is not there, or a part has no density under gravity.
+    """
+    field = np.zeros(grouped.mesh.points.shape)
+    for traction in case.tractions:
+        for axis, force in enumerate(traction.force):
+            if force:
+                field += force * even(grouped, traction.group, axis)
+    for pressure in case.pressures:
+        if followers or not pressure.follower:
+            edges = sides_of(grouped, pressure.group)
+            apart = grouped.mesh.points[edges[:, 1]] - grouped.mesh.points[edges[:, 0]]
+            half = 0.5 * pressure.pressure * thickness * np.stack([-apart[:, 1], apart[:, 0]], axis=1)
+            np.add.at(field, edges, half[:, None, :])
+    if any(case.gravity):
+        field += particle_masses(grouped, thickness, densities or {})[:, None] * case.gravity
     return field
+
+
+def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Edges whose pressure follows them, and that pressure.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    case : LoadCase
+    thickness : float, optional
+        Of the sheet [m].
+
+    Returns
+    -------
+    edges : ndarray of int, shape (n, 2)
+        The body to the left.
+    pressure : ndarray of float, shape (n,)
+        Force over length, towards the body [N/m].
+    """
+    found = [(sides_of(grouped, one.group), one.pressure * thickness) for one in case.pressures if one.follower]
+    edges = [np.zeros((0, 2), dtype=np.int64), *(edges for edges, _ in found)]
+    return np.concatenate(edges), np.concatenate(
+        [np.full(len(edges), value) for edges, value in [(edges[0], 0.0), *found]]
+    )
+
+
+def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
+    """Lumped mass of each particle: a cell gives the same part of its own to each of its corners.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    thickness : float
+        Of the sheet [m].
+    densities : mapping of str to float
+        Density of each part [kg/m3], of the main one at ``""``.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points,)
+        [kg]
+
+    Raises
+    ------
+    ValueError
+        If a part has no density.
+    """
+    points, labels = grouped.mesh.points, part_names(grouped)
+    masses = np.zeros(len(points))
+    for count, corners in grouped.mesh.cells.items():
+        names, which = np.unique(labels[count], return_inverse=True)
+        for name in names:
+            if densities.get(str(name)) is None:
+                said = f"part {str(name)!r}" if name else "the body"
+                raise ValueError(f"density: the material of {said} has none; give one such as '7850 kg/m^3'")
+        density = np.array([densities[str(name)] for name in names], dtype=float)[which]
+        areas = signed_areas(points, corners)
+        np.add.at(masses, corners, (density * thickness * areas / count)[:, None])
+    return masses
+
+
+def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
+    """Part of each cell, by number of corners: ``""`` where it is in none.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+
+    Returns
+    -------
+    dict of int to ndarray of str, shape (n_cells,)
+    """
+    found = {}
+    for count, corners in grouped.mesh.cells.items():
+        found[count] = np.full(len(corners), "", dtype=object)
+        for name, cells in grouped.parts.items():
+            if count in cells:
+                found[count][cells[count]] = name
+    return found
+
+
+def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray:
+    """Weights of the displacements that make a quantity: the mean one of sides, or that of a point.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    quantity : Quantity
+        Of kind ``"displacement"``.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+        Sum 1.
+
+    Raises
+    ------
+    ValueError
+        If the group is not there, or the point not in the mesh.
+    """
+    axis = "xy".index(quantity.component)
+    if quantity.of in grouped.sides:
+        return even(grouped, quantity.of, axis)
+    particles, shares = interpolation(grouped, quantity.of)
+    field = np.zeros(grouped.mesh.points.shape)
+    field[particles, axis] = shares
+    return field
+
+
+def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -> np.ndarray:
+    """Weights of the support's forces on the particles that make a reaction.
+
+    Where two groups hold a particle in the same direction, its force belongs to each by its share in their lengths.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    case : LoadCase
+    quantity : Quantity
+        Of kind ``"reaction"``.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 2)
+
+    Raises
+    ------
+    ValueError
+        If no support holds the group along the component.
+    """
+    axis = "xy".index(quantity.component)
+    holding = [one for one in case.supports if (one.x, one.y)[axis] is not None]
+    if quantity.of not in [one.group for one in holding]:
+        known = ", ".join(dict.fromkeys(one.group for one in holding)) or "none"
+        raise ValueError(
+            f"load {case.name!r}: quantity {quantity.name!r} is the reaction of {quantity.of!r} along "
+            f"{quantity.component}, and no support holds it so; held along {quantity.component}: {known}"
+        )
+    shares = {group: _lengths(grouped, group) for group in dict.fromkeys(one.group for one in holding)}
+    total, field = sum(shares.values()), np.zeros(grouped.mesh.points.shape)
+    own = shares[quantity.of]
+    np.divide(own, total, out=field[:, axis], where=own > 0)
+    return field
+
+
+def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
+    """Length of a group at each particle [m]; of a point more than any, since what holds it there is the point's."""
+    field = np.zeros(len(grouped.mesh.points))
+    if group not in grouped.sides:
+        field[particles_of(grouped, group)] = np.ptp(grouped.mesh.points, axis=0).max() / ON_POINT
+        return field
+    edges = grouped.sides[group]
+    apart = grouped.mesh.points[edges[:, 1]] - grouped.mesh.points[edges[:, 0]]
+    np.add.at(field, edges, 0.5 * np.hypot(*apart.T)[:, None])
+    return field
+
+
+def sides_of(grouped: GroupedMesh, group: str) -> np.ndarray:
+    """Edges of a group.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    group : str
+
+    Returns
+    -------
+    ndarray of int, shape (n, 2)
+
+    Raises
+    ------
+    ValueError
+        If there is no such group of sides.
+    """
+    if group not in grouped.sides:
+        raise ValueError(f"group: {group!r} is no group of sides; {nearest(group, grouped.sides)}")
+    return grouped.sides[group]
+
+
+def particles_of(grouped: GroupedMesh, group: str) -> np.ndarray:
+    """Particles of a group of sides, some of them twice, or of a point.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    group : str
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+
+    Raises
+    ------
+    ValueError
+        If there is no such group, or no particle at its point.
+    """
+    if group in grouped.sides:
+        return grouped.sides[group].ravel()
+    point = _point(grouped, group)
+    found = _particle_at(grouped.mesh, point)
+    if found is None:
+        raise ValueError(
+            f"point: {group!r} at {_shown(point)} is no particle of the mesh, and what is held or pulled has to be "
+            "one; make the mesh with it, or name a corner"
+        )
+    return np.array([found])
+
+
+def _point(grouped: GroupedMesh, name: str) -> np.ndarray:
+    if name not in grouped.points:
+        raise ValueError(f"group: {name!r} is unknown; {nearest(name, [*grouped.sides, *grouped.points])}")
+    return np.asarray(grouped.points[name], dtype=float)
+
+
+def _shown(point: np.ndarray) -> str:
+    return f"({1e3 * point[0]:.6g}, {1e3 * point[1]:.6g}) mm"
+
+
+def _particle_at(mesh: Mesh, point: np.ndarray) -> int | None:
+    """Particle at a point, None where there is none."""
+    apart = ((mesh.points - point) ** 2).sum(axis=1)
+    found = int(np.argmin(apart))
+    return found if apart[found] <= (ON_POINT * np.ptp(mesh.points, axis=0).max()) ** 2 else None
+
+
+def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Weights that interpolate a field at a named point: along the edge of the outline, or in the cell, that has it.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    name : str
+
+    Returns
+    -------
+    particles : ndarray of int, shape (n,)
+    weights : ndarray of float, shape (n,)
+        Sum 1; exact at particles. Linear in triangles, bilinear in quadrilaterals.
+
+    Raises
+    ------
+    ValueError
+        If there is no such point, or it is not in the mesh.
+    """
+    mesh, point = grouped.mesh, _point(grouped, name)
+    outline = mesh.edges[mesh.on_outline]
+    edge = _edge_at(mesh.points[outline], point, ON_POINT * np.ptp(mesh.points, axis=0).max())
+    if edge is not None:
+        along, share = edge
+        return outline[along], np.array([1 - share, share])
+    particle = _particle_at(mesh, point)
+    if particle is not None:
+        return np.array([particle]), np.ones(1)
+    count, cell, shares = cell_at(grouped, name)
+    return mesh.cells[count][cell], shares
+
+
+def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
+    """Cell that a named point is in, or next to where a straight edge cuts off the arc that it is on.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    name : str
+
+    Returns
+    -------
+    corners, cell : int
+        Number of corners, and place among the cells of so many.
+    weights : ndarray of float, shape (corners,)
+        Those of the corners, by interpolation.
+
+    Raises
+    ------
+    ValueError
+        If there is no such point, or it is not in the mesh.
+    """
+    mesh, point = grouped.mesh, _point(grouped, name)
+    slack, found = ON_POINT * np.ptp(mesh.points, axis=0).max(), None
+    best = -OUTSIDE
+    for count, corners in mesh.cells.items():
+        here = mesh.points[corners] - point
+        # What has it is among the cells whose boxes are near.
+        low, high = here.min(axis=1), here.max(axis=1)
+        room = OUTSIDE * (high - low).max(axis=1, keepdims=True) + slack
+        for cell in np.flatnonzero(((low <= room) & (high >= -room)).all(axis=1)):
+            shares = _shares(here[cell])
+            if shares is not None and shares.min() > best:
+                best, found = float(shares.min()), (count, int(cell), shares)
+    if found is None:
+        raise ValueError(f"point: {name!r} at {_shown(point)} is outside of the mesh; move it, or correct its unit")
+    return found
+
+
+def _edge_at(ends: np.ndarray, point: np.ndarray, tolerance: float) -> tuple[int, float] | None:
+    """First edge that a point lies on, and how far along it; None where there is none."""
+    (x, y), (dx, dy) = (point - ends[:, 0]).T, (ends[:, 1] - ends[:, 0]).T
+    squares = dx**2 + dy**2
+    away, along = np.abs(x * dy - y * dx) / np.sqrt(squares), (x * dx + y * dy) / squares
+    met = (away <= tolerance) & (along >= 0) & (along <= 1)
+    if not met.any():
+        return None
+    found = int(np.argmax(met))
+    axis = int(np.argmax(np.abs(ends[found, 1] - ends[found, 0])))
+    first, last = ends[found, :, axis]
+    return found, float((point[axis] - first) / (last - first))
+
+
+def _shares(corners: np.ndarray) -> np.ndarray | None:
+    """Weights of the corners of a cell, relative to a point, that interpolate there; None where they are not found."""
+    if len(corners) == 3:
+        after, before = corners[[1, 2, 0]], corners[[2, 0, 1]]
+        opposite = after[:, 0] * before[:, 1] - after[:, 1] * before[:, 0]
+        return opposite / opposite.sum()
+    place = np.full(2, 0.5)
+    for _ in range(MAX_ITERATIONS):
+        (a, b), (c, d) = 1 - place, place
+        shares = np.array([a * b, c * b, c * d, a * d])
+        slopes = np.array([[-b, b, d, -d], [-a, -c, c, a]]) @ corners
+        try:
+            step = np.linalg.solve(slopes.T, -shares @ corners)
+        except np.linalg.LinAlgError:
+            return None
+        place = place + step
+        if np.abs(step).max() < 1e-15:
+            break
+    (a, b), (c, d) = 1 - place, place
+    return np.array([a * b, c * b, c * d, a * d]) if np.isfinite(place).all() else None

@@ -22,8 +22,13 @@ A new load is a row of `LOADS`, and a `LoadKind` where none of those here has it
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from .geometry import Beam
+from .shapes import LoadCase, Quantity, Support, Traction
+
+MIDDLE = "middle"
+"""Name of the middle of a pressed side, as a group."""
 
 
 @dataclass(frozen=True, order=True)
@@ -45,6 +50,11 @@ class Side:
     def opposite(self) -> "Side":
         """The side across the rectangle."""
         return Side(self.axis, not self.far)
+
+    @property
+    def name(self) -> str:
+        """Its name as a group."""
+        return (("left", "right"), ("bottom", "top"))[self.axis][self.far]
 
     def place(self, length: float, height: float) -> float:
         """Coordinate along `axis` of the side of a rectangle, in the unit of its length and height."""
@@ -142,6 +152,17 @@ class LoadKind:
     def half_held(self) -> tuple[tuple[Side, tuple[int, ...]], ...]:
         """Supports of the half model, as `held`: on the axis of symmetry nothing moves across the force."""
         return (*((side, axes) for side, axes in self.held if side != self.cut), (self.cut, (1 - self.axis,)))
+
+    @cached_property
+    def case(self) -> LoadCase:
+        """The kind as any load of a shape, whose groups are the sides of the rectangle; its force is 1 N."""
+        supports = (
+            Support(side.name, *(0.0 if axis in axes else None for axis in range(2))) for side, axes in self.held
+        )
+        force = (1.0, 0.0) if self.axis == 0 else (0.0, 1.0)
+        where = MIDDLE if self.pressed else self.loaded.name
+        quantity = Quantity("displacement", "displacement", where, "xy"[self.axis])
+        return LoadCase(self.name, tuple(supports), (Traction(self.loaded.name, force),), quantities=(quantity,))
 
     def side_length(self, beam: Beam) -> float:
         """Length of the loaded side [m]."""

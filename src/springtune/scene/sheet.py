@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
+from ..mesh.groups import GroupedMesh
 from ..problem.boundary import held, loaded_edges, measured, weights
 from ..problem.loads import LoadKind
 from ..problem.materials import Material
@@ -160,6 +161,34 @@ def named(definition: Definition | OwnDefinition) -> Iterator[None]:
         raise DefinitionError(f"definition {definition.name!r}: {error}") from None
 
 
+@dataclass(frozen=True, eq=False)
+class Loading:
+    """What a load does to the particles of a mesh.
+
+    Attributes
+    ----------
+    key : tuple
+        What tells it from others on the mesh.
+    held : ndarray of bool, shape (n_points, 2)
+        Directions that cannot move, or move as they are told.
+    pattern : ndarray of float, shape (n_points, 2)
+        Forces at rest for a factor of 1 [N].
+    given : ndarray of float, shape (n_points, 2), or None
+        Prescribed displacements for a factor of 1 [m]; None where there are none.
+    follower : FollowerPressure or None
+        Forces that turn with their sides for a factor of 1 [N].
+    dead : ndarray of float, shape (n_points, 2), or None
+        The pattern without those; None where they are all of it, or none.
+    """
+
+    key: tuple[object, ...]
+    held: np.ndarray
+    pattern: np.ndarray
+    given: np.ndarray | None = None
+    follower: FollowerPressure | None = None
+    dead: np.ndarray | None = None
+
+
 @dataclass(frozen=True)
 class Solution:
     """An equilibrium of a network, judged.
@@ -176,7 +205,7 @@ class Solution:
     negative_pivots : int or float
         Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
     displacement : float
-        Of the load [m]; NaN where there is no equilibrium.
+        Of the load [m], or the first quantity of a load case; NaN where there is no equilibrium.
     """
 
     problem: StaticProblem
@@ -186,6 +215,31 @@ class Solution:
     message: str
     negative_pivots: float
     displacement: float
+
+
+def solved(
+    problem: StaticProblem, load: float, kinematics: str, displacement: Callable[[np.ndarray], float]
+) -> Solution:
+    """Equilibrium of a problem, judged.
+
+    Parameters
+    ----------
+    problem : StaticProblem
+    load : float
+        Force over the reference stiffness [m].
+    kinematics : str
+        ``"linear"`` or ``"nonlinear"``.
+    displacement : callable
+        What is read from displacements of the particles [m], shape (n_points, 2).
+
+    Returns
+    -------
+    Solution
+    """
+    found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
+    status, message, pivots = problem.judge(load, found)
+    value = displacement(found.displacements) if found.converged else np.nan
+    return Solution(problem, load, found, status, message, pivots, value)
 
 
 class Sheet:
@@ -211,6 +265,8 @@ class Sheet:
         displacements that make its displacement; each computed once.
     deriving : float
         Seconds that deriving springs has taken so far.
+    references : dict
+        Those of load cases of a shape that have been solved.
 
     Examples
     --------
@@ -228,11 +284,12 @@ class Sheet:
         self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
+        self.references: dict[tuple[object, ...], Any] = {}
         self._most = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
         shared = like is not None and mesh.shares_cells(like.mesh)
         self._patterns: dict[bytes, Network] = dict(like._patterns) if like is not None and shared else {}
-        self._networks: dict[bytes, tuple[Network, dict[tuple[LoadKind, float, bool], StaticProblem]]] = {}
+        self._networks: dict[bytes, tuple[Network, dict[tuple[object, ...], StaticProblem]]] = {}
 
     def derive(
         self,
@@ -273,9 +330,58 @@ class Sheet:
             key += case[:2] if case else ()
         elif definition.needs == "stiffness" and stiffness is None:
             raise DefinitionError("needs a uniform stiffness, and there is none; give one in N/m")
+        return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))
+
+    def derive_on_shape(
+        self,
+        definition: Definition | OwnDefinition,
+        materials: Mapping[str, Material],
+        grouped: GroupedMesh,
+        stiffness: float | None = None,
+        cases: list[Case] | None = None,
+        case_key: tuple[object, ...] = (),
+    ) -> tuple[Springs, float]:
+        """As `derive`, of a body of any outline and of one material or more.
+
+        Parameters
+        ----------
+        definition : Definition
+        materials : mapping of str to Material
+            By part, the main one at ``""``.
+        grouped : GroupedMesh
+            Of this mesh.
+        stiffness : float, optional
+            Uniform stiffness [N/m], for definitions that are told one.
+        cases : list of Case, optional
+            For definitions that are told cases.
+        case_key : tuple, optional
+            What tells these from others on the mesh.
+
+        Returns
+        -------
+        springs : Springs
+        seconds : float
+            That deriving them took, now or before.
+
+        Raises
+        ------
+        DefinitionError
+            If the definition cannot live on the mesh or with a material, or is not told what it needs.
+        """
+        given = cases if definition.needs == "cases" else stiffness
+        key = definition, tuple(materials.items()), stiffness, case_key if definition.needs == "cases" else ()
+        if len(materials) == 1:
+            (material,) = materials.values()
+            return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))
+        from ..springs.parts import derive_by_parts  # here: most bodies are of one material
+
+        return self._once(key, lambda: derive_by_parts(definition, grouped, materials, self.thickness, given))
+
+    def _once(self, key: tuple[object, ...], make: Callable[[], Springs]) -> tuple[Springs, float]:
+        """Springs, and the seconds that deriving them took: the last ones are kept."""
         if self._derived is None or self._derived[0] != key:
             begin = time.perf_counter()
-            springs = definition.springs(self.mesh, material, self.thickness, given)
+            springs = make()
             seconds = time.perf_counter() - begin
             self.deriving += seconds
             self._derived = key, springs, seconds
@@ -303,7 +409,7 @@ class Sheet:
 
     def _known(
         self, directions: np.ndarray, springs: Springs
-    ) -> tuple[Network, dict[tuple[LoadKind, float, bool], StaticProblem]]:
+    ) -> tuple[Network, dict[tuple[object, ...], StaticProblem]]:
         """Network, and its problems so far."""
         parts = [directions, springs.relative, *(energy.key for energy in springs.energies)]
         name = hashlib.sha256(b"".join(bytes(memoryview(part).cast("B")) for part in parts)).digest()
@@ -343,8 +449,27 @@ class Sheet:
         network, problems = self._known(self.held(kind), springs)
         label = (kind, springs.lateral, follower)
         if label not in problems:
-            turning = FollowerPressure(self.mesh, *loaded_edges(self.mesh, kind)) if follower else None
+            turning = FollowerPressure.of_side(self.mesh, *loaded_edges(self.mesh, kind)) if follower else None
             problems[label] = StaticProblem(network, self.pattern(kind, springs), turning)
+        return problems[label]
+
+    def stated(self, loading: Loading, springs: Springs) -> StaticProblem:
+        """Static problem of springs under any loading; at ``s = 1 / springs.reference`` it is the whole load.
+
+        Parameters
+        ----------
+        loading : Loading
+        springs : Springs
+
+        Returns
+        -------
+        StaticProblem
+        """
+        network, problems = self._known(loading.held, springs)
+        label = loading.key, None if loading.given is None else springs.reference
+        if label not in problems:
+            given = None if loading.given is None else springs.reference * loading.given
+            problems[label] = StaticProblem(network, loading.pattern, loading.follower, dead=loading.dead, given=given)
         return problems[label]
 
     def solve(
@@ -367,11 +492,8 @@ class Sheet:
         -------
         Solution
         """
-        problem, load = self.problem(kind, springs, follower), force / springs.reference
-        found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
-        status, message, pivots = problem.judge(load, found)
-        displacement = self.displacement(kind, found.displacements) if found.converged else np.nan
-        return Solution(problem, load, found, status, message, pivots, displacement)
+        problem = self.problem(kind, springs, follower)
+        return solved(problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved))
 
     def displacement(self, kind: LoadKind, displacements: np.ndarray) -> float:
         """Displacement of a load [m] from those of the particles [m], shape (n_points, 2)."""

@@ -1,8 +1,9 @@
 """One scene: a meshed beam of springs under a load, its equilibrium, and the finite-element answer beside it."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +14,18 @@ from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
+from ..mesh.groups import GroupedMesh
 from ..problem.compare import deformation_error
 from ..problem.geometry import Beam
-from ..problem.loads import KINEMATICS, LOADS, LoadKind
+from ..problem.loads import KINEMATICS
 from ..problem.materials import Material
 from ..problem.quantities import positive
+from ..problem.shapes import Shape
 from ..problem.status import Status
 from ..springs import Springs
-from .meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
-from .sheet import AnyDefinition, Sheet, check_stiffness, chosen, definition_of, named
+from .meshes import is_a
+from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
+from .statements import BeamStatement, ShapeStatement, Statement
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,24 +36,29 @@ if TYPE_CHECKING:
 
 
 class Scene:
-    """A boundary-value problem: a beam, meshed by springs of a definition, under a load.
+    """A boundary-value problem: a beam or a shape, meshed by springs of a definition, under a load.
 
     Parameters
     ----------
-    beam : Beam
-    mesh : Mesh
-        That fills the beam, see `springtune.make_mesh` and `springtune.read_mesh`.
-    material : Material
+    beam : Beam or Shape
+        The body.
+    mesh : Mesh or GroupedMesh
+        That fills the beam, see `springtune.make_mesh` and `springtune.read_mesh`; of a shape with its groups.
+    material : Material or mapping of str to Material
+        Of a shape of several parts by their names, the main one at ``""``.
     load : str
-        Key of `springtune.LOADS`: what is held, and where the force acts.
-    force : float or str
-        Size of the force [N], above zero, or a text with its unit; its direction is the load's.
+        Key of `springtune.LOADS`: what is held, and where the force acts; of a shape key of its own ``loads``.
+    force : float or str, optional
+        Size of the force on a beam [N], above zero, or a text with its unit; its direction is the load's. The loads of
+        a shape have their own sizes.
     definition : str, Definition or callable, optional
         Key of `springtune.DEFINITIONS`, or a function (mesh, material, thickness) -> `springtune.Springs`.
     kinematics : str, optional
         ``"nonlinear"``: springs keep their length law; or ``"linear"``.
     stiffness : float or str, optional
         Uniform stiffness [N/m], or a text with its unit, for definitions that are told one.
+    scale : float, optional
+        Factor on all that the load case of a shape prescribes, forces and displacements [1].
     sheet : Sheet, optional
         Of another scene of the same mesh and thickness: what the two have in common is then computed once.
 
@@ -57,14 +66,19 @@ class Scene:
     ----------
     sheet : Sheet
         What scenes of the same mesh and thickness can share.
-    force : float
-        With the sign that its load gives it [N].
     definition : Definition
     uniform_stiffness : float or None
         The stiffness that was given [N/m].
+    force : float
+        Of a beam, with the sign that its load gives it [N].
     kind : LoadKind
+        Of a beam's load.
     follower : bool
-        Whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
+        Of a beam: whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
+    grouped : GroupedMesh
+        Of a shape.
+    case : LoadCase
+        Of a shape, with `scale` in it.
 
     Raises
     ------
@@ -100,54 +114,55 @@ class Scene:
 
     def __init__(
         self,
-        beam: Beam,
-        mesh: Mesh,
-        material: Material,
+        beam: Beam | Shape,
+        mesh: Mesh | GroupedMesh,
+        material: Material | Mapping[str, Material],
         load: str,
-        force: float | str,
+        force: float | str | None = None,
         *,
         definition: AnyDefinition = "patch",
         kinematics: str = "nonlinear",
         stiffness: float | str | None = None,
+        scale: float = 1.0,
         sheet: Sheet | None = None,
     ) -> None:
-        is_a(beam, Beam, "beam", A_BEAM)
-        is_a(mesh, Mesh, "mesh", A_MESH)
-        is_a(material, Material, "material", A_MATERIAL)
-        check_filled(mesh, beam)
-        about = chosen(LOADS, load, "load")
-        self.beam, self.mesh, self.material = beam, mesh, material
-        self.load, self.kind = load, about.kind
-        self.force = about.sign * positive(force, "force", "force")
-        self.definition = definition_of(definition)
-        if self.definition.uniaxial and not self.kind.uniaxial:
-            raise ValueError(
-                f"definition: {self.definition.name!r} is not for {load!r}; take it for traction or compression"
-            )
         if kinematics not in KINEMATICS:
             raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
-        self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
+        self.kinematics, self.load = kinematics, load
+        self._stated: Statement
+        if isinstance(beam, Shape):
+            if force is not None:
+                raise ValueError(f"force: {force!r} is not used, since loads of a shape have their sizes; give scale")
+            about = self._stated = ShapeStatement(beam, mesh, material, load, scale, kinematics)
+            self.shape, self.grouped, self.case, self.materials = beam, about.grouped, about.case, about.materials
+        else:
+            if scale != 1:
+                raise ValueError(f"scale: {scale!r} is of loads of shapes alone; give another force")
+            of_beam = self._stated = BeamStatement(beam, mesh, material, load, force, kinematics)
+            self.beam, self.material, self.kind = beam, of_beam.material, of_beam.kind
+            self.force, self.follower = of_beam.force, of_beam.follower
+        self.mesh = self._stated.mesh
+        self.definition = definition_of(definition)
+        self._stated.check(self.definition)
         self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
         check_stiffness(self.definition, stiffness)
         if sheet is not None:
             is_a(sheet, Sheet, "sheet", "that of another scene")
-        self.sheet = Sheet(mesh, beam.thickness) if sheet is None else sheet
-        if self.sheet.mesh is not mesh or self.sheet.thickness != beam.thickness:
+        thickness = self._stated.thickness
+        self.sheet = Sheet(self.mesh, thickness) if sheet is None else sheet
+        if self.sheet.mesh is not self.mesh or self.sheet.thickness != thickness:
             raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
 
     def __repr__(self) -> str:
         return (
-            f"Scene({self.beam.label}, {len(self.mesh.points)} particles, {self.material.name}, {self.load} of "
-            f"{abs(self.force):g} N, {self.definition.name}, {self.kinematics})"
+            f"Scene({self._stated.body}, {len(self.mesh.points)} particles, {self._stated.named_materials}, "
+            f"{self._stated.label}, {self.definition.name}, {self.kinematics})"
         )
 
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
-        case = None
-        if self.definition.needs == "cases":
-            case = self.kind, self.force, _reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
         with named(self.definition):
-            return self.sheet.derive(self.definition, self.material, self.uniform_stiffness, case)
+            return self._stated.springs(self.sheet, self.definition, self.uniform_stiffness)
 
     @cached_property
     def springs(self) -> "SceneSprings":
@@ -165,14 +180,78 @@ class Scene:
         return SceneSprings(**{part.name: getattr(springs, part.name) for part in fields(Springs)}, scene=self)
 
     @property
+    def title(self) -> str:
+        """Load in words.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN").title
+        'traction of 400000 N'
+        """
+        return self._stated.label
+
+    def displacement_of(self, displacements: np.ndarray) -> float:
+        """Displacement of the load, of a shape the first one that its load case asks for.
+
+        Parameters
+        ----------
+        displacements : ndarray of float, shape (n_points, 2)
+            Of the particles [m].
+
+        Returns
+        -------
+        float
+            [m]; NaN where the load case asks for none.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
+        >>> scene.displacement_of(0.01 * scene.mesh.points).__round__(12)
+        0.002
+        """
+        return self._stated.displacement(self.sheet, displacements)
+
+    @property
+    def held(self) -> np.ndarray:
+        """Directions of the particles that are held, shape (n_points, 2).
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
+        >>> scene.held.sum().item()
+        20
+        """
+        return self._stated.held(self.sheet)
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Forces of the load on the particles at rest [N], shape (n_points, 2).
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
+        >>> scene.forces.sum(axis=0).round(6).tolist()
+        [400000.0, 0.0]
+        """
+        return self._stated.forces(self.sheet, self.springs)
+
+    @property
     def network(self) -> Network:
         """Network of the springs, held as the load holds them; everything over the reference stiffness."""
-        return self.sheet.network(self.sheet.held(self.kind), self.springs)
+        return self.sheet.network(self.held, self.springs)
 
     @property
     def problem(self) -> StaticProblem:
         """Network under the pattern of the load."""
-        return self.sheet.problem(self.kind, self.springs, self.follower)
+        return self._stated.problem(self.sheet, self.springs)
 
     def solve(self) -> "Result":
         """Equilibrium under the force.
@@ -203,12 +282,13 @@ class Scene:
             springs, derived = self._derived
         except SingularError as error:  # of the patch test that scales springs
             seconds = time.perf_counter() - begin
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, 0.0, seconds)
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, 0.0, seconds, self._stated.none())
         begin = time.perf_counter()
         try:
-            solution = self.sheet.solve(self.kind, springs, self.force, self.kinematics, self.follower)
+            solution = self._stated.solve(self.sheet, springs)
         except SingularError as error:
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, time.perf_counter() - begin, derived)
+            seconds = time.perf_counter() - begin
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, seconds, derived, self._stated.none())
         return Result(
             self,
             solution.equilibrium,
@@ -218,6 +298,7 @@ class Scene:
             solution.displacement,
             time.perf_counter() - begin,
             derived,
+            self._stated.values(self.sheet, springs, solution),
         )
 
     def reference(self) -> "ReferenceSolution":
@@ -246,7 +327,30 @@ class Scene:
         >>> print(f"{1e3 * reference.displacement:.2f} mm; F L / (E A) = {1e3 * 400e3 * 0.2 / (210e9 * 4e-5):.2f} mm")
         9.50 mm; F L / (E A) = 9.52 mm
         """
-        return _reference(self.beam, self.material, self.kind, self.force)
+        return self._stated.reference(self.sheet)
+
+    def reference_values(self) -> dict[str, float]:
+        """Quantities of interest of the reference by name.
+
+        Returns
+        -------
+        dict of str to float
+            In SI units.
+
+        Raises
+        ------
+        ReferenceNotConvergedError
+            If its error estimate stays above the tolerance.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN")
+        >>> {name: f"{1e3 * value:.2f} mm" for name, value in scene.reference_values().items()}
+        {'displacement': '9.50 mm'}
+        """
+        return self._stated.reference_values(self.sheet)
 
     @property
     def objection(self) -> str:
@@ -273,7 +377,7 @@ class Scene:
         Raises
         ------
         ValueError
-            If the material has no density.
+            If the material has no density, or the load prescribes displacements.
 
         Notes
         -----
@@ -288,13 +392,19 @@ class Scene:
         >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
         622 ns
         """
-        if self.material.density is None:
-            name = self.material.name
+        inertia = self._stated.masses()
+        if inertia is None:
+            name = self._stated.named_materials
             raise ValueError(f"density: material {name!r} has none; give a density such as '7850 kg/m^3'")
-        from .motion import motion_of
+        if self.problem.given is not None:
+            raise ValueError(
+                f"load: {self.load!r} prescribes displacements, and a motion is under forces; take another load"
+            )
+        from ..mechanics.dynamics import Motion
 
         options = {"linear": self.kinematics == "linear"} | options
-        return motion_of(self.sheet, self.kind, self.springs, self.material.density, self.force, **options)
+        reference = self.springs.reference
+        return Motion(self.network, inertia / reference, **({"load": self.forces / reference} | options))
 
     def write_motion(
         self,
@@ -360,7 +470,13 @@ class Scene:
         Returns
         -------
         float
-            [N]; NaN where there is none up to a hundred times the scene's force, or none that could be proved.
+            [N], of a shape the factor on its load [1]; NaN where there is none up to a hundred times the scene's force,
+            or none that could be proved.
+
+        Raises
+        ------
+        ValueError
+            If the load prescribes displacements.
 
         Notes
         -----
@@ -380,8 +496,10 @@ class Scene:
         """
         from ..mechanics.arc_length import buckling_load
 
-        reference = self.springs.reference
-        return float(abs(buckling_load(self.problem, self.force / reference)) * reference)
+        if self.problem.given is not None:
+            raise ValueError(f"load: {self.load!r} prescribes displacements, and buckling loads are of forces")
+        begin = self._stated.factor(self.springs)
+        return float(abs(buckling_load(self.problem, begin) / begin * self._stated.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -439,11 +557,13 @@ class Result:
         Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
     displacement : float
         Displacement of the load [m]: the mean one of the loaded side along the force, or that of a pressed side's
-        middle; NaN where there is no equilibrium.
+        middle; of a shape its first quantity, whatever that is. NaN where there is no equilibrium.
     seconds : float
         That the solve took, springs not included.
     definition_seconds : float
         That deriving the springs took.
+    values : dict of str to float
+        Quantities of interest by name, in SI units, NaN where there is no equilibrium; of a beam its displacement.
 
     Examples
     --------
@@ -473,6 +593,7 @@ class Result:
     displacement: float
     seconds: float
     definition_seconds: float
+    values: dict[str, float]
 
     @property
     def displacements(self) -> np.ndarray:
@@ -522,7 +643,26 @@ class Result:
 
         `Scene.objection` says where the reference of small strain does not apply.
         """
-        return float(deformation_error(self.displacement, self.reference().displacement))
+        return next(iter(self.errors.values()))
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """As `error`, of each quantity of interest [1]; infinite or NaN where the reference has none of it.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+        >>> result = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="lattice").solve()
+        >>> {name: f"{100 * error:+.2f} %" for name, error in result.errors.items()}
+        {'displacement': '+3.52 %'}
+        >>> result.values.keys() == result.errors.keys()
+        True
+        """
+        known = self.scene.reference_values()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return {name: float(deformation_error(value, known[name])) for name, value in self.values.items()}
 
     def write(self, path: str | Path, steps: int = 10) -> list[Path]:
         """Write the deformed network for ParaView, or whatever else reads VTU.
@@ -587,22 +727,8 @@ class Result:
         """
         from .drawing import drawer
 
-        if not np.isfinite(self.displacement):
+        if self.equilibrium is None or not self.equilibrium.converged:
             raise ValueError(f"there is no equilibrium to draw: {self.message}")
-        title = f"{self.scene.load} of {abs(self.scene.force):g} N: {1e3 * self.displacement:.4g} mm"
+        moved = self.scene.displacement_of(self.displacements)
+        title = self.scene.title if np.isnan(moved) else f"{self.scene.title}: {1e3 * moved:.4g} mm"
         return drawer().draw_springs(ax, self.scene.mesh, self.displacements, self.spring_forces, title)
-
-
-@lru_cache(maxsize=32)
-def _solve_unit(aspect_ratio: float, nu: float, kind: LoadKind) -> "ReferenceSolution":
-    from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
-
-    return solve_unit(aspect_ratio, nu, kind)
-
-
-def _reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
-    """Reference under a force, solved once for all beams, materials and forces that differ by factors."""
-    from ..reference.similarity import unit_problem, unit_scales
-
-    length, displacement = unit_scales(beam, material, kind)
-    return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)

@@ -144,7 +144,7 @@ def _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pre
     arguments, total = {}, pressure * strip.length * strip.thickness
     if loading == "pressure":
         top = mesh.outline_edges(1, mesh.points[:, 1].max())
-        arguments = {"pressure": FollowerPressure(mesh, top, 0), "force": -total}
+        arguments = {"pressure": FollowerPressure.of_side(mesh, top, 0), "force": -total}
     elif loading == "gravity":
         weights = -total * mesh.particle_areas / mesh.area
         arguments = {"forces": np.stack([np.zeros(len(weights)), weights], axis=1)}

@@ -1,0 +1,159 @@
+r"""Stress in a network, recovered from the forces in its cells.
+
+A cell of area A in which forces f act on corners at x has the mean stress (virial)
+
+.. math:: \sigma = \frac{1}{A t} \sum_{corners} x \otimes f
+
+Energies give the forces of each cell exactly: with `springtune.springs.delingette` this is the stress of linear
+triangles. A spring of force f, length l and direction n belongs to the cells on both of its sides, each of which has
+half of it, :math:`f l\, n \otimes n / 2`; an edge of the outline or a diagonal has one cell, which has all. So do
+`springtune.springs.lattice` and `springtune.springs.patch` give springs to cells, and whatever share it is the sum over
+all cells is the same.
+
+Stress at particles is that of a linear field, fitted by least squares to the cells around a particle at their middles,
+where it is better than elsewhere (superconvergent patch recovery: O. C. Zienkiewicz and J. Z. Zhu, Int. J. Numer.
+Methods Eng. 33:1331, 1992). Particles on the outline have cells on one side only, and too few: there the fits of their
+neighbours inside are continued to them, by the mean of these.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..mesh.cells import Mesh, signed_areas
+from .network import Network
+
+
+def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> dict[int, np.ndarray]:
+    """Stress of each cell, times the thickness and over the reference stiffness.
+
+    Parameters
+    ----------
+    network : Network
+    displacements : ndarray of float, shape (n_points, 2)
+        [m]
+    linear : bool
+        Whether the network is linear in the displacements: forces and areas are then those at rest, and Cauchy's stress
+        otherwise.
+
+    Returns
+    -------
+    dict of int to ndarray of float, shape (n_cells, 3)
+        By number of corners: components xx, yy and xy [1].
+    """
+    mesh = network.mesh
+    place = mesh.points if linear else mesh.points + displacements
+    vectors = place[network.second] - place[network.first]
+    lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    pull = network.spring_forces(displacements, linear) / lengths / mesh.cells_per_edge
+    # Components xx, yy and xy of each edge's share.
+    virial = np.stack([vectors[:, 0] ** 2, vectors[:, 1] ** 2, vectors[:, 0] * vectors[:, 1]], axis=1) * pull[:, None]
+    total = {count: virial[edges].sum(axis=1) for count, edges in mesh.cell_edges.items()}
+    for energy in network.energies:
+        count, corners = energy.corners.shape[1], energy.corners
+        moved = displacements[corners]
+        if linear:
+            forces = (energy.tangent() @ moved.reshape(len(corners), -1, 1)).reshape(moved.shape)
+        else:
+            forces = energy.forces(displacements)
+        # About a corner of its own: coordinates far from the origin would cost digits.
+        x, y = (place[corners] - place[corners[:, :1]]).transpose(2, 0, 1)
+        fx, fy = forces.transpose(2, 0, 1)
+        total[count] += np.stack([(x * fx).sum(1), (y * fy).sum(1), 0.5 * (x * fy + y * fx).sum(1)], axis=1)
+    return {count: total[count] / signed_areas(place, corners)[:, None] for count, corners in mesh.cells.items()}
+
+
+def particle_stresses(
+    mesh: Mesh, stresses: Mapping[int, np.ndarray], chosen: Mapping[int, np.ndarray] | None = None
+) -> np.ndarray:
+    """Stress at the particles, recovered from that of the cells.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    stresses : dict of int to ndarray of float, shape (n_cells, 3)
+        As of `cell_stresses`.
+    chosen : dict of int to ndarray of bool, shape (n_cells,), optional
+        Cells of one part of the body: stress jumps from one material to another. All without.
+
+    Returns
+    -------
+    ndarray of float, shape (n_points, 3)
+        In the unit of the cells'; NaN at particles of no such cell.
+    """
+    corners, values, middles = [], [], []
+    for count, cells in mesh.cells.items():
+        kept = slice(None) if chosen is None else chosen[count]
+        corners.append(np.pad(cells[kept], ((0, 0), (0, 4 - count)), constant_values=-1))
+        values.append(stresses[count][kept])
+        middles.append(mesh.points[cells[kept]].mean(axis=1))
+    cells, value, middle = np.concatenate(corners), np.concatenate(values), np.concatenate(middles)
+    return _recovered(mesh, cells, value, middle)
+
+
+def _recovered(mesh: Mesh, cells: np.ndarray, value: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    count, size = len(mesh.points), np.sqrt(mesh.area / len(cells))
+    cell, corner = np.nonzero(cells >= 0)
+    particle = cells[cell, corner]
+    fits, good = _fits(mesh.points, particle, middle[cell], value[cell], count, size)
+    # Of the sides of these cells, those that have one of them are the outline.
+    first, last = cells, np.roll(cells, -1, axis=1)
+    triangles = cells[:, 3] < 0
+    last = last.copy()
+    last[triangles, 2] = cells[triangles, 0]
+    pairs = np.stack([first.ravel(), last.ravel()], axis=1)[(first >= 0).ravel()]
+    code = np.sort(pairs, axis=1) @ np.array([count, 1])
+    sides, times = np.unique(code, return_counts=True)
+    rim = np.zeros(count, dtype=bool)
+    rim[np.concatenate(np.divmod(sides[times == 1], count))] = True
+    found = np.full((count, 3), np.nan)
+    inside = good & ~rim
+    found[inside] = fits[inside, 0]
+    # Of neighbours inside, and where there are none of theirs, the fits are continued.
+    joined = np.concatenate([pairs, pairs[:, ::-1]])
+    here = np.zeros(count, dtype=bool)
+    here[particle] = True
+    sources = inside
+    while True:
+        wanted = here & np.isnan(found[:, 0])
+        if not wanted.any():
+            return found
+        to, of = joined[wanted[joined[:, 0]] & sources[joined[:, 1]]].T
+        if not len(to):
+            # No particle inside: the fits to the cells around, or their mean.
+            weights = np.bincount(particle, minlength=count)
+            means = np.stack([np.bincount(particle, part, count) for part in value[cell].T], axis=1)
+            found[wanted] = np.where(
+                good[wanted, None], fits[wanted, 0], means[wanted] / np.maximum(weights[wanted], 1)[:, None]
+            )
+            return found
+        apart = (mesh.points[to] - mesh.points[of]) / size
+        reached = fits[of, 0] + apart[:, :1] * fits[of, 1] + apart[:, 1:] * fits[of, 2]
+        times = np.bincount(to, minlength=count)
+        sums = np.stack([np.bincount(to, part, count) for part in reached.T], axis=1)
+        filled = np.flatnonzero(times)
+        found[filled] = sums[filled] / times[filled, None]
+        # What was filled passes on the mean of the fits that filled it.
+        slopes = fits[of, 1:].reshape(len(of), -1)
+        means = np.stack([np.bincount(to, part, count) for part in slopes.T], axis=1)[filled] / times[filled, None]
+        fits[filled, 0], fits[filled, 1:] = found[filled], means.reshape(-1, 2, 3)
+        sources = np.zeros(count, dtype=bool)
+        sources[filled] = True
+
+
+def _fits(
+    points: np.ndarray, particle: np.ndarray, middle: np.ndarray, value: np.ndarray, count: int, size: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Linear field about each particle, value and slopes over `size`, shape (n_points, 3, 3), and where it is one."""
+    basis = np.concatenate([np.ones((len(particle), 1)), (middle - points[particle]) / size], axis=1)
+    matrix, right = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
+    for i in range(3):
+        for j in range(3):
+            matrix[:, i, j] = np.bincount(particle, basis[:, i] * basis[:, j], count)
+            right[:, i, j] = np.bincount(particle, basis[:, i] * value[:, j], count)
+    # Three middles that are on no line.
+    scale = np.trace(matrix, axis1=1, axis2=2)
+    good = np.linalg.det(matrix) > 1e-6 * np.where(scale > 0, scale, 1.0) ** 3
+    fits = np.zeros((count, 3, 3))
+    fits[good] = np.linalg.solve(matrix[good], right[good])
+    return fits, good
