@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...jobs import store
+from ...jobs.hashing import hash_of
 from ...problem.status import Status
 from ...scene.single import Scene
 from ...springs import DefinitionError
@@ -41,10 +42,11 @@ def run(tasks, spent):
             store.add(path, {key: _hole(grouped) for scene in missing for key in _keys(scene)})
             spent.add(WITHOUT_MESH, 0, 0.0, len(missing))
             continue
+        sheets = {}
         with store.Keeper(path) as keeper:
-            for task in missing:
+            for task in sorted(missing, key=_turn):
                 begin = time.perf_counter()
-                result = spent.attempt(task["key"], partial(_solved, family, grouped, task), _hole)
+                result = spent.attempt(task["key"], partial(_solved, family, grouped, task, sheets), _hole)
                 if result is None:
                     continue
                 if task.get("keep_fields"):
@@ -80,12 +82,20 @@ def _hole(why):
     return {"status": Status.FAILED, "message": why, "seconds": 0.0}
 
 
-def _solved(family, grouped, task):
+def _turn(scene):
+    """Order in which scenes of one network follow each other."""
+    return scene["definition"], hash_of(scene["materials"])
+
+
+def _solved(family, grouped, task, sheets):
     shape = shape_of(family["shape"], task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
     begin = time.perf_counter()
     try:
-        found = Scene(shape, grouped, materials_of(task["materials"]), CASE, **chosen).solve()
+        sheet = sheets.get(shape.thickness)
+        scene = Scene(shape, grouped, materials_of(task["materials"]), CASE, sheet=sheet, **chosen)
+        sheets[shape.thickness] = scene.sheet
+        found = scene.solve()
     except DefinitionError as error:
         return _hole(str(error)) | {"seconds": time.perf_counter() - begin}
     result = {
