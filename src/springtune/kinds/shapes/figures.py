@@ -9,11 +9,16 @@ from matplotlib.colors import LinearSegmentedColormap
 from ...output import labels, style
 from ...output.dataset import NO_NODE, STATUS
 from ...output.selection import choose, group
-from .names import KINDS_OF_QUANTITY
 from .outputs import DEFORMED, ERRORS, figures
 
 COLUMNS = 3
 """Networks side by side."""
+
+MOST_NETWORKS = 6
+"""Networks that are drawn where none are chosen."""
+
+FIRST = ("lattice", "van-gelder", "element-fit", "patch", "area", "delingette")
+"""Definitions that are drawn before others."""
 
 FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
 """Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""
@@ -85,7 +90,7 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_shape_errors(tree, shape="cook")
     >>> axes[0, 0].get_title(loc="left"), axes[0, 1].get_xlabel()
-    ('tip: displacement y at tip', 'Seconds, springs and solve')
+    ('tip: displacement y, tip', 'Seconds, springs and solve')
     """
     cut, selection = _cut(data, shape, load, material, kinematics)
     names = _quantities(cut)
@@ -134,12 +139,11 @@ def described(cut, name):
     """What a quantity is, in words."""
     one = cut.sel(quantity=name)
     kind, component, of = (str(one[f"quantity_{part}"].item()) for part in ("kind", "component", "of"))
-    joint = "at" if KINDS_OF_QUANTITY[kind].places == ("at",) else "of"
     if kind == "area":
         return "growth of the area"
     if kind == "energy":
         return "strain energy"
-    return f"{kind} {component} {joint} {of}"
+    return f"{kind} {component}, {of}"
 
 
 def _points(cut, name, definition):
@@ -252,13 +256,20 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     rows = _rows(whole, material, kinematics)
     definitions = [name for name in whole.definition.values.tolist() if any(name in row["errors"] for row in rows)]
     looks = {name: style.line(i) | {"linestyle": ""} for i, name in enumerate(definitions)}
-    tall = 0.9 + 0.24 * max(len(rows), 3) + 0.14 * -(-len(definitions) // 5)
+    tall = 1.05 + 0.24 * max(len(rows), 3) + 0.14 * -(-len(definitions) // 5)
     figure, axes = style.panels(ax, figsize=(style.PAGE, tall))
     panel = axes[0, 0]
     left = 0.15 + max((labels.width(row["name"]) for row in rows), default=0.5)
-    holes = [f"without {', '.join(lost)}" for row in rows for lost in [_lost(row)] if lost]
+    nowhere = [name for name in whole.definition.values.tolist() if rows and all(name in _lost(row) for row in rows)]
+    lacking = [[name for name in _lost(row) if name not in nowhere] for row in rows]
+    holes = [f"without {', '.join(lost)}" for lost in lacking if lost]
     right = 0.1 + max(map(labels.width, holes), default=0.0)
-    place = {"left": left, "right": min(right, 2.0), "bottom": 0.42, "top": 0.22 + 0.14 * -(-len(definitions) // 5)}
+    place = {
+        "left": left,
+        "right": min(right, 2.0),
+        "bottom": 0.42 + 0.16 * bool(nowhere),
+        "top": 0.22 + 0.14 * -(-len(definitions) // 5),
+    }
     style.arrange(figure, axes, **place)
     if not any(row["errors"] for row in rows):
         labels.say(panel, "No quantity has an error: see status and message.")
@@ -272,10 +283,12 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
         if np.isfinite(row["reference"]):
             x = np.clip(row["reference"], LEAST_SHOWN, MOST_SHOWN_ERROR)
             panel.plot([x], [number], "|", color="0.5", markersize=9, zorder=1)
-        if _lost(row):
-            text = labels.wrapped(f"without {', '.join(_lost(row))}", 1.9)
+        if lacking[number]:
+            text = labels.wrapped(f"without {', '.join(lacking[number])}", 1.9)
             panel.annotate(text, (1, number), xycoords=("axes fraction", "data"), xytext=(3, 0), va="center",
                            textcoords="offset points", fontsize=style.SMALL, color="0.4")  # fmt: skip
+    if nowhere:
+        labels.note(panel, f"nowhere solved: {', '.join(nowhere)}")
     panel.set_yticks(range(len(rows)), [row["name"] for row in rows])
     panel.tick_params(axis="y", length=0)
     style.plain(panel, "x")
@@ -341,7 +354,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     shape, load : str, optional
         Labels of the scenes. One that is not given must leave no choice.
     definition : str or list of str, optional
-        Some definitions in place of all.
+        Definitions in the place of a few, of which those that have an answer come first.
 
     Returns
     -------
@@ -371,10 +384,11 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     labels_of = {name: str(case[f"{name}_name"].item()) for name in ("shape", "load", "material", "kinematics")}
     mesh = {"mesh_type": str(case.mesh_type_name.item()), "mesh_size": float(case.case_mesh_size)}
     cut = cells.sel(labels_of | mesh)
-    wanted = _definitions(cut) if definition is None else [definition] if isinstance(definition, str) else definition
-    missing = [name for name in wanted if name not in _definitions(cut)]
+    asked = _definitions(cut)
+    wanted = _few(cut, asked) if definition is None else [definition] if isinstance(definition, str) else definition
+    missing = [name for name in wanted if name not in asked]
     if missing:
-        raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(_definitions(cut))}")
+        raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
     width, height = _extent(case)
     columns = min(COLUMNS, len(wanted))
     page = style.COLUMN if columns == 1 else style.PAGE
@@ -387,6 +401,8 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     scale = _scale(case, cut, wanted, max(width, height))
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*labels_of.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
+    lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
+    said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
     title = labels.wrapped(", ".join(said), page - 0.2, 8.5)
     place = {"left": 0.45, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
     place |= {"down": 0.3, "across": 0.1, "title": title}
@@ -395,7 +411,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     drawn = [_network(panel, case, cut, name, scale, largest) for panel, name in zip(flat, wanted)]
     for number, panel in enumerate(flat):
         panel.set(aspect="equal", adjustable="datalim")
-        panel.set_title(wanted[number])
+        panel.set_title(panel.get_title("left") or wanted[number])
         panel.grid(False)
         if number % columns:
             panel.tick_params(labelleft=False)
@@ -409,6 +425,13 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     if figure is not None:
         _bar(figure, lines, case)
     return flat
+
+
+def _few(cut, asked):
+    """Definitions to draw, in their order: those that have an answer before others, and `FIRST` before the rest."""
+    solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
+    order = sorted(asked, key=lambda name: (not solved[name], name not in FIRST))
+    return [name for name in asked if name in order[:MOST_NETWORKS]]
 
 
 def _extent(case):
@@ -443,17 +466,19 @@ def _largest_force(case, wanted):
 
 def _network(panel, case, cut, name, scale, largest):
     """Draw one network; its lines, or nothing where there is none."""
+    one = case.sel(definition=name) if name in case.definition.values else None
+    drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
     outline = np.stack([case.outline_x.values, case.outline_y.values], axis=1)
     there = np.stack([case.reference_displacement_x.values, case.reference_displacement_y.values], axis=1)
     for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
-        one = case.outline_round.values == number
-        closed = np.append(np.flatnonzero(one), np.flatnonzero(one)[:1])
+        places = np.flatnonzero(case.outline_round.values == number)
+        closed = np.append(places, places[:1])
         panel.plot(*1e3 * outline[closed].T, color="0.6", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
-        panel.plot(*1e3 * (outline + scale * there)[closed].T, color="black", linewidth=0.9, zorder=3)
+        if drawn:
+            panel.plot(*1e3 * (outline + scale * there)[closed].T, color="black", linewidth=0.9, zorder=3)
     flag = int(cut.status.sel(definition=name))
     lines = None
-    one = case.sel(definition=name) if name in case.definition.values else None
-    if one is not None and np.isfinite(one.displacement_x.values).any():
+    if drawn:
         rest = np.stack([case.x.values, case.y.values], axis=1)
         moved = np.stack([one.displacement_x.values, one.displacement_y.values], axis=1)
         nodes = case.spring_nodes.transpose("spring", "spring_end").fillna(NO_NODE).values.astype(int)
@@ -470,6 +495,8 @@ def _network(panel, case, cut, name, scale, largest):
         )
         panel.add_collection(lines)
         panel.autoscale()
+        if not np.abs(forces).max() > 0:
+            panel.set_title(f"{name}: its law is in an energy, not in springs")
     if flag != STATUS.index("solved"):
         message = str(cut.message.sel(definition=name).item())
         text = f"{STATUS[flag].replace('_', ' ')}: {message[:120]}" if lines is None else STATUS[flag]
