@@ -48,7 +48,7 @@ _NAMES = {
     "problem.shapes": ("Hole", "LoadCase", "Pressure", "Quantity", "Segment", "Shape", "Support", "Traction"),
     "problem.status": ("Status",),
     "scene.curve": ("Curve", "sensitivity"),
-    "scene.meshes": ("make_mesh", "mesh_shape", "read_mesh"),
+    "scene.meshes": ("make_mesh", "mesh_shape", "read_mesh", "read_shape"),
     "scene.moduli": ("Moduli", "moduli"),
     "scene.single": ("Result", "Scene"),
     "springs": ("DEFINITIONS", "Definition", "DefinitionError", "Springs", "definition"),
@@ -127,6 +127,7 @@ __all__ = [
     "plot_sweep",
     "predict",
     "read_mesh",
+    "read_shape",
     "sensitivity",
 ]
 

@@ -56,6 +56,7 @@ from .scene.curve import sensitivity as sensitivity
 from .scene.meshes import make_mesh as make_mesh
 from .scene.meshes import mesh_shape as mesh_shape
 from .scene.meshes import read_mesh as read_mesh
+from .scene.meshes import read_shape as read_shape
 from .scene.moduli import Moduli as Moduli
 from .scene.moduli import moduli as moduli
 from .scene.single import Result as Result

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..mesh import MESH_TYPES, GroupedMesh, Mesh, read_beam_mesh
 from ..mesh import mesh_shape as mesh_outlined
+from ..mesh import read_shape as read_grouped
 from ..mesh.box import box_fault
 from ..problem.geometry import Beam
 from ..problem.quantities import positive
@@ -181,3 +182,36 @@ def mesh_shape(
     is_a(shape, Shape, "shape", A_SHAPE)
     sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
     return mesh_outlined(shape, positive(size, "length", "mesh size"), mesh_type, sizes)
+
+
+def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
+    """Read the mesh of a shape with its groups, of any format that meshio knows.
+
+    Groups are Gmsh's physical groups, sets of cells and of points in Abaqus and other files, and arrays of zeros and
+    ones in VTU; how each becomes sides, a point or a part is told in the guide on mesh files.
+
+    Parameters
+    ----------
+    path : str or Path
+    unit : float or str, optional
+        Unit of the coordinates in the file [m], or a text such as ``"1 mm"``.
+
+    Returns
+    -------
+    GroupedMesh
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read, or its cells are no conforming plane sheet.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> from springtune.mesh import write_mesh
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+    >>> write_mesh("plate.msh", st.mesh_shape(plate, "4 mm"))
+    >>> sorted(st.read_shape("plate.msh").sides)
+    ['hole', 'left', 'lower', 'right', 'upper']
+    """
+    return read_grouped(path, positive(unit, "length", "unit"))
