@@ -18,49 +18,21 @@ import numpy as np
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.shapes import Segment, Shape
+from ..problem.outlines import OutlineSide
+from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
 Ends = tuple[int, int]
 """Points at the ends of a side, the lower number first."""
 
 LARGEST_TURN = np.pi / 6
-"""Of a side of a triangle along an arc [rad]."""
+"""Of the direction of a side of a triangle along an arc [rad]."""
 
 LARGEST_SAGITTA = 0.15
 """Of a side of a triangle along an arc, over the distance to what else there is."""
 
 FEWEST_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""
-
-
-@dataclass(frozen=True)
-class Arc:
-    """A circle, or an ellipse with its axes along x and y.
-
-    Attributes
-    ----------
-    centre : tuple of float
-        [m]
-    axes : tuple of float
-        Half axes along x and y [m].
-    """
-
-    centre: tuple[float, float]
-    axes: tuple[float, float]
-
-    def at(self, angles: np.ndarray | float) -> np.ndarray:
-        """Points of eccentric angles [rad], shape (..., 2) [m]."""
-        return np.array(self.centre) + np.array(self.axes) * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-
-    def slope(self, angle: float) -> np.ndarray:
-        """Derivative of `at`, shape (2,)."""
-        return np.array(self.axes) * [-np.sin(angle), np.cos(angle)]
-
-    def angle(self, point: Iterable[float]) -> float:
-        """Eccentric angle of a point [rad]."""
-        x, y = (np.array(point) - self.centre) / self.axes
-        return float(np.arctan2(y, x))
 
 
 @dataclass(frozen=True)
@@ -71,15 +43,15 @@ class Side:
     ----------
     groups : tuple of str
         That it belongs to.
-    arc : Arc or None
+    arc : OutlineSide or None
         That it lies on; straight without.
-    angles : tuple of float
-        On the arc, at the corner of the lower number and at the other one [rad].
+    span : tuple of float
+        Parameters of the arc at the corner of the lower number and at the other one.
     """
 
     groups: tuple[str, ...] = ()
-    arc: Arc | None = None
-    angles: tuple[float, float] = (0.0, 0.0)
+    arc: OutlineSide | None = None
+    span: tuple[float, float] = (0.0, 1.0)
 
 
 class CoarseMesh:
@@ -123,20 +95,21 @@ class CoarseMesh:
         share = (along + 1) / 2
         if side is None or side.arc is None:
             return self.points[ends[0]] + share[:, None] * (self.points[ends[1]] - self.points[ends[0]])
-        return side.arc.at(side.angles[0] + share * (side.angles[1] - side.angles[0]))
+        return _points(side.arc, side.span, share)
 
     def _cut_side(self, first: int, second: int, share: float, new: int) -> np.ndarray:
         """The point a share of the way from one corner to another, and its number in the places of `sides`."""
         ends = (min(first, second), max(first, second))
-        side = self.sides.pop(ends, None)
+        side = self.sides.get(ends)
         if side is None:
             return self.points[first] + share * (self.points[second] - self.points[first])
         if first != ends[0]:
             share = 1 - share
         where = self.curve(ends, np.array([2 * share - 1]))[0]
-        middle = side.angles[0] + share * (side.angles[1] - side.angles[0])
-        self.sides[ends[0], new] = replace(side, angles=(side.angles[0], middle))
-        self.sides[ends[1], new] = replace(side, angles=(side.angles[1], middle))
+        middle = side.span[0] + share * (side.span[1] - side.span[0])
+        del self.sides[ends]
+        self.sides[ends[0], new] = replace(side, span=(side.span[0], middle))
+        self.sides[ends[1], new] = replace(side, span=(side.span[1], middle))
         return where
 
     def _replace(self, rows: np.ndarray, triangles: list[tuple[int, int, int]], parts: list[int]) -> None:
@@ -273,105 +246,36 @@ def _triangles_at(triangles: np.ndarray, sides: Iterable[Ends]) -> dict[Ends, li
     return wanted
 
 
+def _points(side: OutlineSide, span: tuple[float, float], shares: np.ndarray) -> np.ndarray:
+    """Points of a side at shares of the way between two parameters [m], shape (n, 2)."""
+    return np.array([side.at(float(span[0] + share * (span[1] - span[0]))) for share in shares])
+
+
 @dataclass(frozen=True)
 class _Piece:
-    """A piece of a segment that becomes a side of triangles, or some."""
+    """A stretch of the outline that becomes a side of triangles, or some; numbers of the regions beside it."""
 
-    start: np.ndarray
-    end: np.ndarray
-    group: str
-    arc: Arc | None
-    angles: tuple[float, float]
+    side: OutlineSide
+    span: tuple[float, float]
     left: int
     right: int
 
     def at(self, shares: np.ndarray) -> np.ndarray:
-        if self.arc is None:
-            return self.start + shares[:, None] * (self.end - self.start)
-        return self.arc.at(self.angles[0] + shares * (self.angles[1] - self.angles[0]))
+        return _points(self.side, self.span, shares)
 
-    def cut(self, share: float) -> "tuple[_Piece, _Piece]":
-        middle = self.at(np.array([share]))[0]
-        angle = self.angles[0] + share * (self.angles[1] - self.angles[0])
-        return (
-            replace(self, end=middle, angles=(self.angles[0], angle)),
-            replace(self, start=middle, angles=(angle, self.angles[1])),
-        )
+    @property
+    def turn(self) -> float:
+        """By which its direction turns [rad]."""
+        one, other = (self.side.slope(parameter) for parameter in self.span)
+        return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one[0] * other[0] + one[1] * other[1]))
 
-
-def arc_of(segment: Segment, end: tuple[float, float]) -> tuple[Arc, tuple[float, float]]:
-    """Arc of a segment, and the eccentric angles at its ends.
-
-    Parameters
-    ----------
-    segment : Segment
-        With a centre.
-    end : tuple of float
-        Where it ends [m].
-
-    Returns
-    -------
-    arc : Arc
-    angles : tuple of float
-        [rad], less than half a turn from each other.
-
-    Raises
-    ------
-    MeshError
-        If no ellipse about the centre with its axes along x and y passes both ends.
-    """
-    assert segment.centre is not None
-    first, second = (np.array(point) - segment.centre for point in (segment.start, end))
-    lengths = np.hypot(*first), np.hypot(*second)
-    if abs(lengths[0] - lengths[1]) <= 1e-9 * max(lengths):
-        axes = np.array([lengths[0], lengths[0]])
-    else:
-        squares = np.stack([first, second]) ** 2
-        try:
-            inverse = np.linalg.solve(squares, np.ones(2))
-        except np.linalg.LinAlgError:
-            inverse = np.zeros(2)
-        if not (inverse > 0).all():
-            raise MeshError(f"no ellipse about {segment.centre} passes {segment.start} and {end}; correct the centre")
-        axes = inverse**-0.5
-    arc = Arc(segment.centre, (float(axes[0]), float(axes[1])))
-    start, stop = arc.angle(segment.start), arc.angle(end)
-    return arc, (start, start + (stop - start + np.pi) % (2 * np.pi) - np.pi)
+    def halves(self) -> "tuple[_Piece, _Piece]":
+        middle = sum(self.span) / 2
+        return replace(self, span=(self.span[0], middle)), replace(self, span=(middle, self.span[1]))
 
 
-def _round(outline: tuple[Segment, ...], inner: int, outer: int, turned: bool) -> list[_Piece]:
-    """Pieces of a closed round, one a segment; `inner` is to the left where it is counter-clockwise."""
-    pieces = []
-    for segment, following in zip(outline, outline[1:] + outline[:1]):
-        start, end = np.array(segment.start), np.array(following.start)
-        arc, angles = arc_of(segment, following.start) if segment.centre is not None else (None, (0.0, 0.0))
-        left, right = (outer, inner) if turned else (inner, outer)
-        pieces.append(_Piece(start, end, segment.group, arc, angles, left, right))
-    return pieces
-
-
-def _polygon(outline: tuple[Segment, ...]) -> np.ndarray:
-    """Corners of a polygon that follows an outline closely."""
-    return np.concatenate([piece.at(np.linspace(0, 1, 24, endpoint=False)) for piece in _round(outline, 1, 0, False)])
-
-
-def _inside(polygon: np.ndarray, point: np.ndarray) -> bool:
-    start, end = polygon, np.roll(polygon, -1, axis=0)
-    crossed = (start[:, 1] > point[1]) != (end[:, 1] > point[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = start[:, 0] + (point[1] - start[:, 1]) * (end[:, 0] - start[:, 0]) / (end[:, 1] - start[:, 1])
-    return bool((crossed & (point[0] < x)).sum() % 2)
-
-
-def _turns(polygon: np.ndarray) -> bool:
-    """Whether a polygon is clockwise."""
-    x, y = (polygon - polygon[0]).T
-    return bool((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() < 0)
-
-
-def _refined(pieces: list[_Piece], largest_turn: float) -> list[_Piece]:
+def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
     """Pieces that are short where others are near, and turn little."""
-    extent = max(np.ptp([piece.start for piece in pieces], axis=0))
     done = False
     while not done:
         done = True
@@ -391,9 +295,8 @@ def _refined(pieces: list[_Piece], largest_turn: float) -> list[_Piece]:
                 ELEMENT_GROWTH * nearest,
                 (2 * lengths[clear] + apart[clear]).min(initial=np.inf),
             )
-            turn = abs(piece.angles[1] - piece.angles[0])
-            if lengths[i] > 1.01 * limit or turn > 1.01 * largest_turn or sagittas[i] > LARGEST_SAGITTA * nearest:
-                refined += piece.cut(0.5)
+            if lengths[i] > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagittas[i] > LARGEST_SAGITTA * nearest:
+                refined += piece.halves()
                 done = False
             else:
                 refined.append(piece)
@@ -410,7 +313,7 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     corners : iterable of str
         Named points that are to be corners of triangles; those on the outline are anyway.
     largest_turn : float
-        Of a side along an arc [rad].
+        Of the direction of a side along an arc [rad].
 
     Returns
     -------
@@ -424,48 +327,41 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     from netgen.geom2d import SplineGeometry  # here, since only a shape should pay for it
     from netgen.meshing import NgException
 
-    names = tuple(dict.fromkeys(["", *(hole.part for hole in shape.holes if hole.part)]))
-    polygons = [_polygon(hole.outline) for hole in shape.holes]
-    domains = [names.index(hole.part) + 1 if hole.part else 0 for hole in shape.holes]
-    pieces = _round(shape.outline, 1, 0, _turns(_polygon(shape.outline)))
-    for i, (hole, polygon) in enumerate(zip(shape.holes, polygons)):
-        around = [j for j, other in enumerate(polygons) if j != i and _inside(other, polygon[0])]
-        # The innermost of those around it is inside all others.
-        outer = max(around, key=lambda j: sum(_inside(polygons[k], polygons[j][0]) for k in around), default=None)
-        pieces += _round(hole.outline, domains[i], 1 if outer is None else domains[outer], _turns(polygon))
-
-    extent = max(np.ptp([piece.start for piece in pieces], axis=0))
-    placed, inner = {}, {}
-    for name, point in shape.points.items():
-        where = np.array(point, dtype=float)
-        for i, piece in enumerate(pieces):
-            share = _share(piece, where, 1e-9 * extent)
-            if share is not None:
-                placed[name] = where
-                if 1e-9 < share < 1 - 1e-9:
-                    pieces[i : i + 1] = piece.cut(share)
-                break
-        else:
-            if name in corners:
-                inner[name] = where
-    pieces = _refined(pieces, largest_turn)
+    names = ("", *shape.parts)
+    (left, low), (right, high) = shape.extent
+    extent = max(right - left, high - low)
+    numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
+    pieces: list[_Piece] = []
+    inner = {name: point for name, point in shape.points.items() if name in corners}
+    placed = {}
+    for one in shape.rounds:
+        for side in one.sides:
+            cuts = {0.0, 1.0}
+            for name, point in shape.points.items():
+                parameter, distance = side.nearest(point)
+                if distance <= 1e-9 * extent:
+                    placed[name] = point
+                    inner.pop(name, None)
+                    if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > 1e-9 * extent:
+                        cuts.add(parameter)
+            spans = sorted(cuts)
+            for span in zip(spans, spans[1:]):
+                pieces.append(_Piece(side, span, numbers[one.inner], numbers[one.outer]))
+    pieces = _refined(pieces, extent, largest_turn)
 
     # Lengths about 1: netgen's own tolerances are absolute.
     scale = FEWEST_ALONG / extent
-    origin = pieces[0].start
+    origin = np.array([left, low])
     geometry = SplineGeometry()
-    numbers: dict[tuple[int, int], int] = {}
-
-    def number(point: np.ndarray) -> int:
-        x, y = (point - origin) * scale
-        key = round(x * 1e8), round(y * 1e8)
-        if key not in numbers:
-            numbers[key] = geometry.AppendPoint(x, y)
-        return numbers[key]
-
-    for i, piece in enumerate(pieces):
-        ends = [number(piece.start), number(piece.end)]
-        geometry.Append(["line", *ends], leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
+    ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
+    keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
+    given = np.empty((len(keys), 2))
+    given[places.ravel()] = ends.reshape(-1, 2)
+    corner_numbers = [geometry.AppendPoint(*((point - origin) * scale)) for point in given]
+    joined = places.reshape(-1, 2)
+    for i, (piece, (start, end)) in enumerate(zip(pieces, joined)):
+        line = ["line", corner_numbers[start], corner_numbers[end]]
+        geometry.Append(line, leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
     try:
         made = geometry.GenerateMesh(maxh=1.0, grading=0.5)
     except NgException as error:
@@ -479,43 +375,24 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     sides = {}
     exact = points.copy()
     for element in made.Elements1D():
-        piece = pieces[element.index - 1]
-        chord = piece.end - piece.start
-        first, second = (vertex.nr - 1 for vertex in element.vertices)
-        shares = np.array([(points[end] - piece.start) @ chord / (chord @ chord) for end in (first, second)])
+        piece, (start, end) = pieces[element.index - 1], ends[element.index - 1]
+        first, second = sorted(vertex.nr - 1 for vertex in element.vertices)
+        shares = (points[[first, second]] - start) @ (end - start) / ((end - start) @ (end - start))
         shares[np.abs(shares) < 1e-7] = 0.0
         shares[np.abs(shares - 1) < 1e-7] = 1.0
         exact[[first, second]] = piece.at(shares)
-        angles = piece.angles[0] + shares * (piece.angles[1] - piece.angles[0])
-        if first > second:
-            first, second, angles = second, first, angles[::-1]
-        groups = (piece.group,) if piece.group else ()
-        sides[first, second] = Side(groups, piece.arc, (float(angles[0]), float(angles[1])))
-    for piece in pieces:  # the outline's own corners to the last bit
-        exact[np.argmin(np.linalg.norm(exact - piece.start, axis=1))] = piece.start
+        span = piece.span[0] + shares * (piece.span[1] - piece.span[0])
+        groups = (piece.side.group,) if piece.side.group else ()
+        arc = piece.side if piece.side.arc else None
+        sides[first, second] = Side(groups, arc, (float(span[0]), float(span[1])))
     named = {}
-    for name, where in placed.items():
-        named[name] = int(np.argmin(np.linalg.norm(exact - where, axis=1)))
-        exact[named[name]] = where
+    for name, point in placed.items():
+        named[name] = int(np.argmin(np.linalg.norm(exact - point, axis=1)))
+        exact[named[name]] = point
     mesh = CoarseMesh(exact, triangles, parts, names, sides, named)
     for name, where in inner.items():
-        mesh.insert(name, where)
+        mesh.insert(name, np.array(where))
     return mesh
-
-
-def _share(piece: _Piece, where: np.ndarray, tolerance: float) -> float | None:
-    """How far along a piece a point is, from 0 to 1; None where it is not on it."""
-    if piece.arc is None:
-        chord = piece.end - piece.start
-        share = float((where - piece.start) @ chord / (chord @ chord))
-    else:
-        turn = piece.angles[1] - piece.angles[0]
-        beyond = (piece.arc.angle(where) - piece.angles[0]) * np.sign(turn)
-        share = float((beyond + 1e-9) % (2 * np.pi) - 1e-9) / abs(turn)
-    if not -1e-9 <= share <= 1 + 1e-9:
-        return None
-    share = min(max(share, 0.0), 1.0)
-    return share if np.linalg.norm(piece.at(np.array([share]))[0] - where) <= tolerance else None
 
 
 def grouped_mesh(grouped: GroupedMesh, corners: Mapping[str, tuple[float, float]]) -> CoarseMesh:
@@ -633,7 +510,7 @@ def singular_corners(
             way = mesh.points[other] - mesh.points[corner]
         else:
             place = ends.index(corner)
-            way = side.arc.slope(side.angles[place]) * (side.angles[1 - place] - side.angles[place])
+            way = np.array(side.arc.slope(side.span[place])) * (side.span[1 - place] - side.span[place])
         return way / np.linalg.norm(way)
 
     found: dict[int, str] = {}
