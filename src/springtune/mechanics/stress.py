@@ -121,21 +121,20 @@ def _recovered(mesh: Mesh, cells: np.ndarray, value: np.ndarray, middle: np.ndar
         to, of = joined[wanted[joined[:, 0]] & sources[joined[:, 1]]].T
         if not len(to):
             # No particle inside: the fits to the cells around, or their mean.
-            weights = np.bincount(particle, minlength=count)
-            means = np.stack([np.bincount(particle, part, count) for part in value[cell].T], axis=1)
-            found[wanted] = np.where(
-                good[wanted, None], fits[wanted, 0], means[wanted] / np.maximum(weights[wanted], 1)[:, None]
-            )
+            around = np.bincount(particle, minlength=count)
+            total = np.stack([np.bincount(particle, part, count) for part in value[cell].T], axis=1)
+            mean = total[wanted] / around[wanted, None]
+            found[wanted] = np.where(good[wanted, None], fits[wanted, 0], mean)
             return found
         apart = (mesh.points[to] - mesh.points[of]) / size
         reached = fits[of, 0] + apart[:, :1] * fits[of, 1] + apart[:, 1:] * fits[of, 2]
-        times = np.bincount(to, minlength=count)
+        met = np.bincount(to, minlength=count)
         sums = np.stack([np.bincount(to, part, count) for part in reached.T], axis=1)
-        filled = np.flatnonzero(times)
-        found[filled] = sums[filled] / times[filled, None]
+        filled = np.flatnonzero(met)
+        found[filled] = sums[filled] / met[filled, None]
         # What was filled passes on the mean of the fits that filled it.
         slopes = fits[of, 1:].reshape(len(of), -1)
-        means = np.stack([np.bincount(to, part, count) for part in slopes.T], axis=1)[filled] / times[filled, None]
+        means = np.stack([np.bincount(to, part, count) for part in slopes.T], axis=1)[filled] / met[filled, None]
         fits[filled, 0], fits[filled, 1:] = found[filled], means.reshape(-1, 2, 3)
         sources = np.zeros(count, dtype=bool)
         sources[filled] = True

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from ..mechanics.dynamics import Motion, Run
     from ..mechanics.integrators import BackwardEuler
+    from ..reference.shapes import ShapeReference
     from ..reference.small_strain import ReferenceSolution
 
 
@@ -301,12 +302,12 @@ class Scene:
             self._stated.values(self.sheet, springs, solution),
         )
 
-    def reference(self) -> "ReferenceSolution":
-        """Converged finite-element solution in small strain, under the same force.
+    def reference(self) -> "ReferenceSolution | ShapeReference":
+        """Converged finite-element solution in small strain, under the same force or load case.
 
         Returns
         -------
-        ReferenceSolution
+        ReferenceSolution or ShapeReference
 
         Raises
         ------
@@ -402,9 +403,9 @@ class Scene:
             )
         from ..mechanics.dynamics import Motion
 
-        options = {"linear": self.kinematics == "linear"} | options
         reference = self.springs.reference
-        return Motion(self.network, inertia / reference, **({"load": self.forces / reference} | options))
+        known: dict[str, Any] = {"linear": self.kinematics == "linear", "load": self.forces / reference}
+        return Motion(self.network, inertia / reference, **(known | options))
 
     def write_motion(
         self,
@@ -623,12 +624,12 @@ class Result:
         forces = self.scene.network.spring_forces(self.displacements, self.scene.kinematics == "linear")
         return self.scene.springs.reference * forces
 
-    def reference(self) -> "ReferenceSolution":
+    def reference(self) -> "ReferenceSolution | ShapeReference":
         """Converged finite-element solution in small strain, under the same force; as `Scene.reference`.
 
         Returns
         -------
-        ReferenceSolution
+        ReferenceSolution or ShapeReference
 
         Raises
         ------

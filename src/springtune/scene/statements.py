@@ -30,10 +30,10 @@ from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import Material
 from ..problem.quantities import nearest, positive
 from ..problem.shapes import LoadCase, Quantity, Shape
-from ..springs import DefinitionError, Springs
+from ..springs import Definition, DefinitionError, Springs
 from ..springs.identification import Case
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
-from .sheet import Definition, Loading, OwnDefinition, Sheet, Solution, chosen, solved
+from .sheet import Loading, OwnDefinition, Sheet, Solution, chosen, solved
 
 if TYPE_CHECKING:
     from ..reference.shapes import ShapeReference
@@ -65,12 +65,23 @@ class BeamStatement:
         In words.
     """
 
+    body: str
+    label: str
+    named_materials: str
+
     def __init__(
-        self, beam: Beam, mesh: Mesh, material: Material, load: str, force: float | str | None, kinematics: str
+        self,
+        beam: Beam,
+        mesh: Mesh | GroupedMesh,
+        material: Material | Mapping[str, Material],
+        load: str,
+        force: float | str | None,
+        kinematics: str,
     ) -> None:
         is_a(beam, Beam, "beam", A_BEAM)
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
+        assert isinstance(mesh, Mesh) and isinstance(material, Material)  # as type checkers are told
         check_filled(mesh, beam)
         about = chosen(LOADS, load, "load")
         if force is None:
@@ -180,10 +191,18 @@ class ShapeStatement:
         If an argument is none, a name is unknown, a part lacks its material, or nothing is loaded.
     """
 
+    load: str
+    kinematics: str
+    scale: float
+    body: str
+    label: str
+    named_materials: str
+    loading: Loading
+
     def __init__(
         self,
         shape: Shape,
-        grouped: GroupedMesh,
+        grouped: GroupedMesh | Mesh,
         material: Material | Mapping[str, Material],
         load: str,
         scale: float,
@@ -201,7 +220,7 @@ class ShapeStatement:
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
         self.load, self.scale = load, float(scale)
-        self.case = scaled(chosen(shape.loads, load, "load"), self.scale)
+        self.case: LoadCase = scaled(chosen(shape.loads, load, "load"), self.scale)
         if not self.case.quantities:
             raise ValueError(
                 f"load {load!r}: asks for nothing; give it quantities, of which the first one stands for all"
