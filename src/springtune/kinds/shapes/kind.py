@@ -25,6 +25,9 @@ from .sections import ShapeConfig, ShapeGridConfig
 MOST_SHAPE_SCENES = 100_000
 """Most scenes of shapes of a study."""
 
+READ_AT_ONCE = 1_000_000
+"""Size of a mesh file up to which its groups are looked at as a study is read [B]."""
+
 
 @dataclass(frozen=True)
 class ShapeScene:
@@ -116,16 +119,85 @@ def _check(config, problems):
             fault = file_fault(problems.folder / shape.file)
             if fault:
                 problems.add((*path, "file"), f"'{problems.folder / shape.file}' {fault}")
+            elif problems.nothing:
+                _check_file(name, shape, path, problems)
             continue
         _check_outlines(shape, path, problems)
         _check_names(shape, path, problems)
         if problems.nothing:
             try:
-                _shape(name, shape, problems.folder)
+                made = _shape(name, shape, problems.folder)
             except ValueError as error:  # what sides do to each other
                 problems.add(path, str(error).removeprefix(f"shape '{name}': "))
+            else:
+                _check_held(made, path, problems)
     for name, grid in (config.shape_grids or {}).items() if problems.nothing else ():
         _check_grid(config, grid, ("shape_grids", name), problems)
+
+
+def _check_file(name, shape, path, problems):
+    """Groups of a mesh file, if it is small: of a large one the stages say what is wrong, scene by scene."""
+    file = problems.folder / shape.file
+    if file.stat().st_size > READ_AT_ONCE:
+        return
+    # Here, since few studies have files, and reading one takes scipy.
+    from ...mesh import MeshError
+    from ...mesh.group_files import read_shape
+    from ...problem.cases import check_case
+
+    try:
+        grouped = read_shape(file, shape.unit)
+    except MeshError as error:
+        problems.add((*path, "file"), str(error))
+        return
+    for part in sorted(set(grouped.parts) - set(shape.parts)):
+        problems.add(
+            (*path, "parts"), f"part '{part}' of {file} has no material; add it, such as {{{part}: <material>}}"
+        )
+    for part in sorted(set(shape.parts) - set(grouped.parts)):
+        there = nearest(part, grouped.parts) if grouped.parts else "the file has none"
+        problems.add((*path, "parts", part), f"unknown part '{part}'; {there}")
+    try:
+        made = _shape(name, shape, problems.folder)
+    except ValueError as error:
+        problems.add(path, str(error).removeprefix(f"shape '{name}': "))
+        return
+    for label, case in made.loads.items():
+        try:
+            check_case(grouped, case)
+        except ValueError as error:
+            problems.add((*path, "loads", label), str(error).removeprefix(f"load '{label}', "))
+
+
+def _check_held(shape, path, problems):
+    """Whether supports hold a body against all rigid motions, by the corners of what they hold."""
+    (left, low), (right, top) = shape.extent
+    size = max(right - left, top - low)
+    for name, case in shape.loads.items():
+        rows = []
+        for support in case.supports:
+            places = [shape.points[support.group]] if support.group in shape.points else []
+            sides = [side for one in shape.rounds for side in one.sides if side.group == support.group]
+            places += [side.at(share) for side in sides for share in (0.0, 0.5, 1.0)]
+            for x, y in places:
+                x, y = (x - left) / size, (y - low) / size
+                rows += [(1.0, 0.0, -y)] * (support.x is not None) + [(0.0, 1.0, x)] * (support.y is not None)
+        if _rank(rows) < 3:
+            message = "leave the body free to move, or to turn; hold it against both, such as {left: fixed}"
+            problems.add((*path, "loads", name, "supports"), message)
+
+
+def _rank(rows):
+    """Rank of rows of three numbers of the size of one."""
+    found, rows = 0, [list(row) for row in rows]
+    for column in range(3):
+        pivot = max(rows, key=lambda row: abs(row[column]), default=None)
+        if pivot is None or abs(pivot[column]) < 1e-9:
+            continue
+        rows.remove(pivot)
+        rows = [[a - b * row[column] / pivot[column] for a, b in zip(row, pivot)] for row in rows]
+        found += 1
+    return found
 
 
 def _check_outlines(shape, path, problems):

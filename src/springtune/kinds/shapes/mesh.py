@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ...jobs import store
 from ...mesh import quality
+from ...mesh.group_files import read_shape
 from ...mesh.outlines import mesh_shape
 from . import stored
 from .described import shape_of
@@ -78,6 +79,4 @@ def make(source):
     content = hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest()
     if content != source["content"]:
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
-    from ...mesh.shape_files import read_shape
-
     return read_shape(source["file"], source["unit"])

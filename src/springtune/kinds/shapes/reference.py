@@ -58,7 +58,7 @@ def _solved(task):
     shape = shape_of(task["shape"], task["thickness"], task["load"])
     try:
         found = solve_shape(shape, shape.loads[CASE], materials_of(task["materials"]), grouped)
-    except ReferenceNotConvergedError as error:
+    except (ReferenceNotConvergedError, ValueError) as error:  # groups that are not there, bodies that are not held
         return _hole(str(error))
     rounds = _rounds(shape, grouped)
     points = np.concatenate(rounds)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...jobs import store
 from ...jobs.hashing import hash_of
+from ...problem.cases import check_case
 from ...problem.status import Status
 from ...scene.single import Scene
 from ...springs import DefinitionError
@@ -91,6 +92,10 @@ def _turn(scene):
 def _solved(family, grouped, task, sheets):
     shape = shape_of(family["shape"], task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
+    try:
+        check_case(grouped, shape.loads[CASE])
+    except ValueError as error:
+        return _hole(str(error))
     begin, sheet = time.perf_counter(), sheets.get(shape.thickness)
     derived = sheet.deriving if sheet else 0.0
     try:

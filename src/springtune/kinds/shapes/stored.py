@@ -25,7 +25,7 @@ def packed(grouped: GroupedMesh) -> dict[str, Any]:
     """
     mesh = grouped.mesh
     found: dict[str, Any] = {"points": mesh.points, "triangles": mesh.triangles, "quads": mesh.quads}
-    found |= {"side_names": list(grouped.sides), "part_names": list(grouped.parts)}
+    found |= {"side_names": list(grouped.sides), "part_names": list(grouped.parts), "unusable": dict(grouped.unusable)}
     found |= {f"side_{number}": np.asarray(edges) for number, edges in enumerate(grouped.sides.values())}
     found["named_points"] = {name: [float(x) for x in point] for name, point in grouped.points.items()}
     for number, cells in enumerate(grouped.parts.values()):
@@ -69,4 +69,5 @@ def read(folder: str | Path, name: str, key: str) -> GroupedMesh | str:
             label: {count: found[f"part_{number}_{count}"] for count in CELLS if f"part_{number}_{count}" in found}
             for number, label in enumerate(parts)
         },
+        known["unusable"],
     )
