@@ -196,7 +196,7 @@ def _errors_of(panels, cut, name, looks):
         said.append(f"{difference:.2g} % from expected")
     if estimate > 0:
         said.append(f"known to {estimate:.1g} %")
-    panels[1].set_title(f"reference: {', '.join(said)}" if said else "", fontsize=style.SMALL)
+    panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL)
 
 
 def _ends(cut, name, looks):
@@ -256,7 +256,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     rows = _rows(whole, material, kinematics)
     definitions = [name for name in whole.definition.values.tolist() if any(name in row["errors"] for row in rows)]
     looks = {name: style.line(i) | {"linestyle": ""} for i, name in enumerate(definitions)}
-    tall = 1.05 + 0.24 * max(len(rows), 3) + 0.14 * -(-len(definitions) // 5)
+    tall = 1.2 + 0.24 * max(len(rows), 3) + 0.14 * -(-(len(definitions) + 1) // 5)
     figure, axes = style.panels(ax, figsize=(style.PAGE, tall))
     panel = axes[0, 0]
     left = 0.15 + max((labels.width(row["name"]) for row in rows), default=0.5)
@@ -268,7 +268,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
         "left": left,
         "right": min(right, 2.0),
         "bottom": 0.42 + 0.16 * bool(nowhere),
-        "top": 0.22 + 0.14 * -(-len(definitions) // 5),
+        "top": 0.36 + 0.145 * -(-(len(definitions) + 1) // 5),
     }
     style.arrange(figure, axes, **place)
     if not any(row["errors"] for row in rows):
@@ -296,6 +296,8 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     if any(np.isfinite(row["reference"]) for row in rows):
         handles.append(panel.plot([], [], "|", color="0.5", markersize=9, linestyle="")[0])
         names.append("reference to expected")
+    # Above the legend.
+    panel.set_title("Quantities of shapes", pad=6 + 10.5 * -(-len(names) // 5))
     panel.legend(handles, names, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, columnspacing=1.2,
                  handletextpad=0.2, borderaxespad=0.1)  # fmt: skip
     return panel
@@ -369,9 +371,9 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     Examples
     --------
     >>> import springtune as st  # tree = st.open("results/mine")
-    >>> axes = st.plot_shape(tree, shape="cook", definition="lattice")
+    >>> axes = st.plot_shape(tree, shape="cook", definition="area")
     >>> axes[0].get_title(loc="left")
-    'lattice'
+    'area'
     """
     fields, cells = group(data, "shape_fields", alone=False), group(data, "shapes")
     names = list(zip(fields.shape_name.values.tolist(), fields.load_name.values.tolist()))
@@ -496,7 +498,7 @@ def _network(panel, case, cut, name, scale, largest):
         panel.add_collection(lines)
         panel.autoscale()
         if not np.abs(forces).max() > 0:
-            panel.set_title(f"{name}: its law is in an energy, not in springs")
+            panel.set_title(f"{name}: forces in an energy")
     if flag != STATUS.index("solved"):
         message = str(cut.message.sel(definition=name).item())
         text = f"{STATUS[flag].replace('_', ' ')}: {message[:120]}" if lines is None else STATUS[flag]

@@ -209,7 +209,7 @@ def _check_outlines(shape, path, problems):
     for place, segments in rounds:
         if len(segments) < (2 if any(one.centre for one in segments) else 3):
             problems.add(place, f"{len(segments)} sides are no outline; give three or more, or two with an arc")
-    parts = {hole.part for hole in shape.holes} - {""}
+    parts = {hole.part for hole in shape.holes if hole.part}
     for part in sorted(parts - set(shape.parts)):
         problems.add((*path, "holes"), f"part '{part}' has no material; add it under 'parts'")
     for part in sorted(set(shape.parts) - parts):
@@ -307,14 +307,14 @@ def _check_grid(config, grid, path, problems):
 
 
 def _segments(sides):
-    return tuple(Segment(side.start, side.centre, side.group) for side in sides)
+    return tuple(Segment(side.start, side.centre, side.group or "") for side in sides)
 
 
 def _hole(hole):
     """A hole of a config."""
     if hole.circle is None:
-        return Hole(_segments(hole.outline), hole.part)
-    return Hole.circle(hole.circle.centre, hole.circle.radius, hole.group, hole.part)
+        return Hole(_segments(hole.outline), hole.part or "")
+    return Hole.circle(hole.circle.centre, hole.circle.radius, hole.group or "", hole.part or "")
 
 
 def _load(name, case):

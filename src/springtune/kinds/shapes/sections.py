@@ -67,8 +67,9 @@ class Vector:
 
     def __init__(self, kind: str) -> None:
         self.item = Signed(kind)
-        self.kind, example = kind, units.QUANTITY_KINDS[kind].example
-        self.words = f"two of a {kind}, along x and y, such as [{example}, 0]"
+        example = units.QUANTITY_KINDS[kind].example
+        pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
+        self.words = f"{kind}s along x and y, such as [{pair}]"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self._read)
@@ -81,6 +82,18 @@ class Vector:
             raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
         x, y = (self.item._read(one) for one in value)
         return x, y
+
+
+class Words:
+    """Annotation of what is expected where the items of a list or mapping do not tell.
+
+    Parameters
+    ----------
+    words : str
+    """
+
+    def __init__(self, words: str) -> None:
+        self.words = words
 
 
 Place = Annotated[tuple[float, float], Vector("length")]
@@ -119,7 +132,10 @@ class SegmentConfig(Section):
         description="Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse "
         "with its axes along x and y where its ends are not equally far from it. It is straight without.",
     )
-    group: GroupName = Field("", description="Group that it belongs to, for supports, loads and quantities.")
+    group: GroupName | None = Field(None, description="Group that it belongs to, for supports, loads and quantities.")
+
+
+SIDES = Words("a list of sections; see below")
 
 
 class CircleConfig(Section):
@@ -133,9 +149,15 @@ class HoleConfig(Section):
     """A hole, or what fills it: a circle, or an outline."""
 
     circle: CircleConfig | None = Field(None, description="Where it is round.")
-    outline: list[SegmentConfig] | None = Field(None, description="Where it is not: a round of sides, in either sense.")
-    group: GroupName = Field("", description="Group that the circle belongs to; sides of an outline have their own.")
-    part: PartName = Field("", description="Part of the body that fills it, of a material under `parts`.")
+    outline: Annotated[list[SegmentConfig], SIDES] | None = Field(
+        None, description="Where it is not: a round of sides, in either sense."
+    )
+    group: GroupName | None = Field(
+        None, description="Group that the circle belongs to; sides of an outline have their own."
+    )
+    part: PartName | None = Field(
+        None, description="Part of the body that fills it, of a material under `parts`; nothing fills it without."
+    )
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -265,10 +287,12 @@ class ShapeLoadConfig(Section):
     supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)] = Field(
         description="What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."
     )
-    forces: dict[str, ForceVector] = Field(
+    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = Field(
         {}, description="Forces along x and y, by group or point: of a group the total one, spread evenly by length."
     )
-    pressures: dict[str, PressureConfig] = Field({}, description="Pressures, by group; positive towards the body.")
+    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = Field(
+        {}, description="Pressures, by group; positive towards the body."
+    )
     gravity: Gravity = Field(
         ["0", "0"],
         validate_default=True,
@@ -283,7 +307,9 @@ class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
     thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
-    outline: list[SegmentConfig] | None = Field(None, description="Round of its sides, counter-clockwise.")
+    outline: Annotated[list[SegmentConfig], SIDES] | None = Field(
+        None, description="Round of its sides, counter-clockwise."
+    )
     holes: list[HoleConfig] = Field([], description="Holes, and parts of other materials.")
     file: FileName | None = Field(
         None,
@@ -291,15 +317,15 @@ class ShapeConfig(Section):
         "study's folder; its groups are the shape's.",
     )
     unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
-    points: dict[str, Place] = Field(
+    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
         {}, description="Named points of an outline or inside of it: particles of every mesh."
     )
-    refined: dict[str, Ratio] = Field(
+    refined: Annotated[dict[str, Ratio], Words("numbers above 0, by group, point or part")] = Field(
         {},
         description="Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as "
         "`{hole: 0.25}`; from there on it grows.",
     )
-    parts: dict[str, MaterialName] = Field(
+    parts: Annotated[dict[str, MaterialName], Words("names of materials, by part")] = Field(
         {}, description="Materials of the parts, by name; the rest is of the grid's material."
     )
     loads: Annotated[dict[str, ShapeLoadConfig], Named("load")] = Field(description="Loads, by name.")

@@ -9,12 +9,14 @@ VIEWS = (
         "Quantities of interest of bodies of any outline: networks beside converged references on the same shape, and "
         "beside the numbers of others.",
         (
-            Plot("error over particles", "error", "particles", "definition", along="mesh_size", log="xy"),
-            Plot("error over seconds", "error", "solve_seconds", "definition", along="mesh_size", log="xy"),
+            Plot("error over particles", "error", "particles", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
+            Plot("error over seconds", "error", "solve_seconds", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
             Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
             Plot("errors of definitions on shapes", "error", "shape", "definition", "map"),
             Plot("difference to what others give", "expected_error", "particles", "definition", along="mesh_size",
-                 log="xy"),
+                 ascending=True, log="xy"),
             Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
         ),
     ),
