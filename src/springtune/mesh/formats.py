@@ -20,7 +20,7 @@ CELLS = {"triangle": 3, "quad": 4}
 DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
 """Of cells that are read and of those that make groups, by meshio's name."""
 
-PART = "part"
+PART_NUMBERS = "part"
 """Cell data whose whole numbers are parts of the body; 0 is the main one."""
 
 PHYSICAL = "gmsh:physical"
@@ -109,8 +109,8 @@ def _vtu_marks(
 ) -> tuple[dict[str, list[np.ndarray]], dict[str, np.ndarray]]:
     """Cell data of zeros and ones by group, and no field data."""
     names = dict.fromkeys(name for *_, names in blocks for name in names)
-    if PART in names:
-        raise MeshError(f"{path}: a group is named '{PART}', by which VTU files number parts; rename it")
+    if PART_NUMBERS in names:
+        raise MeshError(f"{path}: a group is named '{PART_NUMBERS}', by which VTU files number parts; rename it")
     return {name: [np.full(len(corners), name in of, dtype=np.int8) for _, corners, of in blocks] for name in names}, {}
 
 
@@ -236,6 +236,8 @@ def file_content(path: str | Path) -> Any:
             said = said or type(error).__name__
         shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
         why = f"it is damaged, or not what its name says{shown}; write it again"
+        if PHYSICAL in said:
+            why = f"some of its elements are in no physical group{shown}; give all of them one, or write format 2.2"
         if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
             why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
         raise MeshError(f"{path}: meshio cannot read it: {why}") from None

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..registry import NAME, NAME_RULE
 from .cells import Mesh, MeshError
-from .formats import CELLS, DIMENSIONS, LEFT_OUT, PART, PHYSICAL, assembled, coordinates, file_content
+from .formats import CELLS, DIMENSIONS, LEFT_OUT, PART_NUMBERS, PHYSICAL, assembled, coordinates, file_content
 from .groups import GroupedMesh
 from .sheets import in_words, outline_of, sheet_fault
 
@@ -87,7 +87,8 @@ class _Groups:
             elif block.type in LEFT_OUT:
                 (lines if block.type == "line" else points)[name].append(np.asarray(block.data)[chosen])
         for name, nodes in self._point_sets():
-            points[name].append(nodes)
+            if len(nodes):
+                points[name].append(nodes)
         for name in {**lines, **points, **cells}:
             if not NAME.fullmatch(name):
                 self.unusable[name] = f"cannot be a name; {NAME_RULE}"
@@ -97,18 +98,19 @@ class _Groups:
             if name in points and name not in self.unusable:
                 self._add_points(name, np.unique(np.concatenate(points[name])))
         self._add_parts({name: masks for name, masks in cells.items() if NAME.fullmatch(name)})
-        for name in set(self.sides) & set(self.points):
+        for name in [name for name in self.sides if name in self.points]:
             del self.points[name], self.sides[name]
             self.unusable[name] = "names sides and a point in the file; rename one"
         named = [*self.content.field_data, *self.content.point_sets, *self.content.cell_sets]
-        for name in {name for name in named if not name.startswith("gmsh:")} - {*lines, *points, *cells}:
-            self.unusable.setdefault(name, "has nothing in the file; put something in it")
+        for name in named:
+            if not name.startswith("gmsh:") and name not in {*lines, *points, *cells}:
+                self.unusable.setdefault(name, "has nothing in the file; put something in it")
         return GroupedMesh(self.mesh, self.sides, self.points, self.parts, self.unusable)
 
     def _sets(self) -> Iterator[tuple[str, int, np.ndarray]]:
         """Name, number of the block of cells, and numbers of cells in it, of all sets of cells."""
         content, blocks = self.content, self.content.cells
-        named = {name for name in content.cell_sets if not name.startswith("gmsh:")}
+        named = [name for name in content.cell_sets if not name.startswith("gmsh:")]
         for name in named:
             parts = content.cell_sets[name]
             if len(parts) != len(blocks):
@@ -124,12 +126,12 @@ class _Groups:
                 if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in DIMENSIONS:
                     continue
                 if key == PHYSICAL:
-                    for tag in set(np.unique(values).tolist()) - {0}:
+                    for tag in np.unique(values[values != 0]).tolist():
                         name = tags.get((tag, DIMENSIONS[blocks[number].type]), str(tag))
                         if name not in named:
                             yield name, number, np.flatnonzero(values == tag)
-                elif key == PART:
-                    for tag in set(np.unique(values).tolist()) - {0}:
+                elif key == PART_NUMBERS:
+                    for tag in np.unique(values[values != 0]).tolist():
                         yield str(tag), number, np.flatnonzero(values == tag)
                 elif ":" not in key and self._marks(key, arrays):
                     yield key, number, np.flatnonzero(values)

@@ -49,10 +49,6 @@ def sheet_fault(mesh: Mesh) -> str:
     if fault:
         return fault
     points = mesh.points
-    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
-    if len(again):
-        where = in_words(points[again[0]])
-        return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
     touching = _touching(points, outline)
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
@@ -60,6 +56,10 @@ def sheet_fault(mesh: Mesh) -> str:
         return (
             opening(points, outline[touching], count) or f"cells overlap ({count}, the first one {first}); remove some"
         )
+    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
+    if len(again):
+        where = in_words(points[again[0]])
+        return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
     rounds = _rounds(outline)
     for one in rounds:
         others = outline[~np.isin(outline[:, 0], one)]
@@ -153,29 +153,54 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
 
 def _touching(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Numbers of edges that come near another one with which they share no end."""
+    shortest = np.linalg.norm(np.diff(points[edges], axis=1), axis=2).min()
+    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * shortest)
+    one, other, _ = nearer(points, edges, np.full(len(edges), 0.5 * small))
+    return np.union1d(one, other)
+
+
+def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs of edges that are as near as they reach together, and share no end.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        [m]
+    edges : ndarray of int, shape (n, 2)
+    reach : ndarray of float, shape (n,)
+        Of each edge [m].
+
+    Returns
+    -------
+    one, other : ndarray of int, shape (n_pairs,)
+        Numbers of the edges.
+    distances : ndarray of float, shape (n_pairs,)
+        [m]
+    """
     start, end = points[edges[:, 0]], points[edges[:, 1]]
-    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * np.linalg.norm(end - start, axis=1).min())
     # Along a direction in which few sides of shapes run, an edge overlaps few others.
     along = np.stack([start, end]) @ np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])
-    low, high = along.min(axis=0) - 0.5 * small, along.max(axis=0) + 0.5 * small
+    low, high = along.min(axis=0) - reach[:, None], along.max(axis=0) + reach[:, None]
     order = np.argsort(low[:, 0], kind="stable")
-    last = np.searchsorted(low[order, 0], high[order, 0], side="right")
-    counts = last - np.arange(len(order)) - 1
-    found: list[np.ndarray] = []
+    counts = np.searchsorted(low[order, 0], high[order, 0], side="right") - np.arange(len(order)) - 1
+    before = np.concatenate([[0], np.cumsum(counts)])
+    found = []
     begin = 0
     while begin < len(order):
-        stop = max(begin + 1, int(np.searchsorted(np.cumsum(counts[begin:]), MOST_PAIRS)) + begin)
+        stop = max(begin + 1, int(np.searchsorted(before, before[begin] + MOST_PAIRS, side="right")) - 1)
         here = counts[begin:stop]
         first = np.repeat(np.arange(begin, stop), here)
-        second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(here) - here, here)
+        second = first + 1 + np.arange(len(first)) - np.repeat(before[begin:stop] - before[begin], here)
         one, other = order[first], order[second]
         near = (low[one, 1] <= high[other, 1]) & (low[other, 1] <= high[one, 1])
         near &= (edges[one][:, :, None] != edges[other][:, None, :]).all(axis=(1, 2))
         one, other = one[near], other[near]
-        close = _apart(start[one], end[one], start[other], end[other]) <= small
-        found += [one[close], other[close]]
+        distances = _apart(start[one], end[one], start[other], end[other])
+        close = distances <= reach[one] + reach[other]
+        found.append((one[close], other[close], distances[close]))
         begin = stop
-    return np.unique(np.concatenate(found))
+    ones, others, apart = (np.concatenate(parts) for parts in zip(*found))
+    return ones, others, apart
 
 
 def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:

@@ -122,7 +122,9 @@ def _free_motion(points: np.ndarray, held: np.ndarray) -> str:
         return "move and turn"
     u, v, turn = motions[:, 0]
     if abs(turn) > 1e-6:
-        x0, y0 = 1e3 * (middle + np.array([-v, u]) / turn * np.ptp(points, axis=0).max())
+        size = np.ptp(points, axis=0).max()
+        about = middle + np.array([-v, u]) / turn * size
+        x0, y0 = 1e3 * np.where(np.abs(about) > 1e-9 * size, about, 0.0)
         return f"turn about ({x0:.6g}, {y0:.6g}) mm"
     return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")
 
