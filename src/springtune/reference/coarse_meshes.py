@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
 from ..problem.outlines import OutlineSide
-from ..problem.shapes import Shape
+from ..problem.shapes import Point, Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
 Ends = tuple[int, int]
@@ -30,6 +31,15 @@ LARGEST_TURN = np.pi / 6
 
 LARGEST_SAGITTA = 0.15
 """Of a side of a triangle along an arc, over the distance to what else there is."""
+
+SAMPLES = 7
+"""Points on a piece of an outline at which distances are taken."""
+
+SMALLEST = 1e-9
+"""Distance that is taken for none, over the extent of a shape."""
+
+STRAIGHT = 1e-6
+"""Turn of a polygon that is taken for none [rad]."""
 
 FEWEST_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""
@@ -257,6 +267,7 @@ class _Piece:
 
     side: OutlineSide
     span: tuple[float, float]
+    groups: tuple[str, ...]
     left: int
     right: int
 
@@ -279,23 +290,25 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
     done = False
     while not done:
         done = True
-        samples = np.array([piece.at(np.linspace(0, 1, 7)) for piece in pieces])
+        samples = np.array([piece.at(np.linspace(0, 1, SAMPLES)) for piece in pieces])
         chords = samples[:, -1] - samples[:, 0]
         lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
         normal = chords[:, ::-1] * [1, -1] / np.linalg.norm(chords, axis=1)[:, None]
         sagittas = np.abs(((samples - samples[:, :1]) * normal[:, None]).sum(axis=2)).max(axis=1)
+        tree = cKDTree(samples.reshape(-1, 2))
         refined: list[_Piece] = []
-        for i, piece in enumerate(pieces):
-            apart = np.linalg.norm(samples[:, None] - samples[i][None, :, None], axis=3).min(axis=(1, 2))
-            apart[i] = np.inf
-            clear = apart > 1e-9 * extent
+        for piece, at, length, sagitta in zip(pieces, samples, lengths, sagittas):
+            # What is farther than its length does not matter.
+            near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // SAMPLES)
+            apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
+            clear = apart > SMALLEST * extent
             nearest = apart[clear].min(initial=np.inf)
             limit = min(
                 extent / FEWEST_ALONG,
                 ELEMENT_GROWTH * nearest,
-                (2 * lengths[clear] + apart[clear]).min(initial=np.inf),
+                (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf),
             )
-            if lengths[i] > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagittas[i] > LARGEST_SAGITTA * nearest:
+            if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
                 refined += piece.halves()
                 done = False
             else:
@@ -304,14 +317,30 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
     return pieces
 
 
-def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float = LARGEST_TURN) -> CoarseMesh:
-    """Coarse triangles of a shape that has an outline, by netgen's advancing front.
+def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:
+    """Parameters of the ends of a side and of points on it, and the names of these."""
+    cuts, on_it = {0.0, 1.0}, []
+    for name, point in points.items():
+        parameter, distance = side.nearest(point)
+        if distance <= small:
+            on_it.append(name)
+            if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > small:
+                cuts.add(parameter)
+    return sorted(cuts), on_it
+
+
+def outline_mesh(
+    shape: Shape, grouped: GroupedMesh | None, points: Mapping[str, Point], largest_turn: float = LARGEST_TURN
+) -> CoarseMesh:
+    """Coarse triangles of a shape, by netgen's advancing front.
 
     Parameters
     ----------
     shape : Shape
-    corners : iterable of str
-        Named points that are to be corners of triangles; those on the outline are anyway.
+    grouped : GroupedMesh or None
+        The mesh of one that is that of a file: the polygon around its cells, and those around its parts, are followed.
+    points : mapping of str to tuple of float
+        Named points that are to be corners of triangles [m].
     largest_turn : float
         Of the direction of a side along an arc [rad].
 
@@ -324,48 +353,55 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
     MeshError
         If netgen fails.
     """
+    if grouped is None:
+        names = ("", *shape.parts)
+        numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
+        whole = [
+            _Piece(side, (0.0, 1.0), (side.group,) if side.group else (), numbers[one.inner], numbers[one.outer])
+            for one in shape.rounds
+            for side in one.sides
+        ]
+    else:
+        names, whole = _polygons(grouped)
+    corners = np.array([end for piece in whole for end in (piece.side.start, piece.side.end)])
+    extent = float(np.ptp(corners, axis=0).max())
+    pieces, placed = [], set()
+    for piece in whole:
+        cuts, on_it = _cut(piece.side, points, SMALLEST * extent)
+        placed.update(on_it)
+        pieces += [replace(piece, span=span) for span in zip(cuts, cuts[1:])]
+    mesh = _triangulated(shape.name, _refined(pieces, extent, largest_turn), names, extent)
+    for name, point in points.items():
+        where = np.array(point, dtype=float)
+        if name in placed:
+            mesh.named[name] = int(np.argmin(np.linalg.norm(mesh.points - where, axis=1)))
+            mesh.points[mesh.named[name]] = where
+    for name, point in points.items():
+        if name not in placed:
+            mesh.insert(name, np.array(point, dtype=float))
+    return mesh
+
+
+def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], extent: float) -> CoarseMesh:
+    """Triangles between pieces of outlines."""
     from netgen.geom2d import SplineGeometry  # here, since only a shape should pay for it
     from netgen.meshing import NgException
 
-    names = ("", *shape.parts)
-    (left, low), (right, high) = shape.extent
-    extent = max(right - left, high - low)
-    numbers = {None: 0} | {name: number + 1 for number, name in enumerate(names)}
-    pieces: list[_Piece] = []
-    inner = {name: point for name, point in shape.points.items() if name in corners}
-    placed = {}
-    for one in shape.rounds:
-        for side in one.sides:
-            cuts = {0.0, 1.0}
-            for name, point in shape.points.items():
-                parameter, distance = side.nearest(point)
-                if distance <= 1e-9 * extent:
-                    placed[name] = point
-                    inner.pop(name, None)
-                    if min(np.hypot(*np.subtract(point, end)) for end in (side.start, side.end)) > 1e-9 * extent:
-                        cuts.add(parameter)
-            spans = sorted(cuts)
-            for span in zip(spans, spans[1:]):
-                pieces.append(_Piece(side, span, numbers[one.inner], numbers[one.outer]))
-    pieces = _refined(pieces, extent, largest_turn)
-
-    # Lengths about 1: netgen's own tolerances are absolute.
-    scale = FEWEST_ALONG / extent
-    origin = np.array([left, low])
-    geometry = SplineGeometry()
     ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
+    # Lengths about 1: netgen's own tolerances are absolute.
+    scale, origin = FEWEST_ALONG / extent, ends.min(axis=(0, 1))
+    geometry = SplineGeometry()
     keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
     given = np.empty((len(keys), 2))
     given[places.ravel()] = ends.reshape(-1, 2)
-    corner_numbers = [geometry.AppendPoint(*((point - origin) * scale)) for point in given]
-    joined = places.reshape(-1, 2)
-    for i, (piece, (start, end)) in enumerate(zip(pieces, joined)):
-        line = ["line", corner_numbers[start], corner_numbers[end]]
+    numbers = [geometry.AppendPoint(*((point - origin) * scale)) for point in given]
+    for i, (piece, (start, end)) in enumerate(zip(pieces, places.reshape(-1, 2))):
+        line = ["line", numbers[start], numbers[end]]
         geometry.Append(line, leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
     try:
         made = geometry.GenerateMesh(maxh=1.0, grading=0.5)
     except NgException as error:
-        raise MeshError(f"netgen cannot mesh {shape.name!r}: {error}; look for sides that meet or touch") from None
+        raise MeshError(f"netgen cannot mesh {name!r}: {error}; look for sides that meet or touch") from None
     points = np.array([point.p for point in made.Points()])[:, :2] / scale + origin
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
     parts = np.array([element.index - 1 for element in made.Elements2D()])
@@ -382,88 +418,71 @@ def outline_mesh(shape: Shape, corners: Iterable[str] = (), largest_turn: float 
         shares[np.abs(shares - 1) < 1e-7] = 1.0
         exact[[first, second]] = piece.at(shares)
         span = piece.span[0] + shares * (piece.span[1] - piece.span[0])
-        groups = (piece.side.group,) if piece.side.group else ()
         arc = piece.side if piece.side.arc else None
-        sides[first, second] = Side(groups, arc, (float(span[0]), float(span[1])))
-    named = {}
-    for name, point in placed.items():
-        named[name] = int(np.argmin(np.linalg.norm(exact - point, axis=1)))
-        exact[named[name]] = point
-    mesh = CoarseMesh(exact, triangles, parts, names, sides, named)
-    for name, where in inner.items():
-        mesh.insert(name, np.array(where))
-    return mesh
+        sides[first, second] = Side(piece.groups, arc, (float(span[0]), float(span[1])))
+    return CoarseMesh(exact, triangles, parts, names, sides, {})
 
 
-def grouped_mesh(grouped: GroupedMesh, corners: Mapping[str, tuple[float, float]]) -> CoarseMesh:
-    """Triangles of a mesh as read; quadrilaterals are halved by their shorter diagonal.
-
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    corners : mapping of str to tuple of float
-        Named points that are to be corners of triangles [m].
-
-    Returns
-    -------
-    CoarseMesh
-    """
+def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
+    """Names of parts, and straight pieces around and between the parts of a mesh."""
     mesh = grouped.mesh
     names = tuple(dict.fromkeys(["", *grouped.parts]))
-    of_cells = {count: np.zeros(len(cells), dtype=int) for count, cells in mesh.cells.items()}
-    for name, inside in grouped.parts.items():
-        for count, which in inside.items():
-            of_cells[count][which] = names.index(name)
-    triangles, parts = [mesh.triangles], [of_cells.get(3, np.zeros(0, dtype=int))]
-    if len(quads := mesh.quads):
-        at = mesh.points[quads]
-        across = np.linalg.norm(at[:, 2] - at[:, 0], axis=1) <= np.linalg.norm(at[:, 3] - at[:, 1], axis=1)
-        turned = np.where(across[:, None], quads, np.roll(quads, -1, axis=1))
-        triangles += [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
-        parts += [of_cells[4], of_cells[4]]
-    all_triangles, all_parts = np.concatenate(triangles), np.concatenate(parts)
-
-    groups: dict[tuple[int, int], tuple[str, ...]] = {}
-    for start, end in mesh.edges[mesh.on_outline].tolist():
-        groups[start, end] = ()
+    ways, parts = [], []
+    for count, cells in mesh.cells.items():
+        of_cells = np.zeros(len(cells), dtype=int)
+        for name, inside in grouped.parts.items():
+            if count in inside:
+                of_cells[inside[count]] = names.index(name)
+        for i in range(count):
+            ways.append(cells[:, [i, (i + 1) % count]])
+            parts.append(of_cells)
+    n = len(mesh.points)
+    way, part = np.concatenate(ways), np.concatenate(parts)
+    codes, twins = way[:, 0] * n + way[:, 1], way[:, 1] * n + way[:, 0]
+    order = np.argsort(codes)
+    found = np.minimum(np.searchsorted(codes[order], twins), len(codes) - 1)
+    other = order[found]
+    outer = codes[other] != twins
+    between = ~outer & (part < part[other])
+    groups: dict[Ends, tuple[str, ...]] = {}
     for name, edges in grouped.sides.items():
-        for start, end in np.sort(edges, axis=1).tolist():
-            groups[start, end] = (*groups.get((start, end), ()), name)
-    if len(names) > 1:
-        codes: dict[Ends, int] = {}
-        for i in range(3):
-            pairs = np.sort(all_triangles[:, [i, (i + 1) % 3]], axis=1)
-            for start, end, part in zip(*pairs.T.tolist(), all_parts.tolist()):
-                if codes.setdefault((start, end), part) != part:
-                    groups.setdefault((start, end), ())
-    # Points that no triangle has would be unknowns without a stiffness.
-    used, inverse = np.unique(all_triangles, return_inverse=True)
-    number = np.full(len(mesh.points), -1)
-    number[used] = np.arange(len(used))
-    sides = {}
-    for (start, end), of in groups.items():
-        first, second = int(number[start]), int(number[end])
-        sides[min(first, second), max(first, second)] = Side(of)
-    points = mesh.points[used]
-    coarse = CoarseMesh(points, inverse.reshape(-1, 3), all_parts, names, sides, {})
-    extent = np.ptp(points, axis=0).max()
-    for name, point in corners.items():
-        where = np.array(point, dtype=float)
-        apart = np.linalg.norm(coarse.points - where, axis=1)
-        if apart.min() <= 1e-9 * extent:
-            coarse.named[name] = int(np.argmin(apart))
-            continue
-        for first, second in list(coarse.sides):
-            start, end = coarse.points[first], coarse.points[second]
-            share = (where - start) @ (end - start) / ((end - start) @ (end - start))
-            if 0 < share < 1 and np.linalg.norm(start + share * (end - start) - where) <= 1e-9 * extent:
-                coarse.bisect(first, second)
-                coarse.points[-1] = where
-                coarse.named[name] = len(coarse.points) - 1
-                break
-        else:
-            coarse.insert(name, where)
-    return coarse
+        for first, second in np.sort(edges, axis=1).tolist():
+            groups[first, second] = (*groups.get((first, second), ()), name)
+    # From each point on: where to, and what is beside the way.
+    leaving: dict[int, list[tuple[int, tuple[tuple[str, ...], int, int]]]] = {}
+    arriving: dict[int, int] = {}
+    for row in np.flatnonzero(outer | between):
+        first, second = way[row].tolist()
+        right = 0 if outer[row] else int(part[other[row]]) + 1
+        key = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
+        leaving.setdefault(first, []).append((second, key))
+        arriving[second] = arriving.get(second, 0) + 1
+
+    def goes_on(before: int, here: int, key: object) -> tuple[int, object] | None:
+        """Where a straight way goes on to; None where it ends."""
+        if arriving.get(here) != 1 or len(leaving.get(here, ())) != 1 or leaving[here][0][1] != key:
+            return None
+        there = leaving[here][0][0]
+        one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
+        return (there, key) if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT * (one @ two) else None
+
+    continued = {
+        (here, goes_on(first, here, key)[0])  # type: ignore[index]
+        for first, ways_on in leaving.items()
+        for here, key in ways_on
+        if goes_on(first, here, key)
+    }
+    pieces = []
+    for first, ways_on in leaving.items():
+        for second, key in ways_on:
+            if (first, second) in continued:
+                continue
+            before, here = first, second
+            while (on := goes_on(before, here, key)) is not None:
+                before, here = here, on[0]
+            start, end = (tuple(mesh.points[point].tolist()) for point in (first, here))
+            pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *key))
+    return names, pieces
 
 
 def singular_corners(

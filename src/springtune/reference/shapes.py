@@ -18,7 +18,7 @@ from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
 from ..problem.materials import Material
 from ..problem.shapes import LoadCase, Quantity, Shape
-from .coarse_meshes import LARGEST_TURN, CoarseMesh, Side, grouped_mesh, outline_mesh, singular_corners
+from .coarse_meshes import LARGEST_TURN, CoarseMesh, Side, outline_mesh, singular_corners
 from .limits import most_rotation_and_strain
 from .small_strain import ReferenceNotConvergedError
 from .triangles import SIDE_CORNERS, function_counts, shape_functions, side_fit, side_functions, tabulated
@@ -275,17 +275,15 @@ class _Problem:
         used = {*held, *(traction.group for traction in load.tractions)} & set(self.points)
         # Small triangles where a stress is asked for: it is the last to converge.
         probed = {quantity.of for quantity in load.quantities if quantity.kind == "stress"} & set(self.points)
-        if grouped is not None:
-            self.mesh = grouped_mesh(grouped, {name: tuple(self.points[name]) for name in used | probed})
+        corners = {name: tuple(self.points[name]) for name in sorted(used | probed)}
+        turn = LARGEST_TURN
+        for _ in range(5):
+            self.mesh = outline_mesh(shape, grouped, corners, turn)
+            if _unfolded(self.mesh):
+                break
+            turn /= 2
         else:
-            turn = LARGEST_TURN
-            for _ in range(5):
-                self.mesh = outline_mesh(shape, used | probed, turn)
-                if _unfolded(self.mesh):
-                    break
-                turn /= 2
-            else:
-                raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
+            raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
 
         missing = [name for name in self.mesh.names if name not in materials]
         present = {self.mesh.names[part] for part in np.unique(self.mesh.parts)}
