@@ -8,7 +8,7 @@ from ...problem.compare import deformation_error
 from ...problem.status import Status
 from ...reference.limits import beyond_linear
 from . import plan
-from .described import quantity_key
+from .described import named, quantity_key
 from .names import UNITS
 from .variables import SHAPES
 
@@ -59,14 +59,15 @@ def _references(study, part, folder, found, expected):
         task = plan.reference_task(part, shape, material, load)
         result = store.read_one(folder / "shape_references", task["key"])
         labels = {"shape": shape, "material": material, "load": load}
-        message, objections = result["message"], {}
+        case = part.shape[shape].loads[load]
+        message, objections = named(result["message"], part.shape[shape], case), {}
         values = {"reference_seconds": result["seconds"]}
         if not message:
             values |= {f"reference_{name}": result[name] for name in ("unknowns", "rotation", "strain")}
             objections = {"linear": "", "nonlinear": beyond_linear(result["rotation"], result["strain"])}
             for kinematics in study.axes["kinematics"]:
                 found.put({"reference_applies": not objections[kinematics]}, kinematics=kinematics, **labels)
-            for one in part.shape[shape].loads[load].quantities:
+            for one in case.quantities:
                 key = quantity_key(one)
                 value = result["values"].get(key, np.nan)
                 compared = {
@@ -75,7 +76,9 @@ def _references(study, part, folder, found, expected):
                     "reference_expected_error": _error(value, expected[shape, load][one.name]),
                 }
                 found.put(compared, quantity=one.name, **labels)
-        values["reference_message"] = message or objections["nonlinear"]
+            lacking = (named(why, part.shape[shape], case) for why in result["lacking"].values())
+            message = "; ".join(filter(None, (*lacking, objections["nonlinear"])))
+        values["reference_message"] = message
         found.put(values, **labels)
         answers[shape, material, load] = result, objections
     return answers
@@ -95,11 +98,15 @@ def _scene(part, one, result, references, expected, found):
     }
     reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
     values = {name: result[name] for name in OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
-    why = f"no reference: {reference['message']}" if reference.get("message") else objections.get(one.kinematics, "")
+    case = part.shape[one.shape].loads[one.load]
+    whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
+    whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]
+    why = "; ".join(filter(None, (*whys, objections.get(one.kinematics, ""))))
+    values["message"] = named(values.get("message", ""), part.shape[one.shape], case)
     if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
-        values["message"] = "; ".join(filter(None, (values.get("message"), why)))
+        values["message"] = "; ".join(filter(None, (values["message"], why)))
     found.put(values, **labels)
-    for quantity in part.shape[one.shape].loads[one.load].quantities:
+    for quantity in case.quantities:
         key = quantity_key(quantity)
         value = result.get("values", {}).get(key, np.nan)
         compared = {

@@ -7,8 +7,8 @@ from typing import Any
 from ...problem.materials import Material
 from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
-CASE = "load"
-"""Name of the load of a shape in tasks."""
+UNNAMED, CASE = "shape", "load"
+"""Names of a shape and of its load in tasks."""
 
 
 def quantity_key(quantity: Quantity) -> str:
@@ -88,7 +88,7 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
     points = {name: _pair(point) for name, point in described["points"].items()}
     loads = {} if case is None else {CASE: load_of(case)}
     file = described.get("file", "")
-    return Shape("shape", thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
+    return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
@@ -107,6 +107,28 @@ def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
     """
     found = {quantity_key(one): float(values[one.name]) for one in case.quantities if one.name in values}
     return {key: value for key, value in found.items() if isfinite(value)}
+
+
+def named(message: str, shape: Shape, case: LoadCase) -> str:
+    """A message of a task with the names that a study has.
+
+    Parameters
+    ----------
+    message : str
+    shape : Shape
+    case : LoadCase
+        One of its loads.
+
+    Returns
+    -------
+    str
+    """
+    names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{CASE}'": f"load '{case.name}'"}
+    order = sorted({quantity_key(one) for one in case.quantities})
+    names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}
+    for plain, name in names.items():
+        message = message.replace(plain, name)
+    return message
 
 
 def load_of(described: dict[str, Any]) -> LoadCase:

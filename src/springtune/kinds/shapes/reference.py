@@ -1,6 +1,7 @@
 """Stage `shape_reference`: one finite-element solution each shape, material and load, on the shape itself."""
 
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from ...jobs import store
 from ...reference.shapes import solve_shape
 from ...reference.small_strain import ReferenceNotConvergedError
-from .described import CASE, by_key, materials_of, shape_of
+from .described import CASE, by_key, materials_of, quantity_key, shape_of
 from .mesh import make
 
 ALONG = 24
@@ -55,25 +56,52 @@ def _hole(why):
 
 def _solved(task):
     grouped = make(task["shape"]) if "file" in task["shape"] else None
-    shape = shape_of(task["shape"], task["thickness"], task["load"])
+    shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
+    case = shape.loads[CASE]
     try:
-        found = solve_shape(shape, shape.loads[CASE], materials_of(task["materials"]), grouped)
+        found, lacking = _converged(shape, case, materials, grouped)
     except (ReferenceNotConvergedError, ValueError) as error:  # groups that are not there, bodies that are not held
         return _hole(str(error))
+    values, estimates = {}, {}
+    for one in found:
+        values |= by_key(one.values, case)
+        estimates |= by_key(one.error_estimates, case)
     rounds = _rounds(shape, grouped)
     points = np.concatenate(rounds)
     return {
         "message": "",
-        "values": by_key(found.values, shape.loads[CASE]),
-        "error_estimates": by_key(found.error_estimates, shape.loads[CASE]),
-        "unknowns": int(found.unknowns),
-        "energy": float(found.energy),
-        "rotation": float(found.rotation),
-        "strain": float(found.strain),
+        "values": values,
+        "error_estimates": estimates,
+        "lacking": lacking,
+        "unknowns": max(int(one.unknowns) for one in found),
+        "energy": float(found[0].energy),
+        "rotation": float(found[0].rotation),
+        "strain": float(found[0].strain),
         "outline_points": points,
-        "outline_displacements": found.at(points),
+        "outline_displacements": found[0].at(points),
         "outline_lengths": np.array([len(one) for one in rounds]),
     }
+
+
+def _converged(shape, case, materials, grouped):
+    """References that between them have all quantities that converge, and why others have none, by their keys.
+
+    One that does not converge, such as the stress at a corner, does not cost the others.
+    """
+    try:
+        return [solve_shape(shape, case, materials, grouped)], {}
+    except ReferenceNotConvergedError:
+        if len(case.quantities) == 1:
+            raise
+    found, lacking = [], {}
+    for quantity in case.quantities:
+        try:
+            found.append(solve_shape(shape, replace(case, quantities=(quantity,)), materials, grouped))
+        except ReferenceNotConvergedError as error:
+            lacking[quantity_key(quantity)] = str(error)
+    if not found:
+        raise ReferenceNotConvergedError("; ".join(dict.fromkeys(lacking.values())))
+    return found, lacking
 
 
 def _rounds(shape, grouped):
