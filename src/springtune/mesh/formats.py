@@ -17,7 +17,7 @@ from .sheets import DIGITS, in_words
 CELLS = {"triangle": 3, "quad": 4}
 """Corners of the cells that can be read, by meshio's name."""
 
-DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
+CELL_DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
 """Of cells that are read and of those that make groups, by meshio's name."""
 
 PART_NUMBERS = "part"
@@ -122,7 +122,7 @@ def _gmsh_tags(
     tags = []
     for kind, corners, names in blocks:
         for name in names:
-            if fields.setdefault(name, np.array([len(fields) + 1, DIMENSIONS[kind]]))[1] != DIMENSIONS[kind]:
+            if fields.setdefault(name, np.array([len(fields) + 1, CELL_DIMENSIONS[kind]]))[1] != CELL_DIMENSIONS[kind]:
                 raise MeshError(f"{path}: '{name}' names groups of two kinds, and Gmsh's are of one; write .vtu")
         tags.append(np.full(len(corners), fields[names[0]][0] if names else 0))
     return {PHYSICAL: tags, "gmsh:geometrical": tags}, fields

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..registry import NAME, NAME_RULE
 from .cells import Mesh, MeshError
-from .formats import CELLS, DIMENSIONS, LEFT_OUT, PART_NUMBERS, PHYSICAL, assembled, coordinates, file_content
+from .formats import CELL_DIMENSIONS, CELLS, LEFT_OUT, PART_NUMBERS, PHYSICAL, assembled, coordinates, file_content
 from .groups import GroupedMesh
 from .sheets import in_words, outline_of, sheet_fault
 
@@ -79,7 +79,9 @@ class _Groups:
             block = self.content.cells[number]
             if not len(chosen):
                 continue
-            if block.type in CELLS:
+            if not 0 <= chosen.min() <= chosen.max() < len(block.data):
+                self.unusable[name] = "has cells that are not in the file; remove these"
+            elif block.type in CELLS:
                 masks = cells.setdefault(
                     name, {n: np.zeros(len(found), dtype=bool) for n, found in self.mesh.cells.items()}
                 )
@@ -92,12 +94,16 @@ class _Groups:
         for name in {**lines, **points, **cells}:
             if not NAME.fullmatch(name):
                 self.unusable[name] = f"cannot be a name; {NAME_RULE}"
+            given = np.concatenate([one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]] or [[0]])
+            if not 0 <= given.min() <= given.max() < len(self.numbers):
+                self.unusable[name] = "has points that are not in the file; remove these"
+            if name in self.unusable:
                 continue
             if name in lines:
                 self._add_lines(name, np.unique(np.concatenate(lines[name]).reshape(-1, 2), axis=0))
             if name in points and name not in self.unusable:
                 self._add_points(name, np.unique(np.concatenate(points[name])))
-        self._add_parts({name: masks for name, masks in cells.items() if NAME.fullmatch(name)})
+        self._add_parts({name: masks for name, masks in cells.items() if name not in self.unusable})
         for name in [name for name in self.sides if name in self.points]:
             del self.points[name], self.sides[name]
             self.unusable[name] = "names sides and a point in the file; rename one"
@@ -123,11 +129,11 @@ class _Groups:
         for key, arrays in content.cell_data.items():
             for number, values in enumerate(arrays):
                 values = np.asarray(values)
-                if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in DIMENSIONS:
+                if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in CELL_DIMENSIONS:
                     continue
                 if key == PHYSICAL:
                     for tag in np.unique(values[values != 0]).tolist():
-                        name = tags.get((tag, DIMENSIONS[blocks[number].type]), str(tag))
+                        name = tags.get((tag, CELL_DIMENSIONS[blocks[number].type]), str(tag))
                         if name not in named:
                             yield name, number, np.flatnonzero(values == tag)
                 elif key == PART_NUMBERS:

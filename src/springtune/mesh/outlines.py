@@ -21,6 +21,9 @@ Point = tuple[float, float]
 LEAST_AROUND = 6
 """Fewest edges of a full turn of an arc: a small hole stays one."""
 
+FINEST = 4e-6
+"""Least mesh size over the extent of a shape: netgen takes points for one that are a millionth apart."""
+
 GRADING = 0.3
 """How much longer edges get over the distance from shorter ones, at most: netgen's."""
 
@@ -159,6 +162,8 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
         if name and name not in known:
             there = ", ".join(sorted(map(str, known))) or "none"
             raise MeshError(f"{told}: {what} has no side, point or part of that name; known: {there}")
+        if name and value < FINEST * max(right - left, high - low):
+            raise MeshError(f"{told}: {value!r} is less than some millionths of {what}; give more")
         if value > size:
             raise MeshError(f"{told}: {value!r} is larger than the mesh size, {size!r}; give at most that")
     smaller = min(right - left, high - low)
