@@ -19,8 +19,8 @@ from scipy.spatial import cKDTree
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.outlines import OutlineSide
-from ..problem.shapes import Point, Shape
+from ..problem.outlines import OutlineSide, Point
+from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
 Ends = tuple[int, int]
@@ -40,6 +40,15 @@ SMALLEST = 1e-9
 
 STRAIGHT = 1e-6
 """Turn of a polygon that is taken for none [rad]."""
+
+SMOOTH_TURN = np.radians(12)
+"""Turn of an outline that needs no smaller triangles [rad]: a polygon that stands for a circle."""
+
+SMALL_TURN = 1e-3
+"""Turn of an outline that is taken for none where stresses are concerned [rad]."""
+
+RIGHT_ANGLE = np.radians(91)
+"""Angle up to which the outline may have a corner between sides without supports and loads, and needs none [rad]."""
 
 FEWEST_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""
@@ -485,40 +494,57 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     return names, pieces
 
 
-def singular_corners(
+@dataclass(frozen=True)
+class Corner:
+    """A corner of the outline or of parts.
+
+    Attributes
+    ----------
+    what : str
+        What it is, in words.
+    rough : bool
+        Whether a solution is not smooth enough there for triangles of even size.
+    infinite : bool
+        Whether its stress is known to be infinite.
+    """
+
+    what: str
+    rough: bool = True
+    infinite: bool = False
+
+
+def corners_of(
     mesh: CoarseMesh,
     condition: Callable[[Side], object],
-    free: Callable[[Side], bool],
+    held: Callable[[Side], bool],
     mirror: Callable[[Side, np.ndarray], bool],
-    smooth: float,
-) -> dict[int, str]:
-    """Corners at which a solution may not be smooth, and what they are.
+) -> dict[int, Corner]:
+    """Corners at which a solution may not be smooth.
+
+    Sides that are not held give way to an infinite stress where the outline is re-entrant, at more than half a turn
+    (Williams 1952); a side beyond which the solution goes on as its mirror image doubles the angle.
 
     Parameters
     ----------
     mesh : CoarseMesh
     condition : callable
-        What holds on a side: supports and loads.
-    free : callable
-        Whether nothing holds on it.
+        What holds on a side, supports and loads; nothing where it is empty.
+    held : callable
+        Whether a side has a support.
     mirror : callable
         Whether the solution goes on beyond a side, of a direction, as its mirror image.
-    smooth : float
-        Turn of the outline that is taken for none [rad].
 
     Returns
     -------
-    dict of int to str
+    dict of int to Corner
     """
     at_sides = mesh.part_sides()
-    at_corner: dict[int, list[tuple[int, int]]] = {}
+    at_corner: dict[int, list[Ends]] = {}
     for ends in at_sides:
         for end in ends:
             at_corner.setdefault(end, []).append(ends)
-    angles: dict[int, float] = {}
     inside: dict[int, set[int]] = {}
-    of_interest = np.isin(mesh.triangles, list(at_corner))
-    for row, i in zip(*np.nonzero(of_interest)):
+    for row, i in zip(*np.nonzero(np.isin(mesh.triangles, list(at_corner)))):
         inside.setdefault(int(mesh.triangles[row, i]), set()).add(int(mesh.parts[row]))
 
     def leaving(corner: int, ends: Ends) -> np.ndarray:
@@ -532,46 +558,44 @@ def singular_corners(
             way = np.array(side.arc.slope(side.span[place])) * (side.span[1 - place] - side.span[place])
         return way / np.linalg.norm(way)
 
-    found: dict[int, str] = {}
+    found: dict[int, Corner] = {}
     for corner, around in at_corner.items():
         outer = [ends for ends in around if len(at_sides[ends]) == 1]
         between = [ends for ends in around if len(at_sides[ends]) > 1]
         if len(inside[corner]) > 1:
             if outer:
-                found[corner] = "parts of different materials meet on the outline"
+                found[corner] = Corner("parts of different materials meet on the outline")
             elif len(between) != 2:
-                found[corner] = "parts meet"
+                found[corner] = Corner("parts meet")
             else:
                 one, other = (leaving(corner, ends) for ends in between)
-                if np.arccos(np.clip(-(one @ other), -1, 1)) > smooth:
-                    found[corner] = "the border between two parts has a corner"
+                rough = np.arccos(np.clip(-(one @ other), -1, 1)) > SMOOTH_TURN
+                found[corner] = Corner("parts of different materials meet", bool(rough))
             continue
         if len(outer) != 2:
             if outer:
-                found[corner] = "pieces of the body touch"
+                found[corner] = Corner("pieces of the body touch")
             continue
-
         # The side from which the body lies counter-clockwise about the corner, then the other one.
         leads = at_sides[outer[0]][0][1] == (outer[0][0] == corner)
         first, last = outer if leads else outer[::-1]
         one, other = leaving(corner, first), leaving(corner, last)
         angle = float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other) % (2 * np.pi))
-        angles[corner] = angle
-        side, next_side = mesh.sides[first], mesh.sides[last]
-        same = condition(side) == condition(next_side)
-        if same and abs(angle - np.pi) <= smooth:
-            continue
-        bare = free(side), free(next_side)
-        mirrored = mirror(side, one), mirror(next_side, other)
-        if all(bare) and angle < np.pi:
-            continue
-        if all(mirrored) and angle <= np.pi / 2 + 1e-9:
-            continue
-        if (bare[0] and mirrored[1] or bare[1] and mirrored[0]) and 2 * angle <= np.pi + smooth:
-            continue
-        degrees = f"{np.degrees(angle):.0f} degrees"
-        if same:
-            found[corner] = f"the outline has a corner of {degrees}"
+        sides = mesh.sides[first], mesh.sides[last]
+        same = condition(sides[0]) == condition(sides[1])
+        mirrored = mirror(sides[0], one), mirror(sides[1], other)
+        free = not held(sides[0]), not held(sides[1])
+        bare = not condition(sides[0]), not condition(sides[1])
+        straight = same and abs(angle - np.pi) <= SMALL_TURN
+        if all(mirrored):
+            rough, infinite = abs(angle - np.pi / 2) > SMALL_TURN, angle > np.pi / 2 + SMALL_TURN and not straight
+        elif any(mirrored):
+            smooth = any(bare) and (2 * angle < RIGHT_ANGLE or abs(2 * angle - np.pi) <= SMOOTH_TURN)
+            rough, infinite = not smooth, any(free) and 2 * angle > np.pi + SMALL_TURN
         else:
-            found[corner] = f"supports or loads change at an angle of {degrees}"
+            rough = not (all(bare) and angle < RIGHT_ANGLE)
+            infinite = all(free) and angle > np.pi + SMALL_TURN
+        what = "the outline has a corner" if same else "supports or loads change at an angle"
+        rough = rough and not (same and abs(angle - np.pi) <= SMOOTH_TURN)
+        found[corner] = Corner(f"{what} of {np.degrees(angle):.4g} degrees", rough, infinite)
     return found

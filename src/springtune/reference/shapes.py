@@ -12,13 +12,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
 from ..problem.materials import Material
 from ..problem.shapes import LoadCase, Quantity, Shape
-from .coarse_meshes import LARGEST_TURN, CoarseMesh, Side, outline_mesh, singular_corners
+from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
 from .limits import most_rotation_and_strain
 from .small_strain import ReferenceNotConvergedError
 from .triangles import SIDE_CORNERS, function_counts, shape_functions, side_fit, side_functions, tabulated
@@ -34,9 +35,6 @@ SMALLEST_SHARE = 1e-3
 
 #: Force on a support at a point, over all of them, that is taken for none.
 SMALLEST_REACTION = 1e-6
-
-#: Turn of an outline made of straight sides that is taken for none [rad]: a polygon that stands for a circle.
-SMOOTH_TURN = np.radians(12)
 
 #: Most unknowns of a level.
 LARGEST_LEVEL = 600_000
@@ -342,13 +340,16 @@ class _Problem:
             flat = np.abs(way) < 1e-12
             return bool(flat[1] and x is None and y is not None or flat[0] and y is None and x is not None)
 
-        self.corners = singular_corners(self.mesh, condition, lambda side: not condition(side), mirror, SMOOTH_TURN)
+        self.corners = corners_of(
+            self.mesh, condition, lambda side: any(group in supported for group in side.groups), mirror
+        )
         at_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
+        rough = {point for point, corner in self.corners.items() if corner.rough}
         for name in used:
-            point = self.mesh.named[name]
-            self.corners.setdefault(point, "a force at a point" if name in at_points else "a support at a point")
-        for name in probed:
-            self.corners.setdefault(self.mesh.named[name], "")
+            what = "a force acts on a point" if name in at_points else "a point is held"
+            self.corners[self.mesh.named[name]] = Corner(what)
+        # Small triangles where a stress is asked for, too.
+        self._rough = rough | {self.mesh.named[name] for name in used | probed}
         self.loaded_points = at_points
         self.infinite_energy = bool(at_points)
         self.reacting: list[str] = []
@@ -357,13 +358,29 @@ class _Problem:
         for quantity in load.quantities:
             self._check(quantity, groups)
         self._graded = self.mesh.copy()
-        self._graded.isolate(self.corners)
+        self._graded.isolate(self._rough)
         self._layers = 0
 
     def _check(self, quantity: Quantity, groups: set[str]) -> None:
         name, kind, of = quantity.name, quantity.kind, quantity.of
         if kind in ("stress",) and of not in self.points:
             raise ValueError(f"quantity {name!r}: stress is that of a point, and {of!r} is a group of sides")
+        corner = self.corners.get(self.mesh.named.get(of, -1)) if kind == "stress" else None
+        if corner and corner.infinite:
+            remedy = "ask for it beside the corner"
+            if not self.shape.outline:
+                remedy += ", or give the shape as an outline with arcs rather than as a mesh"
+            raise ValueError(
+                f"quantity {name!r}: the stress at {of!r} is infinite in a continuum, since {corner.what} there: "
+                f"{remedy}"
+            )
+        if kind == "stress":
+            beside = self.mesh.parts[(self.mesh.triangles == self.mesh.named[of]).any(axis=1)]
+            if len(set(beside.tolist())) > 1:
+                raise ValueError(
+                    f"quantity {name!r}: {of!r} is where parts of different materials meet, and the stress has a jump "
+                    "there: ask for it on one side"
+                )
         if kind == "reaction":
             axis = "xy".index(quantity.component)
             if not any(
@@ -407,18 +424,15 @@ class _Problem:
             return f"; held points carry forces, under which a continuum gives way without end: hold sides, not {names}"
         if quantity is None or quantity.of not in self.points:
             return ""
-        where = self.points[quantity.of]
-        extent = np.ptp(self.mesh.points, axis=0).max()
-        for corner, what in self.corners.items():
-            if what and np.linalg.norm(self.mesh.points[corner] - where) <= 1e-9 * extent:
-                finite = "stress" if quantity.kind == "stress" else "displacement"
-                return f"; {quantity.of!r} is a corner where {what}, and {finite} may be infinite there"
-        return ""
+        corner = self.corners.get(self.mesh.named.get(quantity.of, -1))
+        if corner is None or quantity.kind == "reaction":
+            return ""
+        return f"; {quantity.of!r} is where {corner.what}, and the {quantity.kind} there may be infinite"
 
     def graded(self, layers: int) -> CoarseMesh:
         """The mesh with so many layers at its corners; asked for in rising order."""
         while self._layers < layers:
-            self._graded.grade(self.corners)
+            self._graded.grade(self._rough)
             self._layers += 1
         return self._graded.copy()
 
@@ -789,12 +803,26 @@ class _Level:
         sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
         inverse = np.linalg.inv(sides)
         heights = 1 / np.linalg.norm(np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1), axis=2)
-        found, local = np.empty(len(points), dtype=int), np.empty((len(points), 2))
-        for rows in np.array_split(np.arange(len(points)), max(1, len(points) * len(corners) // 2_000_000)):
-            shares = np.einsum("eua,pea->peu", inverse, points[rows, None] - corners[None, :, 0])
-            depth = np.concatenate([(1 - shares.sum(axis=2))[..., None], shares], axis=2) * heights
-            found[rows] = np.argmax(depth.min(axis=2), axis=1)
-            local[rows] = shares[np.arange(len(rows)), found[rows]]
+        found, local = np.zeros(len(points), dtype=int), np.empty((len(points), 2))
+        deepest = np.full(len(points), -np.inf)
+
+        def look(triangles: np.ndarray, rows: np.ndarray) -> None:
+            """Take triangles for points where these are deeper inside than before; pairs by ascending point."""
+            shares = np.einsum("pua,pa->pu", inverse[triangles], points[rows] - corners[triangles, 0])
+            depths = (np.column_stack([1 - shares.sum(axis=1), shares]) * heights[triangles]).min(axis=1)
+            order = np.lexsort((depths, rows))
+            last = order[np.flatnonzero(np.diff(rows[order], append=-1))]
+            better = last[depths[last] > deepest[rows[last]]]
+            deepest[rows[better]], found[rows[better]] = depths[better], triangles[better]
+            local[rows[better]] = shares[better]
+
+        middles = corners.mean(axis=1)
+        reach = 1.001 * np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+        near = cKDTree(points).query_ball_point(middles, reach)
+        look(np.repeat(np.arange(len(corners)), [len(rows) for rows in near]), np.concatenate(near).astype(int))
+        beside = np.flatnonzero(deepest < 0)  # of all triangles: those along arcs, and what is outside
+        for rows in np.array_split(beside, max(1, len(beside) * len(corners) // 500_000)):
+            look(np.tile(np.arange(len(corners)), len(rows)), np.repeat(rows, len(corners)))
         curved = np.flatnonzero(space.curved[found])
         for _ in range(20):
             if not len(curved):
