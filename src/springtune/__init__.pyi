@@ -44,6 +44,7 @@ from .prediction import find_mesh as find_mesh
 from .prediction import predict as predict
 from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS
+from .problem.materials import AnisotropicMaterial as AnisotropicMaterial
 from .problem.materials import Material as Material
 from .problem.shapes import Hole as Hole
 from .problem.shapes import LoadCase as LoadCase

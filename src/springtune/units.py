@@ -39,6 +39,11 @@ class Kind:
     unit: str
     example: str
 
+    @property
+    def words(self) -> str:
+        """What to give, for messages: ``a length such as '200 mm'``."""
+        return f"{_article(self.name)} such as '{self.example}'"
+
 
 QUANTITY_KINDS = {
     kind.name: kind
@@ -51,6 +56,7 @@ QUANTITY_KINDS = {
         Kind("area", "m^2", "12 mm^2"),
         Kind("energy", "J", "3.5 J"),
         Kind("acceleration", "m/s^2", "-9.81 m/s^2"),
+        Kind("angle", "rad", "30 deg"),
     )
 }
 """Kinds of quantity by name."""
@@ -64,6 +70,7 @@ COMMON = {
     "area": {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"},
     "energy": {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"},
     "acceleration": {"m/s^2": "1", "mm/s^2": "1e-3"},
+    "angle": {"rad": "1", "deg": "0.01745329251994329576923690768488612713", "mrad": "1e-3"},
 }
 """Usual units of each kind and their size in its SI unit."""
 
@@ -129,8 +136,8 @@ def parse(text: str, kind: str) -> float:
     wanted = QUANTITY_KINDS[kind]
     if len(text) > LONGEST_QUANTITY:
         text = f"{text[:57]}..."
-        raise UnitError(f"'{text}' is too long; give a {kind} such as '{wanted.example}'")
-    remedy = f"give a {kind} such as '{wanted.example}'"
+        raise UnitError(f"'{text}' is too long; give {wanted.words}")
+    remedy = f"give {wanted.words}"
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
         raise UnitError(f"'{text}' does not begin with a finite number; {remedy}")
@@ -162,7 +169,8 @@ def _spelling(unit: str) -> str:
 
 
 def _article(kind: str) -> str:
-    return f"{'an' if kind[0] in 'ae' else 'a'} {kind}" if kind in QUANTITY_KINDS else kind
+    article = "an" if kind[0] in "aeiou" else "a"
+    return f"{article} {kind}" if kind in QUANTITY_KINDS else kind
 
 
 def _measure(unit: str) -> tuple[str, Decimal] | None:
@@ -202,6 +210,8 @@ def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     except Exception:  # pint raises many kinds, tokenizer's and its own
         return None
     for kind in QUANTITY_KINDS.values():
+        if kind.name == "angle":
+            continue  # to pint it is a number, as a percentage is
         if given.dimensionality == registry.parse_units(kind.unit).dimensionality:
             return kind.name, Decimal(f"{size:.15g}")
     return f"of dimension {given.dimensionality}", Decimal(1)

@@ -199,10 +199,13 @@ def test_every_module_of_the_rooms_shown_is_on_the_site():
     assert listed == {(room, path.stem) for room in rooms for path in (package / room).glob("[a-z]*.py")}
 
 
-def test_every_picture_is_of_a_study():
+def test_every_picture_is_of_a_study_or_an_example():
     """`make pictures` copies what docs/figures.yaml names, and each of it is a figure that its study makes."""
     pictures = yaml.safe_load((REPOSITORY / "docs/figures.yaml").read_text())
     assert set(pictures) == {path.name for path in (REPOSITORY / "docs").glob("*.png")}
     for picture in pictures.values():
+        if "example" in picture:
+            assert "plt.subplots" in (REPOSITORY / f"examples/{picture['example']}.py").read_text()
+            continue
         study = load_study(REPOSITORY / f"config/{picture['study']}.yaml")
         assert picture["figure"] in {stem for one in study.outputs for stem in outputs()[one].figures(study)}, picture

@@ -23,7 +23,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..mesh import corner_angles, signed_areas
-from .simulation import Net, Simulation, about, commented, numbers, simulate
+from .simulation import Net, Simulation, about, commented, load_in_words, numbers, simulate
 from .terms import Terms
 
 LEAST_MASS = 1e-15
@@ -109,7 +109,7 @@ def mjcf(net: Net) -> str:
 
 def _model(net: Net) -> str:
     load = net.header.get("load")
-    return net.header["definition"] + (f", {load['name']} of {abs(load['force']):g} N" if load else "")
+    return net.header["definition"] + (f", {load_in_words(load)}" if load else "")
 
 
 def _particles(net: Net, simulation: Simulation, bodies: bool) -> list[str]:
@@ -147,9 +147,8 @@ def _tendons(net: Net, simulation: Simulation, dampers: bool) -> list[str]:
         for (first, second), stiffness, length in rows
         if stiffness
     ]
-    load = net.header.get("load")
-    if load:
-        shares = np.where(net.held, 0.0, net.forces / load["force"])
+    if simulation.force:
+        shares = np.where(net.held, 0.0, net.forces / simulation.force)
         joints = "".join(
             f'<joint joint="{"xy"[axis]}{number}" coef="{float(shares[number, axis])!r}"/>'
             for number, axis in np.argwhere(shares).tolist()
@@ -215,9 +214,10 @@ def _load(net: Net, simulation: Simulation) -> list[str]:
     lines = []
     if simulation.force:
         most = abs(simulation.force)
+        what = "load [N]" if "force" in net.header["load"] else "factor on the load"
         lines += [
             "  <actuator>",
-            "    <!-- The load [N]; the control is added to it. -->",
+            f"    <!-- The {what}; the control is added to it. -->",
             f'    <general name="load" tendon="load" gaintype="fixed" gainprm="1" biastype="affine" '
             f'biasprm="{simulation.force!r} 0 0" ctrllimited="true" ctrlrange="{-most!r} {most!r}"/>',
             "  </actuator>",

@@ -29,12 +29,14 @@ from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import no_cells
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
+from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
+from ..scene.statements import ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
 from .formats import ARRAYS, Content, read, write
 from .terms import Terms
@@ -57,6 +59,14 @@ MEANING = (
     "springs are too soft, under compression and pressure below; linear kinematics, small strain"
 )
 """What an expected error is."""
+
+MEANING_ON_SHAPES = (
+    "(network - reference) / |reference| of each quantity that the load case asks for; linear kinematics, small strain"
+)
+"""What an expected error is on a shape."""
+
+CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
+"""What a header says of a material."""
 
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
 """What a largest stable step is."""
@@ -141,7 +151,8 @@ class SpringNet:
         springs : Springs, optional
             In the place of the scene's own.
         errors : bool, optional
-            Whether the header shall say the expected errors, which takes a solve a load.
+            Whether the header shall say the expected errors, which takes a solve a load; of a shape those of its
+            quantities under the scene's load, for which its reference is solved.
 
         Returns
         -------
@@ -153,14 +164,27 @@ class SpringNet:
             If the definition cannot live on the mesh or with the material.
         """
         springs = scene.springs if springs is None else springs
-        parts = _parts(scene.sheet, springs, scene.material, scene.kind, scene.force)
+        held, inertia, about = scene.held, scene.statement.masses(), scene.statement
+        parts = _parts(scene.sheet, springs, inertia, held, about.forces(scene.sheet, springs))
+        header = _header(scene.definition, scene.sheet, about.materials, springs, inertia, held, mesh_name)
+        if isinstance(about, ShapeStatement):
+            load = {
+                "name": scene.load,
+                "scale": about.scale,
+                "kinematics": scene.kinematics,
+                "follower": about.loading.follower is not None,
+                "prescribed": about.loading.given is not None,
+            }
+            header |= {"shape": about.body, "load": load}
+            if errors:
+                header |= {"expected_error": _errors_on_shape(scene), "expected_error_means": MEANING_ON_SHAPES}
+            return cls(**parts, header=header)
         load = {
             "name": scene.load,
             "force": scene.force,
             "kinematics": scene.kinematics,
             "follower": scene.follower,
         }
-        header = _header(scene.definition, scene.sheet, scene.material, springs, scene.kind, mesh_name)
         header |= {"beam": _beam(scene.beam), "load": load}
         if errors:
             from ..prediction import CASES  # here, since finite elements take half a second to import
@@ -234,7 +258,8 @@ class SpringNet:
             given = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
             with named(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
-        header = _header(chosen, sheet, material, springs, None, mesh_name)
+        inertia = None if material.density is None else masses(mesh, material.density, sheet.thickness)
+        header = _header(chosen, sheet, [material], springs, inertia, None, mesh_name)
         if beam is None:
             header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
         else:
@@ -244,7 +269,8 @@ class SpringNet:
 
                 said = check_loads(CASES if loads is None else loads)
                 header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
-        return cls(**_parts(sheet, springs, material, None, 0.0), header=header)
+        none = np.zeros(mesh.points.shape)
+        return cls(**_parts(sheet, springs, inertia, none.astype(bool), none), header=header)
 
     def write(self, path: str | Path) -> list[Path]:
         """Write the net in the format that the ending of a name says; files appear whole or not at all.
@@ -265,8 +291,15 @@ class SpringNet:
         Raises
         ------
         ValueError
-            If the name has another ending, or its folder is not there.
+            If the name has another ending, its folder is not there, or the load prescribes displacements, which no such
+            file tells.
         """
+        load = self.header.get("load")
+        if load and load.get("prescribed"):
+            raise ValueError(
+                f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
+                "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
+            )
         return write(path, content_of(self))
 
     @classmethod
@@ -347,20 +380,21 @@ def terms(energy: Energy, reference: float) -> Terms:
     )
 
 
-def _parts(sheet: Sheet, springs: Springs, material: Material, kind: LoadKind | None, force: float) -> dict[str, Any]:
+def _parts(
+    sheet: Sheet, springs: Springs, inertia: np.ndarray | None, held: np.ndarray, forces: np.ndarray
+) -> dict[str, Any]:
     """Arrays of a net."""
-    mesh, none = sheet.mesh, np.zeros(sheet.mesh.points.shape)
-    density = material.density
+    mesh = sheet.mesh
     return {
         "points": mesh.points,
         "springs": mesh.edges,
         "rest_lengths": mesh.edge_lengths,
         "stiffness": springs.reference * springs.relative,
         "energies": _merged([terms(energy, springs.reference) for energy in springs.energies]),
-        "masses": None if density is None else masses(mesh, density, sheet.thickness),
+        "masses": inertia,
         "thickness": sheet.thickness,
-        "held": none.astype(bool) if kind is None else sheet.held(kind),
-        "forces": none if kind is None else force * sheet.pattern(kind, springs),
+        "held": held,
+        "forces": forces,
         "triangles": mesh.triangles,
         "quads": mesh.quads,
     }
@@ -385,13 +419,15 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
 def _header(
     definition: Definition | OwnDefinition,
     sheet: Sheet,
-    material: Material,
+    materials: Sequence[AnyMaterial],
     springs: Springs,
-    kind: LoadKind | None,
+    inertia: np.ndarray | None,
+    held: np.ndarray | None,
     mesh_name: str,
 ) -> dict[str, Any]:
     """What a net says of itself, but for what a scene adds."""
     mesh, (formula, source) = sheet.mesh, described(definition)
+    material, *others = ({name: getattr(one, name, None) for name in CONSTANTS_SAID} for one in materials)
     counts = {
         "particles": len(mesh.points),
         "springs": len(mesh.edges),
@@ -408,17 +444,13 @@ def _header(
         **({"lateral_stress": springs.lateral} if springs.lateral else {}),
         "thickness": float(sheet.thickness),
         "beam": None,
-        "material": {
-            "name": material.name,
-            "young_modulus": material.young_modulus,
-            "poisson_ratio": material.poisson_ratio,
-            "density": material.density,
-        },
+        "material": material,
+        **({"other_materials": {one["name"]: one for one in others}} if others else {}),
         "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
         "load": None,
         "expected_error": f"{NOT_COMPUTED}: not asked for",
         "expected_error_means": MEANING,
-        "largest_stable_step": _stable_steps(sheet, springs, material, kind),
+        "largest_stable_step": _stable_steps(sheet, springs, materials, inertia, held),
         "largest_stable_step_means": STEP_MEANING,
         "units": UNITS
         | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
@@ -491,13 +523,47 @@ def _steady(load: str) -> str:
     return next(name for name, one in LOADS.items() if one == replace(LOADS[load], follower=False))
 
 
+def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
+    """Error of each quantity of a load case, linear kinematics against the reference of small strain; or why none."""
+    # Here, since finite elements take half a second to import.
+    from ..prediction.choices import SOLVED
+    from ..reference.small_strain import ReferenceNotConvergedError
+
+    names, count = [one.name for one in scene.case.quantities], len(scene.mesh.points)
+    if count > SOLVED:
+        return dict.fromkeys(names, f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header")
+    linear = Scene(
+        scene.shape,
+        scene.grouped,
+        scene.by_part,
+        scene.load,
+        definition=scene.definition,
+        kinematics="linear",
+        stiffness=scene.uniform_stiffness,
+        scale=scene.scale,
+        sheet=scene.sheet,
+    )
+    found = linear.solve()
+    try:
+        errors = found.errors if found.status is Status.SOLVED else {}
+    except ReferenceNotConvergedError as error:
+        return dict.fromkeys(names, f"{NOT_COMPUTED}: {error}")
+    why = found.message or "the reference is zero"
+    return {name: errors[name] if np.isfinite(errors.get(name, np.nan)) else f"{NOT_COMPUTED}: {why}" for name in names}
+
+
 def _stable_steps(
-    sheet: Sheet, springs: Springs, material: Material, kind: LoadKind | None
+    sheet: Sheet,
+    springs: Springs,
+    materials: Sequence[AnyMaterial],
+    inertia: np.ndarray | None,
+    held: np.ndarray | None,
 ) -> dict[str, float | str] | str:
     """Largest stable step of each integrator, undamped [s], or that any is stable; or why there is none."""
-    if material.density is None:
-        return f"{NOT_COMPUTED}: material '{material.name}' has no density"
-    steps = stable_steps(sheet, springs, material.density, INTEGRATORS, kind)
+    if inertia is None:
+        lacking = next(one.name for one in materials if one.density is None)
+        return f"{NOT_COMPUTED}: material '{lacking}' has no density"
+    steps = stable_steps(sheet, springs, inertia, INTEGRATORS, held)
     if isinstance(steps, str):
         return f"{NOT_COMPUTED}: {steps}"
     return {name: "unlimited" if name in IMPLICIT else step for name, step in steps.items()}

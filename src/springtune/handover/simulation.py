@@ -56,7 +56,7 @@ class Simulation:
     masses : ndarray of float, shape (n_points,)
         [kg]
     force : float
-        Of the load, with its sign [N]; 0 without a load.
+        Of the load, with its sign [N]; 1 for a load case of a shape, 0 without a load.
     largest_step : float
         Largest stable step of explicit schemes about rest, undamped [s].
     step : float
@@ -115,7 +115,8 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     assert net.masses is not None
     reference = float(net.header["reference_stiffness"])
     load = net.header.get("load")
-    force = float(load["force"]) if load else 0.0
+    # Of a shape, whose load case is of several forces, the factor on it.
+    force = float(load.get("force", 1.0)) if load else 0.0
     network = _network(net, reference)
     motion = Motion(network, net.masses / reference, net.forces / reference)
     largest = motion.step_limit("symplectic-euler")
@@ -156,6 +157,22 @@ def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
             return
         said = f"the equilibrium is {moved:.3g} m away from rest, further than the beam is long ({extent:.3g} m)"
     warnings.warn(said, EquilibriumWarning, stacklevel=2)
+
+
+def load_in_words(load: Mapping[str, Any]) -> str:
+    """Load of a header, with its size: the force on a beam, the factor on a load case of a shape.
+
+    Parameters
+    ----------
+    load : dict
+
+    Returns
+    -------
+    str
+    """
+    if "force" in load:
+        return f"{load['name']} of {abs(load['force']):g} N"
+    return load["name"] + ("" if load["scale"] == 1 else f" times {load['scale']:g}")
 
 
 def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:
@@ -241,17 +258,20 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     """
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
+    constants = ""
+    if material["young_modulus"] is not None:
+        constants = f"Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio {material['poisson_ratio']:g}, "
     left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
     lines = [
         f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",
         f"{len(net.points)} particles, {len(net.springs) - left_out} springs; m, kg, s, N.",
-        f"Material '{material['name']}': Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio "
-        f"{material['poisson_ratio']:g}, density {material['density']:g} kg/m3; thickness {header['thickness']:g} m.",
+        f"Material '{material['name']}': {constants}density {material['density']:g} kg/m3; thickness "
+        f"{header['thickness']:g} m.",
     ]
     if left_out:
         lines.append(f"{left_out} springs of no stiffness are left out.")
     if load:
-        lines.append(f"Load: {load['name']} of {abs(load['force']):g} N.")
+        lines.append(f"Load: {load_in_words(load)}.")
     if isinstance(errors, dict):
         said = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
         if said:

@@ -75,16 +75,16 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
         return [path]
     if not 1 <= steps <= MOST_PIECES:
         raise ValueError(f"steps: {steps!r} is not from 1 to {MOST_PIECES}; give the number of load steps")
-    frames, reference = _Frames(scene), scene.springs.reference
+    frames, about = _Frames(scene), scene.statement
     with series(path) as add:
         add(0.0, partial(frames.write, displacements=np.zeros(scene.mesh.points.shape), share=0.0))
         for share in np.arange(1, steps + 1) / steps:
-            load = share * scene.force / reference
+            load = share * about.factor(scene.springs)
             linear = scene.kinematics == "linear"
             found = scene.problem.linear(load) if linear else scene.problem.nonlinear(load)
             if not found.converged:
                 raise ValueError(f"no equilibrium at {100 * share:g} % of the force; give another number of steps")
-            add(float(share * abs(scene.force)), partial(frames.write, displacements=found.displacements, share=share))
+            add(float(share * about.size), partial(frames.write, displacements=found.displacements, share=share))
     return pieces_of(path)
 
 
@@ -174,5 +174,5 @@ class _Frames:
             expected = share * self.reference
             of_particles |= {"reference_displacement": expected, "error": displacements - expected}
         forces = scene.springs.reference * scene.network.spring_forces(displacements, linear)
-        numbers = {"displacement_of_the_load": scene.sheet.displacement(scene.kind, displacements)}
+        numbers = {"displacement_of_the_load": scene.displacement_of(displacements)}
         write_vtu_with(path, self.content, of_particles, {"force": forces}, numbers)

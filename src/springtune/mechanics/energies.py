@@ -12,6 +12,7 @@ faster than on their short vectors.
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import sha256
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Energy(ABC):
     points : ndarray of float, shape (n_points, 2)
         Rest positions of the particles [m].
     corners : ndarray of int, shape (n_cells, m)
-        Particles of each cell, counter-clockwise: all cells of a mesh with so many corners, as in its ``cells``.
+        Particles of each cell, counter-clockwise: all cells of a mesh with so many corners, or some.
     """
 
     points: np.ndarray
@@ -100,7 +101,13 @@ class Energy(ABC):
     @property
     def key(self) -> bytes:
         """Bytes that tell energies of one mesh apart."""
-        return type(self).__name__.encode() + b"".join(np.ascontiguousarray(part).tobytes() for part in self._moduli())
+        moduli = (np.ascontiguousarray(part).tobytes() for part in self._moduli())
+        return type(self).__name__.encode() + self._cells + b"".join(moduli)
+
+    @cached_property
+    def _cells(self) -> bytes:
+        """Digest of the cells, which need not be all of the mesh."""
+        return sha256(np.ascontiguousarray(self.corners).tobytes()).digest()
 
     @property
     def _pairs(self) -> tuple[tuple[int, int], ...]:

@@ -158,7 +158,7 @@ class Pattern:
         count = len(self.springs)
         total = np.zeros((2, 2, count))
         for energy in energies:
-            places = self._cell_springs[energy.corners.shape[1]]
+            places = self._springs_of(energy.corners)
             blocks = np.ascontiguousarray(energy.couplings(displacements).transpose(1, 2, 0, 3))
             for a in range(2):
                 for d in range(2):
@@ -170,12 +170,22 @@ class Pattern:
     @cached_property
     def _cell_springs(self) -> dict[int, np.ndarray]:
         """Spring of each pair of corners by number of corners, beyond the last one where it runs the other way."""
-        found = {}
-        for count, corners in self.mesh.cells.items():
-            first, second = np.transpose(SIDES[count] + DIAGONALS[count])
-            turned = corners[:, first] > corners[:, second]
-            found[count] = (self.mesh.cell_edges[count] + len(self.springs) * turned).T.ravel()
-        return found
+        edges = self.mesh.cell_edges
+        return {count: self._directed(corners, edges[count]) for count, corners in self.mesh.cells.items()}
+
+    def _springs_of(self, corners: np.ndarray) -> np.ndarray:
+        """As `_cell_springs`, of all cells with so many corners, or of some: parts have energies of their own."""
+        count = corners.shape[1]
+        if len(corners) == len(self.mesh.cells[count]):
+            return self._cell_springs[count]
+        ends = np.sort(corners[:, SIDES[count] + DIAGONALS[count]], axis=2)
+        scale = [self.shape[0], 1]
+        return self._directed(corners, np.searchsorted(self.mesh.edges @ scale, ends @ scale))
+
+    def _directed(self, corners: np.ndarray, edges: np.ndarray) -> np.ndarray:
+        first, second = np.transpose(SIDES[corners.shape[1]] + DIAGONALS[corners.shape[1]])
+        turned = corners[:, first] > corners[:, second]
+        return (edges + len(self.springs) * turned).T.ravel()
 
     def coupling_entries(self, couplings: np.ndarray) -> np.ndarray:
         """Entries of the tangent from its blocks that couple the ends of each spring, shape (2, 2, n_springs).

@@ -4,7 +4,7 @@ Every definition worth a choice is solved on the mesh itself under some loads an
 of small strain; a patch test between rollers measures Young's modulus and Poisson's ratio of the network.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
 
@@ -14,15 +14,19 @@ from ..linalg.factors import SingularError
 from ..mechanics.energies import AreaEnergy
 from ..mechanics.moduli import PatchTest
 from ..mesh import Mesh
+from ..mesh.groups import GroupedMesh
+from ..problem.compare import deformation_error
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
+from ..problem.shapes import Shape
 from ..problem.status import Status
 from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.sheet import Sheet
-from ..springs import DefinitionError, Springs
+from ..scene.statements import ShapeStatement
+from ..springs import DEFINITIONS, DefinitionError, Springs
 
 PREDICTED = tuple(name for name, load in LOADS.items() if not load.follower)
 """Loads that can be predicted, keys of `springtune.problem.loads.LOADS`: all but those that turn with the side that
@@ -76,9 +80,10 @@ class Choice:
     energies : bool
         Whether a simulator needs more than springs for it.
     errors : dict of str to float
-        Deformation error by load, linear kinematics against the reference of small strain, (network - reference) /
-        abs(reference) [1]: above zero where the network is too soft, but below under compression and pressure, whose
-        displacements are negative. NaN where there is none, because of the reference or for the reason in `failures`.
+        Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
+        (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
+        compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or
+        for the reason in `failures`.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
@@ -206,30 +211,42 @@ def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> 
 
 
 def predict(
-    beam: Beam, mesh: Mesh, material: Material, known: References | None = None, *, loads: Iterable[str] = CASES
+    beam: Beam | Shape,
+    mesh: Mesh | GroupedMesh,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    known: References | None = None,
+    *,
+    loads: Iterable[str] = CASES,
+    load: str | None = None,
 ) -> list[Choice]:
-    """Choices for a mesh, solved on it, the best one by its worst load first.
+    """Choices for a mesh, solved on it, the best one by its worst load first, or quantity of a shape.
 
     Parameters
     ----------
-    beam : Beam
-    mesh : Mesh
-        That fills the beam.
-    material : Material
+    beam : Beam or Shape
+    mesh : Mesh or GroupedMesh
+        That fills the beam; of a shape with its groups.
+    material : Material, AnisotropicMaterial or mapping of str to those
+        Of a shape of several parts by their names.
     known : dict, optional
         What `springtune.prediction.references` gave for the beam, the material and the loads.
     loads : iterable of str, optional
-        Loads that count: of traction, compression, bending, shear and pressure.
+        Loads of a beam that count: of traction, compression, bending, shear and pressure.
+    load : str, optional
+        Load case of a shape; its only one without.
 
     Returns
     -------
     list of Choice
-        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last.
+        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last. On a shape their errors are
+        by quantity of interest, and moduli are none, since a patch test between rollers is one of strips.
 
     Raises
     ------
     ValueError
         If an argument is none, the mesh does not fill the beam, or a load cannot be predicted.
+    ReferenceNotConvergedError
+        If the load of a shape has no reference.
     DefinitionError
         If none of them can live on the mesh.
 
@@ -254,10 +271,28 @@ def predict(
     >>> best = st.predict(beam, mesh, steel, loads=["traction", "pressure"])[0]
     >>> print(best.definition, *(f"{load} {100 * error:+.2f} %" for load, error in best.errors.items()))
     delingette traction -0.09 % pressure +0.05 %
+
+    The quantities that a load case of a shape asks for:
+
+    >>> pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))],
+    ...                    quantities=[st.Quantity("end", "displacement", "right", "x")])
+    >>> hole = st.Hole.circle(("50 mm", "20 mm"), "8 mm")
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[hole], loads={"pull": pull})
+    >>> for choice in st.predict(plate, st.mesh_shape(plate, "2 mm"), steel, load="pull")[:2]:
+    ...     print(choice.definition, f"{100 * choice.errors['end']:+.1f} %")
+    delingette -0.8 %
+    van-gelder -2.5 %
     """
+    if isinstance(beam, Shape):
+        if known is not None:
+            raise ValueError("known: is of beams alone; leave it out for a shape")
+        return _on_shape(beam, mesh, material, load)
+    if load is not None:
+        raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
     is_a(mesh, Mesh, "mesh", A_MESH)
     is_a(material, Material, "material", A_MATERIAL)
+    assert isinstance(mesh, Mesh) and isinstance(material, Material)  # as type checkers are told
     check_filled(mesh, beam)
     loads = check_loads(loads)
     missing = [load for load in loads if known is not None and not (isinstance(known, dict) and load in known)]
@@ -271,6 +306,56 @@ def predict(
     choices += [tried.failed(name) for name in tried.failures]
     if not tried.names and all("springs" in found for found in tried.failures.values()):
         raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
+    return sorted(choices, key=lambda choice: choice.worst)
+
+
+def _on_shape(
+    shape: Shape, mesh: Mesh | GroupedMesh, material: AnyMaterial | Mapping[str, AnyMaterial], load: str | None
+) -> list[Choice]:
+    """As `predict`, of a shape."""
+    if load is None:
+        if len(shape.loads) != 1:
+            raise ValueError(
+                f"load: none, and {shape.name!r} has {len(shape.loads)}; give one of them, such as load='pull'; "
+                f"known: {', '.join(shape.loads) or 'none'}"
+            )
+        (load,) = shape.loads
+    statement = ShapeStatement(shape, mesh, material, load, 1.0, "linear")
+    sheet, names = Sheet(statement.mesh, shape.thickness, networks=1), [one.name for one in statement.case.quantities]
+    known = statement.reference_values(sheet)
+    single = statement.materials[0] if len(statement.materials) == 1 else None
+    choices, first = [], set()
+    for name in ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES:
+        failures: dict[str, str] = {}
+        errors: dict[str, Number] = dict.fromkeys(names, nan)
+        parts: tuple[float, float, str] = (nan, nan, "")
+        try:
+            springs = statement.springs(sheet, DEFINITIONS[name], None)[0]
+        except DefinitionError as error:
+            failures["springs"] = str(error)
+        except SingularError as error:
+            failures["patch test"] = f"unstable: {error}"
+        else:
+            # Some are the same network: at nu = 1/3 no energy is left.
+            label = f"{springs.reference:.9g}", *key_of(springs)
+            if label in first:
+                continue
+            first.add(label)
+            parts = in_words(sheet, single, name, springs)
+            try:
+                found = statement.solve(sheet, springs)
+            except SingularError as error:
+                failures[load] = f"unstable: {error}"
+            else:
+                if found.status is Status.SOLVED:
+                    values = statement.values(sheet, springs, found)
+                    with np.errstate(divide="ignore", invalid="ignore"):
+                        errors |= {one: float(deformation_error(values[one], known[one])) for one in names}
+                else:
+                    failures[load] = found.message
+        choices.append(Choice(name, *parts, name in NEED_ENERGIES, errors, nan, nan, failures))
+    if all("springs" in choice.failures for choice in choices):
+        raise DefinitionError("; ".join(f"{choice.definition}: {choice.failures['springs']}" for choice in choices))
     return sorted(choices, key=lambda choice: choice.worst)
 
 
@@ -360,7 +445,7 @@ class TriedMesh:
                 self.failures[name] = {"patch test": f"unstable: {error}"}
             else:
                 # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
-                label = f"{springs.reference:.9g}", *_key(springs)
+                label = f"{springs.reference:.9g}", *key_of(springs)
                 self.same[name] = first.setdefault(label, name)
                 if self.same[name] == name:
                     self._springs[name] = springs
@@ -394,7 +479,7 @@ class TriedMesh:
         float or str
         """
         springs, kind = self._springs[name], LOADS[load].kind
-        key = kind, _key(springs)
+        key = kind, key_of(springs)
         if key not in self._displacements:
             self._displacements[key] = displacement_of(self._sheet, springs, kind)
         return error_of(self._displacements[key], springs, load, self.known[load])
@@ -415,7 +500,7 @@ class TriedMesh:
         found = {load: self.error(name, load) for load in self.known}
         errors: dict[str, Number] = {load: nan if isinstance(error, str) else error for load, error in found.items()}
         failures = {load: error for load, error in found.items() if isinstance(error, str)}
-        key = _key(springs)
+        key = key_of(springs)
         if key not in self._moduli:
             try:
                 self._moduli[key] = self._test.axial(springs)
@@ -428,7 +513,7 @@ class TriedMesh:
         young = moduli[0] * springs.reference / (self.material.young_modulus * self.beam.thickness)
         return Choice(
             name,
-            *self._parts(name, springs),
+            *in_words(self._sheet, self.material, name, springs),
             bool(springs.energies),
             errors=errors,
             young_modulus_error=float(young) - 1,
@@ -451,37 +536,52 @@ class TriedMesh:
         errors: dict[str, Number] = dict.fromkeys(self.known, nan)
         return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
 
-    def _parts(self, name: str, springs: Springs) -> tuple[float, float, str]:
-        """Stiffness of sides inside and on the outline, and in words what else there is."""
-        outline, several = self.mesh.on_outline, self.mesh.cells_per_edge > 1
-        inside, at_outline, diagonals = (
-            self._common(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
-        )
-        extra = list(self._terms(springs))
-        if len(self.mesh.quads):
-            extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
-        plain = {"patch": "lattice", "patch-area": "area"}.get(name)
-        if plain and not len(self.mesh.quads):
-            scale = springs.reference / self._sheet.derive(plain, self.material)[0].reference
-            extra.append(f"{scale:.5f} times {plain}")
-        return inside, at_outline, "; ".join([*(() if springs.energies else ("none",)), *extra])
 
-    def _terms(self, springs: Springs) -> Iterator[str]:
-        """Energies in words."""
-        for energy in springs.energies:
-            if isinstance(energy, AreaEnergy):
-                modulus = self._common(springs.reference * energy.modulus) / self.beam.thickness
-                yield f"area energy, K_A = {1e-6 * modulus:.4g} MPa"
-            else:
-                yield "coupling of the sides of each triangle"
+def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
+    """Stiffness of sides inside and on the outline, and in words what else there is.
 
-    @staticmethod
-    def _common(values: np.ndarray) -> float:
-        """The one that all values are, NaN where they differ."""
-        alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
-        return float(np.median(values)) if alike else nan
+    Parameters
+    ----------
+    sheet : Sheet
+    material : Material or None
+        None where there are several.
+    name : str
+        Of the definition.
+    springs : Springs
+
+    Returns
+    -------
+    inside, outline : float
+        As of `Choice`.
+    extra : str
+    """
+    mesh = sheet.mesh
+    outline, several = mesh.on_outline, mesh.cells_per_edge > 1
+    inside, at_outline, diagonals = (
+        _common(springs.reference * springs.relative[part]) for part in (several, outline, ~outline & ~several)
+    )
+    extra = []
+    for energy in springs.energies:
+        if isinstance(energy, AreaEnergy):
+            modulus = _common(springs.reference * energy.modulus) / sheet.thickness
+            extra.append(f"area energy, K_A = {1e-6 * modulus:.4g} MPa")
+        else:
+            extra.append("coupling of the sides of each triangle")
+    if len(mesh.quads):
+        extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
+    plain = {"patch": "lattice", "patch-area": "area"}.get(name)
+    if plain and material is not None and not len(mesh.quads):
+        scale = springs.reference / sheet.derive(plain, material)[0].reference
+        extra.append(f"{scale:.5f} times {plain}")
+    return inside, at_outline, "; ".join([*(() if springs.energies else ("none",)), *extra])
 
 
-def _key(springs: Springs) -> tuple[bytes, ...]:
+def _common(values: np.ndarray) -> float:
+    """The one that all values are, NaN where they differ."""
+    alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
+    return float(np.median(values)) if alike else nan
+
+
+def key_of(springs: Springs) -> tuple[bytes, ...]:
     """What tells networks apart but for their reference stiffness."""
     return springs.relative.tobytes(), *(energy.key for energy in springs.energies)

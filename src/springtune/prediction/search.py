@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import count, takewhile
 
+from ..mechanics.dynamics import masses
 from ..mesh import MESH_TYPES, Mesh
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
@@ -542,5 +543,6 @@ def _cost(mesh: Mesh, beam: Beam, material: Material, springs: Springs, loads: l
         seconds = max(seconds, time.perf_counter() - begin)
     if material.density is None:
         return seconds, math.nan
-    steps = stable_steps(Sheet(mesh, beam.thickness), springs, material.density, ["central-difference"])
+    inertia = masses(mesh, material.density, beam.thickness)
+    steps = stable_steps(Sheet(mesh, beam.thickness), springs, inertia, ["central-difference"])
     return seconds, math.nan if isinstance(steps, str) else steps["central-difference"]

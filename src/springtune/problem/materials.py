@@ -1,12 +1,27 @@
-"""Materials: isotropic, linearly elastic."""
+r"""Materials: linearly elastic, isotropic or not.
 
+Sheets are in plane stress. With stresses and strains in Voigt's order, xx, yy and xy, the shear strain being the angle,
+
+.. math:: \begin{pmatrix} \sigma_{xx} \\ \sigma_{yy} \\ \sigma_{xy} \end{pmatrix} =
+          \begin{pmatrix} C_{11} & C_{12} & C_{16} \\ C_{12} & C_{22} & C_{26} \\ C_{16} & C_{26} & C_{66}
+          \end{pmatrix}
+          \begin{pmatrix} \varepsilon_{xx} \\ \varepsilon_{yy} \\ \gamma_{xy} \end{pmatrix}.
+
+An orthotropic material has, along its own axes, C16 = C26 = 0 and
+
+.. math:: C_{11} = \frac{E_x}{1 - \nu_{xy} \nu_{yx}}, \quad C_{22} = \frac{E_y}{1 - \nu_{xy} \nu_{yx}}, \quad
+          C_{12} = \nu_{xy} C_{22}, \quad C_{66} = G_{xy}, \quad \nu_{yx} = \nu_{xy} E_y / E_x.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from .quantities import positive
+from .quantities import positive, quantity
 
 
 @dataclass(frozen=True)
@@ -24,6 +39,11 @@ class Material:
     name : str
         Label of the material, e.g. ``"steel"``.
 
+    Attributes
+    ----------
+    isotropic : bool
+        True: it has one Young's modulus and one Poisson's ratio.
+
     Raises
     ------
     ValueError
@@ -40,6 +60,7 @@ class Material:
     poisson_ratio: float
     density: float | None = None
     name: str = "material"
+    isotropic: ClassVar[bool] = True
 
     if TYPE_CHECKING:  # what it takes, where what it holds are numbers
 
@@ -52,8 +73,7 @@ class Material:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            raise ValueError(f"name: {self.name!r} is not a text; give one such as 'steel', or none")
+        _check_name(self.name)
         set_ = object.__setattr__  # of a frozen class
         set_(self, "young_modulus", positive(self.young_modulus, "stress", "Young's modulus"))
         if self.density is not None:
@@ -77,3 +97,483 @@ class Material:
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
+
+
+@dataclass(frozen=True)
+class AnisotropicMaterial:
+    """A linearly elastic sheet of any anisotropy, by its six constants in plane stress.
+
+    `orthotropic` makes one of engineering constants and the angle of its fibres, `laminate` one of plies.
+
+    Parameters
+    ----------
+    C11, C22 : float or str
+        Stiffness along x and along y, the strain across held [Pa], or a text with its unit.
+    C12 : float or str
+        Stress along x for a strain along y [Pa].
+    C66 : float or str
+        Shear stress for a shear angle [Pa].
+    C16, C26 : float or str
+        Shear stress for strains along x and y [Pa]; none where x and y are axes of the material.
+    density : float, str or None
+        Density rho [kg/m3], or a text with its unit; statics need none.
+    name : str
+        Label of the material, e.g. ``"ply"``.
+
+    Attributes
+    ----------
+    isotropic : bool
+        False: what needs one Young's modulus and one Poisson's ratio refuses it, whatever its constants.
+
+    Raises
+    ------
+    ValueError
+        If a quantity is of another kind, or if the six are not positive definite: a strain would take no work.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa", name="board")
+    >>> (board.plane_stress / 1e9).tolist()
+    [[9.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 2.0]]
+    """
+
+    C11: float
+    C22: float
+    C12: float
+    C66: float
+    C16: float = 0.0
+    C26: float = 0.0
+    density: float | None = None
+    name: str = "material"
+    isotropic: ClassVar[bool] = False
+
+    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
+
+        def __init__(
+            self,
+            C11: float | str,
+            C22: float | str,
+            C12: float | str,
+            C66: float | str,
+            C16: float | str = 0.0,
+            C26: float | str = 0.0,
+            density: float | str | None = None,
+            name: str = "material",
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        _check_name(self.name)
+        set_ = object.__setattr__  # of a frozen class
+        for constant in CONSTANTS:
+            read = positive if constant in ("C11", "C22", "C66") else quantity
+            set_(self, constant, read(getattr(self, constant), "stress", constant))
+        if self.density is not None:
+            set_(self, "density", positive(self.density, "density", "density"))
+        fault = indefinite(self.C11, self.C22, self.C12, self.C66, self.C16, self.C26)
+        if fault:
+            raise ValueError(f"material {self.name!r}: {fault}")
+
+    @classmethod
+    def orthotropic(
+        cls,
+        young_modulus_x: float | str,
+        young_modulus_y: float | str,
+        poisson_ratio_xy: float,
+        shear_modulus: float | str,
+        angle: float | str = 0.0,
+        density: float | str | None = None,
+        name: str = "material",
+    ) -> "AnisotropicMaterial":
+        """Material with two axes of its own, such as a ply of fibres, of its engineering constants.
+
+        Parameters
+        ----------
+        young_modulus_x, young_modulus_y : float or str
+            Young's modulus along the fibres and across [Pa], or a text with its unit.
+        poisson_ratio_xy : float
+            Contraction across over extension along the fibres, pulled along them [1].
+        shear_modulus : float or str
+            [Pa]
+        angle : float or str
+            By which the fibres are turned from the sheet's x axis, counter-clockwise [rad], or a text with its unit.
+        density : float, str or None
+            [kg/m3]
+        name : str
+
+        Returns
+        -------
+        AnisotropicMaterial
+
+        Raises
+        ------
+        ValueError
+            If a quantity is not above zero or of another kind, or Poisson's ratio beyond sqrt(E_x / E_y), where the
+            energy of a strain would be negative.
+
+        Examples
+        --------
+        Carbon fibres in epoxy, turned by 30 degrees:
+
+        >>> import springtune as st
+        >>> ply = st.AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", "30 deg", name="ply")
+        >>> (ply.plane_stress / 1e9).round(1).tolist()
+        [[84.8, 26.4, 41.9], [26.4, 19.4, 14.8], [41.9, 14.8, 28.4]]
+        """
+        along = positive(young_modulus_x, "stress", "young_modulus_x")
+        across = positive(young_modulus_y, "stress", "young_modulus_y")
+        shear = positive(shear_modulus, "stress", "shear_modulus")
+        turn = quantity(angle, "angle", "angle")
+        bound = math.sqrt(along / across)
+        if isinstance(poisson_ratio_xy, bool) or not (
+            isinstance(poisson_ratio_xy, Real) and abs(poisson_ratio_xy) < bound
+        ):
+            raise ValueError(
+                f"material {name!r}: poisson_ratio_xy is {poisson_ratio_xy!r}, and its size must be below "
+                f"sqrt(young_modulus_x / young_modulus_y) = {bound:.6g}; give the ratio for a pull along the fibres"
+            )
+        nu = float(poisson_ratio_xy)
+        scale = 1 - nu * nu * across / along
+        made = cls(along / scale, across / scale, nu * across / scale, shear, density=density, name=name)
+        return made.rotated(turn) if turn else made
+
+    @classmethod
+    def laminate(
+        cls,
+        plies: "Sequence[tuple[AnyMaterial, float | str, float | str]]",
+        density: float | str | None = None,
+        name: str = "laminate",
+    ) -> "AnisotropicMaterial":
+        """Plies that are bonded to one another, as one sheet: the mean of their stiffnesses by thickness.
+
+        The in-plane part A / t of classical lamination theory. It takes stackings for symmetric: others bend out of
+        their plane as they are stretched.
+
+        Parameters
+        ----------
+        plies : sequence of (material, angle, thickness)
+            Of each ply its material, isotropic or not, the angle by which it is turned [rad] and its thickness, which
+            counts over that of all; angle and thickness may be texts with their units.
+        density : float, str or None
+            [kg/m3]; the plies' mean without, if each has one.
+        name : str
+
+        Returns
+        -------
+        AnisotropicMaterial
+
+        Raises
+        ------
+        ValueError
+            If there are no plies, or one is of another kind.
+
+        Examples
+        --------
+        Equal shares at 0, 60 and -60 degrees are isotropic in the plane:
+
+        >>> import springtune as st
+        >>> ply = st.AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa")
+        >>> laminate = st.AnisotropicMaterial.laminate([(ply, f"{angle} deg", 1) for angle in (0, 60, -60)])
+        >>> constants = [laminate.constants_at(f"{angle} deg") for angle in (0, 17, 45)]
+        >>> [f"{one.young_modulus_x / 1e9:.1f} GPa, {one.poisson_ratio_xy:.3f}" for one in constants]
+        ['54.1 GPa, 0.311', '54.1 GPa, 0.311', '54.1 GPa, 0.311']
+        """
+        parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
+        for number, ply in enumerate(plies):
+            if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
+                raise ValueError(f"ply {number}: {ply!r} is none; give a material, an angle and a thickness")
+            material, angle, thickness = ply
+            turned = rotated(material.plane_stress, quantity(angle, "angle", f"angle of ply {number}"))
+            parts.append((material, turned, positive(thickness, "length", f"thickness of ply {number}")))
+        if not parts:
+            raise ValueError("plies: there are none; give at least one material, angle and thickness")
+        total = math.fsum(part for _, _, part in parts)
+        densities = [material.density for material, _, _ in parts]
+        if density is None and None not in densities:
+            density = sum(part * (one or 0.0) for one, (_, _, part) in zip(densities, parts)) / total
+        return cls.of(np.sum([part / total * turned for _, turned, part in parts], axis=0), density, name)
+
+    @classmethod
+    def of(
+        cls, stiffness: np.ndarray, density: float | str | None = None, name: str = "material"
+    ) -> "AnisotropicMaterial":
+        """Material of a stiffness in plane stress.
+
+        Parameters
+        ----------
+        stiffness : ndarray of float, shape (3, 3)
+            As `plane_stress` [Pa].
+        density : float, str or None
+            [kg/m3]
+        name : str
+
+        Returns
+        -------
+        AnisotropicMaterial
+
+        Raises
+        ------
+        ValueError
+            If it is no symmetric matrix of that shape, or not positive definite.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
+        500000.0
+        """
+        given = np.asarray(stiffness, dtype=float)
+        if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
+            raise ValueError(f"stiffness: {stiffness!r} is no symmetric array of shape (3, 3); give one in Pa")
+        (c11, c12, c16), (_, c22, c26), (_, _, c66) = given.tolist()
+        return cls(c11, c22, c12, c66, c16, c26, density, name)
+
+    @property
+    def plane_stress(self) -> np.ndarray:
+        """Stiffness in plane stress [Pa], shape (3, 3): stresses xx, yy, xy of strains xx, yy and the shear angle xy.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
+        [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
+        """
+        return np.array(
+            [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
+        )
+
+    def rotated(self, angle: float | str) -> "AnisotropicMaterial":
+        """The material, turned counter-clockwise in the sheet.
+
+        Parameters
+        ----------
+        angle : float or str
+            [rad], or a text with its unit.
+
+        Returns
+        -------
+        AnisotropicMaterial
+
+        Raises
+        ------
+        ValueError
+            If it is no angle.
+
+        Examples
+        --------
+        A quarter of a turn exchanges the axes:
+
+        >>> import springtune as st
+        >>> turned = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa").rotated("90 deg")
+        >>> round(turned.C11 / 1e9, 9), round(turned.C22 / 1e9, 9)
+        (4.0, 9.0)
+        """
+        turned = rotated(self.plane_stress, quantity(angle, "angle", "angle"))
+        return AnisotropicMaterial.of(turned, self.density, self.name)
+
+    def constants_at(self, angle: float | str = 0.0) -> "EngineeringConstants":
+        """Engineering constants along axes that are turned from x and y, as of a coupon cut out at that angle.
+
+        Parameters
+        ----------
+        angle : float or str
+            Of the coupon's length from the x axis, counter-clockwise [rad], or a text with its unit.
+
+        Returns
+        -------
+        EngineeringConstants
+
+        Raises
+        ------
+        ValueError
+            If it is no angle.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> ply = st.AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa")
+        >>> for angle in (0, 10, 45):
+        ...     found = ply.constants_at(f"{angle} deg")
+        ...     print(f"{angle:2} deg: E = {found.young_modulus_x / 1e9:.1f} GPa, nu = {found.poisson_ratio_xy:.3f}")
+         0 deg: E = 140.0 GPa, nu = 0.300
+        10 deg: E = 79.8 GPa, nu = 0.378
+        45 deg: E = 13.2 GPa, nu = 0.321
+        """
+        return engineering_constants(self.plane_stress, quantity(angle, "angle", "angle"))
+
+
+CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")
+"""Constants of a sheet in plane stress."""
+
+AnyMaterial = Material | AnisotropicMaterial
+"""What a sheet can be of."""
+
+ANY_MATERIAL = (Material, AnisotropicMaterial)
+"""Classes of `AnyMaterial`."""
+
+
+class EngineeringConstants(NamedTuple):
+    """What coupons of a sheet show, cut out along two axes and pulled, or sheared along them.
+
+    Attributes
+    ----------
+    young_modulus_x, young_modulus_y : float
+        Young's modulus along each axis [Pa].
+    poisson_ratio_xy : float
+        Contraction along the second axis over extension along the first, pulled along the first [1].
+    shear_modulus : float
+        [Pa]
+    shear_by_x : float
+        Shear angle over extension along the first axis, pulled along it [1]; none along axes of the material.
+    """
+
+    young_modulus_x: float
+    young_modulus_y: float
+    poisson_ratio_xy: float
+    shear_modulus: float
+    shear_by_x: float
+
+
+def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> EngineeringConstants:
+    """Engineering constants of a stiffness in plane stress.
+
+    Parameters
+    ----------
+    stiffness : ndarray of float, shape (3, 3)
+        As of `Material.plane_stress` [Pa].
+    angle : float, optional
+        By which the axes are turned from x and y, counter-clockwise [rad].
+
+    Returns
+    -------
+    EngineeringConstants
+
+    Examples
+    --------
+    >>> found = engineering_constants(Material(1.0, 0.25).plane_stress, 0.3)
+    >>> [round(one, 9) for one in found[:4]]
+    [1.0, 1.0, 0.25, 0.4]
+    """
+    compliance = np.linalg.inv(rotated(stiffness, -angle) if angle else stiffness)
+    (along, coupled, sheared), across, shear = compliance[0].tolist(), float(compliance[1, 1]), float(compliance[2, 2])
+    return EngineeringConstants(1 / along, 1 / across, -coupled / along, 1 / shear, sheared / along)
+
+
+def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
+    """Stiffness in plane stress of what is turned counter-clockwise [as given], shape (3, 3).
+
+    Parameters
+    ----------
+    stiffness : ndarray of float, shape (3, 3)
+    angle : float
+        [rad]
+
+    Returns
+    -------
+    ndarray of float, shape (3, 3)
+
+    Examples
+    --------
+    >>> along = np.diag([1.0, 0.0, 0.0])  # fibres along x
+    >>> rotated(along, np.pi / 4).round(6).tolist()
+    [[0.25, 0.25, 0.25], [0.25, 0.25, 0.25], [0.25, 0.25, 0.25]]
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    # Strains along the turned axes of strains along x and y; the energy is the same.
+    strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    turned = strains.T @ stiffness @ strains
+    return 0.5 * (turned + turned.T)
+
+
+def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0, c26: float = 0.0) -> str:
+    """Why constants in plane stress are none of a material, with the bound; empty where they are positive definite.
+
+    Parameters
+    ----------
+    c11, c22, c12, c66, c16, c26 : float
+        [Pa]
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> indefinite(9e9, 4e9, 7e9, 2e9)
+    'C12 is 7e+09 Pa, and its size must be below sqrt(C11 C22) = 6e+09 Pa, or some strain takes no work; correct it'
+    >>> indefinite(9e9, 4e9, 1.5e9, 2e9)
+    ''
+    """
+    bound = math.sqrt(c11) * math.sqrt(c22)
+    why = "or some strain takes no work; correct"
+    if not abs(c12) < bound:
+        return f"C12 is {c12:.6g} Pa, and its size must be below sqrt(C11 C22) = {bound:.6g} Pa, {why} it"
+    least = 0.0
+    if c16 or c26:
+        a, b = c16 / math.sqrt(c11), c26 / math.sqrt(c22)  # no product of two stiffnesses: they may be large
+        ratio = c12 / bound
+        least = (a * a - 2 * ratio * a * b + b * b) / ((1 - ratio) * (1 + ratio))
+    if not c66 > least:
+        return (
+            f"C66 is {c66:.6g} Pa, and with these C16 and C26 it must be above {least:.6g} Pa, {why} it, or the other "
+            "two"
+        )
+    return ""
+
+
+def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
+    """Material of its fields, as `dataclasses.asdict` gives them.
+
+    Parameters
+    ----------
+    fields : mapping of str to float, str or None
+
+    Returns
+    -------
+    Material or AnisotropicMaterial
+
+    Examples
+    --------
+    >>> from dataclasses import asdict
+    >>> steel, board = Material(210e9, 0.3), AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9)
+    >>> material_of(asdict(steel)) == steel, material_of(asdict(board)) == board
+    (True, True)
+    """
+    return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
+
+
+def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
+    """The material, refused where it is not isotropic.
+
+    Parameters
+    ----------
+    material : Material or AnisotropicMaterial
+    remedy : str
+        For the message.
+
+    Returns
+    -------
+    Material
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> only_isotropic(AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9, name="board"), "take another")
+    Traceback (most recent call last):
+    ...
+    ValueError: material: 'board' is anisotropic, and beams are of isotropic ones, as their references; take another
+    """
+    if not isinstance(material, Material):
+        raise ValueError(
+            f"material: {material.name!r} is anisotropic, and beams are of isotropic ones, as their references; "
+            f"{remedy}"
+        )
+    return material
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str):
+        raise ValueError(f"name: {name!r} is not a text; give one such as 'steel', or none")

@@ -96,7 +96,7 @@ def beyond(number: float, kind: str) -> bool:
 def _remedy(kind: str) -> str:
     from ..units import QUANTITY_KINDS
 
-    return f"give a {kind} such as '{QUANTITY_KINDS[kind].example}', or a number in {QUANTITY_KINDS[kind].unit}"
+    return f"give {QUANTITY_KINDS[kind].words}, or a number in {QUANTITY_KINDS[kind].unit}"
 
 
 LONGEST_WORD = 100

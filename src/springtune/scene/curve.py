@@ -201,6 +201,8 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     >>> print(f"{curve.best_stiffness:.3g} N/m, closed form {curve.predicted_stiffness:.3g} N/m")
     1.6e+08 N/m, closed form 1.59e+08 N/m
     """
+    if hasattr(scene, "shape"):
+        raise ValueError(f"scene: {scene!r} is of a shape, and a curve is of a beam under a load of one size; give one")
     if not hasattr(scene, "follower"):
         raise ValueError(f"scene: {scene!r} is not a Scene; give one such as springtune.Scene(beam, mesh, ...)")
     if scene.follower:
@@ -219,7 +221,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     path = follow(scene.sheet, kind, scene.kinematics, force / stiffness)
     displacement, stable = path.values, path.stable
     try:
-        reference, objection = scene.reference().displacement, scene.objection
+        reference, objection = scene.reference_values()["displacement"], scene.objection
     except RuntimeError as error:
         reference, objection = np.nan, f"no reference: {error}"
     best = meeting(path, force, stiffness, displacement, stable, reference, objection)

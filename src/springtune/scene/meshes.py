@@ -10,6 +10,7 @@ from ..mesh import mesh_shape as mesh_outlined
 from ..mesh import read_shape as read_grouped
 from ..mesh.box import box_fault
 from ..problem.geometry import Beam
+from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from .sheet import chosen
@@ -18,13 +19,14 @@ FILLED = 1e-6
 """What a mesh may miss of its beam, over the beam's extent."""
 
 
-def is_a(value: object, wanted: type, name: str, example: str) -> None:
+def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str) -> None:
     """Refuse an argument of another type.
 
     Parameters
     ----------
     value : object
-    wanted : type
+    wanted : type or tuple of type
+        The first one is named in the message.
     name : str
         Of the argument.
     example : str
@@ -34,8 +36,11 @@ def is_a(value: object, wanted: type, name: str, example: str) -> None:
     ------
     ValueError
     """
+    if wanted is Material and isinstance(value, AnisotropicMaterial):
+        only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
-        raise ValueError(f"{name}: {value!r} is not a {wanted.__name__}; give one such as {example}")
+        first = wanted[0] if isinstance(wanted, tuple) else wanted
+        raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
 
 
 A_SHAPE = "springtune.Shape.rectangle('200 mm', '40 mm')"

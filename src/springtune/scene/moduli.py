@@ -1,10 +1,13 @@
 """Effective moduli of a definition on a mesh, by patch tests."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
-from ..mechanics.moduli import PatchTest
+import numpy as np
+
+from ..mechanics.moduli import PatchTest, effective_stiffness
 from ..mesh import Mesh
-from ..problem.materials import Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..springs import DefinitionError, Springs
 from .meshes import A_MATERIAL, A_MESH, is_a
 from .sheet import AnyDefinition, Sheet, definition_of, named
@@ -26,6 +29,13 @@ class Moduli:
         Of a sheet that is 1 m thick: moduli do not depend on the thickness.
     seconds : float
         That deriving the springs took.
+    mesh : Mesh
+    material : Material or AnisotropicMaterial
+        What they were derived from.
+
+    Notes
+    -----
+    Young's modulus, Poisson's ratio and shear modulus are NaN where the material is not isotropic.
 
     Examples
     --------
@@ -45,6 +55,49 @@ class Moduli:
     shear_modulus_error: float
     springs: Springs
     seconds: float
+    mesh: Mesh = field(repr=False)
+    material: AnyMaterial
+
+    @cached_property
+    def stiffness(self) -> np.ndarray:
+        """Stiffness in plane stress [Pa], shape (3, 3), as of `Material.plane_stress`; NaN where loads change it.
+
+        The whole outline is strained evenly, on any mesh and of any anisotropy: see
+        `springtune.mechanics.moduli.effective_stiffness`.
+
+        Examples
+        --------
+        Springs alone have C12 = C66, whatever is asked:
+
+        >>> import springtune as st
+        >>> board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa")
+        >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "braced", "5 mm")
+        >>> for name in ("orthotropic", "energy-fit"):
+        ...     found = st.moduli(mesh, board, name)
+        ...     print(name, (abs(found.stiffness) / 1e9).round(2).tolist(), f"{found.stiffness_error:.1%}")
+        orthotropic [[9.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 2.0]] 0.0%
+        energy-fit [[9.29, 1.91, 0.0], [1.91, 4.13, 0.0], [0.0, 0.0, 1.91]] 6.4%
+        """
+        if self.springs.lateral:
+            return np.full((3, 3), np.nan)
+        return effective_stiffness(self.mesh, self.springs) * self.springs.reference
+
+    @property
+    def stiffness_error(self) -> float:
+        """Norm of what `stiffness` differs by from the material's, over the norm of that [1].
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "free", "5 mm")
+        >>> round(st.moduli(mesh, st.AnisotropicMaterial(9.0, 4.0, 1.5, 2.0, C16=0.5), "delingette").stiffness_error, 9)
+        0.0
+        """
+        wanted = self.material.plane_stress
+        # Twice the shear and its couplings: the norm of the tensor, which no turn of the axes changes.
+        weights = np.sqrt([1.0, 1.0, 2.0])
+        weights = weights[:, None] * weights
+        return float(np.linalg.norm(weights * (self.stiffness - wanted)) / np.linalg.norm(weights * wanted))
 
 
 class MeshModuli:
@@ -60,9 +113,11 @@ class MeshModuli:
         self._test = PatchTest(mesh)
         self._found: dict[tuple[object, ...], tuple[float, float, float]] = {}
 
-    def __call__(self, material: Material, definition: AnyDefinition) -> Moduli:
+    def __call__(self, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
         """As `moduli`."""
         springs, seconds = self.sheet.derive(definition, material)
+        if not isinstance(material, Material):
+            return Moduli(np.nan, np.nan, np.nan, springs, seconds, self.sheet.mesh, material)
         name = springs.relative.tobytes(), springs.lateral, *(energy.key for energy in springs.energies)
         if name not in self._found:
             self._found[name] = *self._test.axial(springs), self._test.shear(springs)
@@ -74,16 +129,18 @@ class MeshModuli:
             shear_modulus * springs.reference / scale * 2 * (1 + material.poisson_ratio) - 1,
             springs,
             seconds,
+            self.sheet.mesh,
+            material,
         )
 
 
-def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
+def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
     """Effective moduli of a definition on a mesh, by patch tests with an even strain.
 
     Parameters
     ----------
     mesh : Mesh
-    material : Material
+    material : Material or AnisotropicMaterial
         What the springs are derived from.
     definition : str, Definition or callable
         Key of `springtune.springs.DEFINITIONS`, or a function (mesh, material, thickness) -> Springs.
@@ -99,7 +156,7 @@ def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
     SingularError
         If the network is singular or unstable at rest.
     MeshError
-        If the mesh is no full strip, see `springtune.mechanics.moduli.strip_fault`.
+        If the material is isotropic and the mesh no full strip, see `springtune.mechanics.moduli.strip_fault`.
 
     Notes
     -----
@@ -117,7 +174,7 @@ def moduli(mesh: Mesh, material: Material, definition: AnyDefinition) -> Moduli:
     '0.000000 0.3333 0.000000'
     """
     is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, Material, "material", A_MATERIAL)
+    is_a(material, ANY_MATERIAL, "material", A_MATERIAL)
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(

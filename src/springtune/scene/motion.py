@@ -52,7 +52,7 @@ def motion_of(
 
 
 def stable_steps(
-    sheet: Sheet, springs: Springs, density: float, integrators: Iterable[str], kind: LoadKind | None = None
+    sheet: Sheet, springs: Springs, inertia: np.ndarray, integrators: Iterable[str], held: np.ndarray | None = None
 ) -> dict[str, float] | str:
     """Largest stable steps of springs about rest, undamped.
 
@@ -60,11 +60,11 @@ def stable_steps(
     ----------
     sheet : Sheet
     springs : Springs
-    density : float
-        Of the material [kg/m3].
+    inertia : ndarray of float, shape (n_points,)
+        Masses of the particles [kg].
     integrators : iterable of str
         Of `springtune.mechanics.integrators.INTEGRATORS`.
-    kind : LoadKind, optional
+    held : ndarray of bool, shape (n_points, 2), optional
         Which directions are held; none without.
 
     Returns
@@ -78,15 +78,16 @@ def stable_steps(
     >>> from springtune.problem.materials import Material
     >>> sheet = Sheet(MESH_TYPES["structured"](0.1, 0.02, 5e-3), 1e-3)
     >>> springs, _ = sheet.derive("lattice", Material(210e9, 0.3))
-    >>> f"{1e9 * stable_steps(sheet, springs, 7850.0, ['central-difference'])['central-difference']:.0f} ns"
+    >>> inertia = masses(sheet.mesh, 7850.0, sheet.thickness)
+    >>> f"{1e9 * stable_steps(sheet, springs, inertia, ['central-difference'])['central-difference']:.0f} ns"
     '602 ns'
     """
-    if kind is None:
-        inertia = masses(sheet.mesh, density, sheet.thickness) / springs.reference
-        held = np.zeros(sheet.mesh.points.shape, dtype=bool)
-        motion = Motion(Network(sheet.mesh, held, springs.relative, springs.energies), inertia)
+    if held is None:
+        free = np.zeros(sheet.mesh.points.shape, dtype=bool)
+        network = Network(sheet.mesh, free, springs.relative, springs.energies)
     else:
-        motion = motion_of(sheet, kind, springs, density)
+        network = sheet.network(held, springs)
+    motion = Motion(network, inertia / springs.reference)
     try:
         return {name: motion.step_limit(name) for name in integrators}
     except ArpackError as error:

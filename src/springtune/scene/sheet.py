@@ -19,7 +19,7 @@ from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import held, loaded_edges, measured, weights
 from ..problem.loads import LoadKind
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from ..problem.quantities import nearest
 from ..problem.status import Status
 from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
@@ -39,7 +39,7 @@ class OwnDefinition:
         (mesh, material, thickness) -> Springs.
     """
 
-    function: Callable[[Mesh, Material, float], Springs]
+    function: Callable[..., Springs]
     uniform: bool = False
     uniaxial: bool = False
     needs: str = ""
@@ -49,7 +49,7 @@ class OwnDefinition:
         """What it is called in messages."""
         return getattr(self.function, "__name__", type(self.function).__name__)
 
-    def springs(self, mesh: Mesh, material: Material, thickness: float, given: object = None) -> Springs:
+    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh, checked."""
         found = self.function(mesh, material, thickness)
         if not isinstance(found, Springs):
@@ -62,7 +62,7 @@ class OwnDefinition:
         return found
 
 
-AnyDefinition = str | Definition | OwnDefinition | Callable[[Mesh, Material, float], Springs]
+AnyDefinition = str | Definition | OwnDefinition | Callable[..., Springs]
 """Definition by its name, or a function of one's own."""
 
 Entry = TypeVar("Entry")
@@ -272,6 +272,7 @@ class Sheet:
     --------
     >>> from springtune.mesh import MESH_TYPES
     >>> from springtune.problem.loads import LOADS
+    >>> from springtune.problem.materials import Material
     >>> sheet = Sheet(MESH_TYPES["structured"](0.1, 0.02, 5e-3), 1e-3)
     >>> springs, _ = sheet.derive("lattice", Material(210e9, 0.3))
     >>> found = sheet.solve(LOADS["traction"].kind, springs, 20e3, "linear")
@@ -294,7 +295,7 @@ class Sheet:
     def derive(
         self,
         definition: AnyDefinition,
-        material: Material,
+        material: AnyMaterial,
         stiffness: float | None = None,
         case: tuple[LoadKind, float, np.ndarray | None] | None = None,
     ) -> tuple[Springs, float]:
@@ -304,7 +305,7 @@ class Sheet:
         ----------
         definition : str, Definition or callable
             See `definition_of`.
-        material : Material
+        material : Material or AnisotropicMaterial
         stiffness : float, optional
             Uniform stiffness [N/m], for definitions that are told one.
         case : tuple of LoadKind, float and ndarray, optional
@@ -335,7 +336,7 @@ class Sheet:
     def derive_on_shape(
         self,
         definition: Definition | OwnDefinition,
-        materials: Mapping[str, Material],
+        materials: Mapping[str, AnyMaterial],
         grouped: GroupedMesh,
         stiffness: float | None = None,
         cases: list[Case] | None = None,
@@ -346,7 +347,7 @@ class Sheet:
         Parameters
         ----------
         definition : Definition
-        materials : mapping of str to Material
+        materials : mapping of str to Material or AnisotropicMaterial
             By part, the main one at ``""``.
         grouped : GroupedMesh
             Of this mesh.

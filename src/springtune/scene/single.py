@@ -18,7 +18,7 @@ from ..mesh.groups import GroupedMesh
 from ..problem.compare import deformation_error
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from ..problem.status import Status
@@ -45,8 +45,8 @@ class Scene:
         The body.
     mesh : Mesh or GroupedMesh
         That fills the beam, see `springtune.make_mesh` and `springtune.read_mesh`; of a shape with its groups.
-    material : Material or mapping of str to Material
-        Of a shape of several parts by their names, the main one at ``""``.
+    material : Material, AnisotropicMaterial or mapping of str to those
+        Isotropic of a beam; of a shape of several parts by their names, the main one at ``""``.
     load : str
         Key of `springtune.LOADS`: what is held, and where the force acts; of a shape key of its own ``loads``.
     force : float or str, optional
@@ -67,6 +67,8 @@ class Scene:
     ----------
     sheet : Sheet
         What scenes of the same mesh and thickness can share.
+    statement : BeamStatement or ShapeStatement
+        What is held and loaded, and what is read, see `springtune.scene.statements`.
     definition : Definition
     uniform_stiffness : float or None
         The stiffness that was given [N/m].
@@ -76,7 +78,10 @@ class Scene:
         Of a beam's load.
     follower : bool
         Of a beam: whether the force turns and grows with the side that it acts on, in nonlinear kinematics.
+    shape : Shape
     grouped : GroupedMesh
+        Of a shape.
+    by_part : dict of str to Material
         Of a shape.
     case : LoadCase
         Of a shape, with `scale` in it.
@@ -117,7 +122,7 @@ class Scene:
         self,
         beam: Beam | Shape,
         mesh: Mesh | GroupedMesh,
-        material: Material | Mapping[str, Material],
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         load: str,
         force: float | str | None = None,
         *,
@@ -130,40 +135,41 @@ class Scene:
         if kinematics not in KINEMATICS:
             raise ValueError(f"kinematics: {kinematics!r} is unknown; known: {', '.join(KINEMATICS)}")
         self.kinematics, self.load = kinematics, load
-        self._stated: Statement
+        self.statement: Statement
         if isinstance(beam, Shape):
             if force is not None:
                 raise ValueError(f"force: {force!r} is not used, since loads of a shape have their sizes; give scale")
-            about = self._stated = ShapeStatement(beam, mesh, material, load, scale, kinematics)
-            self.shape, self.grouped, self.case, self.materials = beam, about.grouped, about.case, about.materials
+            about = self.statement = ShapeStatement(beam, mesh, material, load, scale, kinematics)
+            self.shape, self.grouped, self.case, self.scale = beam, about.grouped, about.case, about.scale
+            self.by_part = about.by_part
         else:
             if scale != 1:
                 raise ValueError(f"scale: {scale!r} is of loads of shapes alone; give another force")
-            of_beam = self._stated = BeamStatement(beam, mesh, material, load, force, kinematics)
+            of_beam = self.statement = BeamStatement(beam, mesh, material, load, force, kinematics)
             self.beam, self.material, self.kind = beam, of_beam.material, of_beam.kind
             self.force, self.follower = of_beam.force, of_beam.follower
-        self.mesh = self._stated.mesh
+        self.mesh = self.statement.mesh
         self.definition = definition_of(definition)
-        self._stated.check(self.definition)
+        self.statement.check(self.definition)
         self.uniform_stiffness = None if stiffness is None else positive(stiffness, "stiffness", "stiffness")
         check_stiffness(self.definition, stiffness)
         if sheet is not None:
             is_a(sheet, Sheet, "sheet", "that of another scene")
-        thickness = self._stated.thickness
+        thickness = self.statement.thickness
         self.sheet = Sheet(self.mesh, thickness) if sheet is None else sheet
         if self.sheet.mesh is not self.mesh or self.sheet.thickness != thickness:
             raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
 
     def __repr__(self) -> str:
         return (
-            f"Scene({self._stated.body}, {len(self.mesh.points)} particles, {self._stated.named_materials}, "
-            f"{self._stated.label}, {self.definition.name}, {self.kinematics})"
+            f"Scene({self.statement.body}, {len(self.mesh.points)} particles, {self.statement.named_materials}, "
+            f"{self.statement.label}, {self.definition.name}, {self.kinematics})"
         )
 
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
         with named(self.definition):
-            return self._stated.springs(self.sheet, self.definition, self.uniform_stiffness)
+            return self.statement.springs(self.sheet, self.definition, self.uniform_stiffness)
 
     @cached_property
     def springs(self) -> "SceneSprings":
@@ -191,7 +197,7 @@ class Scene:
         >>> st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "400 kN").title
         'traction of 400000 N'
         """
-        return self._stated.label
+        return self.statement.label
 
     def displacement_of(self, displacements: np.ndarray) -> float:
         """Displacement of the load, of a shape the first one that its load case asks for.
@@ -214,7 +220,7 @@ class Scene:
         >>> scene.displacement_of(0.01 * scene.mesh.points).__round__(12)
         0.002
         """
-        return self._stated.displacement(self.sheet, displacements)
+        return self.statement.displacement(self.sheet, displacements)
 
     @property
     def held(self) -> np.ndarray:
@@ -228,7 +234,7 @@ class Scene:
         >>> scene.held.sum().item()
         20
         """
-        return self._stated.held(self.sheet)
+        return self.statement.held(self.sheet)
 
     @property
     def forces(self) -> np.ndarray:
@@ -242,7 +248,7 @@ class Scene:
         >>> scene.forces.sum(axis=0).round(6).tolist()
         [400000.0, 0.0]
         """
-        return self._stated.forces(self.sheet, self.springs)
+        return self.statement.forces(self.sheet, self.springs)
 
     @property
     def network(self) -> Network:
@@ -252,7 +258,7 @@ class Scene:
     @property
     def problem(self) -> StaticProblem:
         """Network under the pattern of the load."""
-        return self._stated.problem(self.sheet, self.springs)
+        return self.statement.problem(self.sheet, self.springs)
 
     def solve(self) -> "Result":
         """Equilibrium under the force.
@@ -283,13 +289,15 @@ class Scene:
             springs, derived = self._derived
         except SingularError as error:  # of the patch test that scales springs
             seconds = time.perf_counter() - begin
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, 0.0, seconds, self._stated.none())
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, 0.0, seconds, self.statement.none())
         begin = time.perf_counter()
         try:
-            solution = self._stated.solve(self.sheet, springs)
+            solution = self.statement.solve(self.sheet, springs)
         except SingularError as error:
             seconds = time.perf_counter() - begin
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, seconds, derived, self._stated.none())
+            return Result(
+                self, None, Status.FAILED, str(error), np.nan, np.nan, seconds, derived, self.statement.none()
+            )
         return Result(
             self,
             solution.equilibrium,
@@ -299,7 +307,7 @@ class Scene:
             solution.displacement,
             time.perf_counter() - begin,
             derived,
-            self._stated.values(self.sheet, springs, solution),
+            self.statement.values(self.sheet, springs, solution),
         )
 
     def reference(self) -> "ReferenceSolution | ShapeReference":
@@ -328,7 +336,7 @@ class Scene:
         >>> print(f"{1e3 * reference.displacement:.2f} mm; F L / (E A) = {1e3 * 400e3 * 0.2 / (210e9 * 4e-5):.2f} mm")
         9.50 mm; F L / (E A) = 9.52 mm
         """
-        return self._stated.reference(self.sheet)
+        return self.statement.reference(self.sheet)
 
     def reference_values(self) -> dict[str, float]:
         """Quantities of interest of the reference by name.
@@ -351,7 +359,7 @@ class Scene:
         >>> {name: f"{1e3 * value:.2f} mm" for name, value in scene.reference_values().items()}
         {'displacement': '9.50 mm'}
         """
-        return self._stated.reference_values(self.sheet)
+        return self.statement.reference_values(self.sheet)
 
     @property
     def objection(self) -> str:
@@ -393,9 +401,9 @@ class Scene:
         >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
         622 ns
         """
-        inertia = self._stated.masses()
+        inertia = self.statement.masses()
         if inertia is None:
-            name = self._stated.named_materials
+            name = self.statement.named_materials
             raise ValueError(f"density: material {name!r} has none; give a density such as '7850 kg/m^3'")
         if self.problem.given is not None:
             raise ValueError(
@@ -499,8 +507,8 @@ class Scene:
 
         if self.problem.given is not None:
             raise ValueError(f"load: {self.load!r} prescribes displacements, and buckling loads are of forces")
-        begin = self._stated.factor(self.springs)
-        return float(abs(buckling_load(self.problem, begin) / begin * self._stated.size))
+        begin = self.statement.factor(self.springs)
+        return float(abs(buckling_load(self.problem, begin) / begin * self.statement.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -728,7 +736,7 @@ class Result:
         """
         from .drawing import drawer
 
-        if self.equilibrium is None or not self.equilibrium.converged:
+        if not np.isfinite(self.displacement):
             raise ValueError(f"there is no equilibrium to draw: {self.message}")
         moved = self.scene.displacement_of(self.displacements)
         title = self.scene.title if np.isnan(moved) else f"{self.scene.title}: {1e3 * moved:.4g} mm"

@@ -27,20 +27,20 @@ from ..problem.boundary import (
 )
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import nearest, positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..springs import Definition, DefinitionError, Springs
 from ..springs.identification import Case
-from .meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
+from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
 from .sheet import Loading, OwnDefinition, Sheet, Solution, chosen, solved
 
 if TYPE_CHECKING:
     from ..reference.shapes import ShapeReference
     from ..reference.small_strain import ReferenceSolution
 
-A_SHAPE, A_GROUPED_MESH = "a springtune.Shape", "springtune.make_mesh(shape, 'free', '5 mm')"
-"""How arguments are made, for messages."""
+A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
+"""How a mesh with groups is made, for messages."""
 
 
 class BeamStatement:
@@ -73,7 +73,7 @@ class BeamStatement:
         self,
         beam: Beam,
         mesh: Mesh | GroupedMesh,
-        material: Material | Mapping[str, Material],
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         load: str,
         force: float | str | None,
         kinematics: str,
@@ -91,7 +91,7 @@ class BeamStatement:
         self.thickness = beam.thickness
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
         self.body, self.label = beam.label, f"{load} of {abs(self.force):g} N"
-        self.named_materials = material.name
+        self.named_materials, self.materials = material.name, [material]
 
     def check(self, definition: Definition | OwnDefinition) -> None:
         """Refuse a definition that is not for the load."""
@@ -169,7 +169,7 @@ class ShapeStatement:
     ----------
     shape : Shape
     grouped : GroupedMesh
-    material : Material or mapping of str to Material
+    material : Material, AnisotropicMaterial or mapping of str to those
         By part, the main one at ``""``; or of all.
     load : str
         Key of the shape's loads.
@@ -181,7 +181,9 @@ class ShapeStatement:
     ----------
     case : LoadCase
         Scaled.
-    materials : dict of str to Material
+    by_part : dict of str to Material
+    materials : list of Material
+        Each once.
     label : str
         In words.
 
@@ -203,7 +205,7 @@ class ShapeStatement:
         self,
         shape: Shape,
         grouped: GroupedMesh | Mesh,
-        material: Material | Mapping[str, Material],
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         load: str,
         scale: float,
         kinematics: str,
@@ -216,7 +218,8 @@ class ShapeStatement:
             )
         is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
         self.shape, self.grouped, self.mesh, self.thickness = shape, grouped, grouped.mesh, shape.thickness
-        self.materials = _materials(material, grouped)
+        self.by_part = _materials(material, grouped)
+        self.materials = list(dict.fromkeys(self.by_part.values()))
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
         self.load, self.scale = load, float(scale)
@@ -228,14 +231,14 @@ class ShapeStatement:
         self.kinematics = kinematics
         factor = "" if self.scale == 1 else f" times {self.scale:g}"
         self.body, self.label = shape.name, f"{load}{factor}"
-        self.named_materials = ", ".join(dict.fromkeys(one.name for one in self.materials.values()))
+        self.named_materials = ", ".join(dict.fromkeys(one.name for one in self.materials))
         self.loading = self._loading()
         for one in self.case.quantities:
             self._check(one)
 
     def _loading(self) -> Loading:
         held, given = supported(self.grouped, self.case)
-        densities = {name: one.density for name, one in self.materials.items()}
+        densities = {name: one.density for name, one in self.by_part.items()}
         all_forces = partial(forces, self.grouped, self.case, self.thickness, densities)
         pattern = all_forces()
         if not (pattern[~held].any() or given.any()):
@@ -285,7 +288,7 @@ class ShapeStatement:
             field = self.reference(sheet).at(self.mesh.points)
             given = [Case(self.loading.held, self.loading.pattern, field)]
         springs, seconds = sheet.derive_on_shape(
-            definition, self.materials, self.grouped, stiffness, given, self.loading.key
+            definition, self.by_part, self.grouped, stiffness, given, self.loading.key
         )
         if springs.lateral:
             raise DefinitionError(
@@ -303,7 +306,7 @@ class ShapeStatement:
 
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
-        densities = {name: one.density for name, one in self.materials.items()}
+        densities = {name: one.density for name, one in self.by_part.items()}
         return None if None in densities.values() else particle_masses(self.grouped, self.thickness, densities)
 
     def problem(self, sheet: Sheet, springs: Springs) -> StaticProblem:
@@ -379,12 +382,12 @@ class ShapeStatement:
 
     def reference(self, sheet: Sheet) -> "ShapeReference":
         """Converged finite-element solution, once for all scenes of a sheet."""
-        key = self.case, tuple(self.materials.items())
+        key = self.case, tuple(self.by_part.items())
         if key not in sheet.references:
             from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
 
             as_read = self.grouped if self.shape.file else None
-            sheet.references[key] = solve_shape(self.shape, self.case, self.materials, as_read)
+            sheet.references[key] = solve_shape(self.shape, self.case, self.by_part, as_read)
         return sheet.references[key]
 
     def reference_values(self, sheet: Sheet) -> dict[str, float]:
@@ -425,12 +428,12 @@ def scaled(case: LoadCase, scale: float) -> LoadCase:
     )
 
 
-def _materials(material: Material | Mapping[str, Material], grouped: GroupedMesh) -> dict[str, Material]:
+def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: GroupedMesh) -> dict[str, AnyMaterial]:
     """Material of each part that the mesh has, checked."""
     parts = {str(name) for labels in part_names(grouped).values() for name in np.unique(labels)}
     given = dict(material) if isinstance(material, Mapping) else dict.fromkeys(sorted(parts), material)
     for name, one in given.items():
-        if not hasattr(one, "plane_stress"):
+        if not isinstance(one, ANY_MATERIAL):
             of = f" of part {name!r}" if name else ""
             raise ValueError(f"material{of}: {one!r} is not a Material; give one such as {A_MATERIAL}")
     for name in sorted(parts - set(given)):

@@ -10,15 +10,15 @@ import math
 import numpy as np
 
 from ..mesh import Mesh
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .identification import SPAN, Misfit, patch_cases
 
 MAX_EVALUATIONS = 400
 
 
-@definition("adjoint", order=170)
-def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+@definition("adjoint", order=170, anisotropic=True)
+def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself.
 
     Parameters, returns and errors as in `springtune.springs.lattice.springs`.

@@ -10,16 +10,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..mesh import Mesh
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .identification import SPAN, Case, Misfit
 
 MAX_EVALUATIONS = 1000
 
 
-@definition("annealed", order=150, needs="cases")
+@definition("annealed", order=150, needs="cases", anisotropic=True)
 def springs(
-    mesh: Mesh, material: Material, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
+    mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
     """Stiffness of each spring by simulated annealing on a scene's reference displacements.
 

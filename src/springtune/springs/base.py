@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..mesh import Mesh
-from ..problem.materials import Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import LEAST, MOST
 from ..registry import Declared, Registry
 
@@ -105,6 +105,8 @@ class Definition(Declared):
         Whether it is for loads alone that stretch a beam along its length, see `LoadKind.uniaxial`.
     needs : str
         What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
+    anisotropic : bool
+        Whether it takes materials that are not isotropic; others need Young's modulus and Poisson's ratio.
 
     Examples
     --------
@@ -120,14 +122,15 @@ class Definition(Declared):
     cells: tuple[int, ...] = (3, 4)
     uniaxial: bool = False
     needs: str = ""
+    anisotropic: bool = False
 
-    def springs(self, mesh: Mesh, material: Material, thickness: float, given: object = None) -> Springs:
+    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh.
 
         Parameters
         ----------
         mesh : Mesh
-        material : Material
+        material : Material or AnisotropicMaterial
         thickness : float
             Thickness of the sheet [m].
         given : float or sequence of Case, optional
@@ -152,9 +155,17 @@ class Definition(Declared):
         >>> print(f"{found.reference:.4g} N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = {3 ** 0.5 / 2 * 210e9 * 1e-3:.4g}")
         1.819e+08 N/m, 3 ** 0.5 / 2 * 210e9 * 1e-3 = 1.819e+08
         """
-        for one, kind, name in ((mesh, Mesh, "mesh"), (material, Material, "material")):
-            if not isinstance(one, kind):
-                raise DefinitionError(f"{name}: {one!r} is not a {kind.__name__}; give a springtune.{kind.__name__}")
+        if not isinstance(mesh, Mesh):
+            raise DefinitionError(f"mesh: {mesh!r} is not a Mesh; give a springtune.Mesh")
+        if not isinstance(material, ANY_MATERIAL):
+            raise DefinitionError(f"material: {material!r} is not a Material; give a springtune.Material")
+        if not (material.isotropic or self.anisotropic):
+            able = [name for name, one in DEFINITIONS.items() if one.anisotropic and not one.needs]
+            fitting = [name for name in able if set(mesh.cells) <= set(DEFINITIONS[name].cells)]
+            raise DefinitionError(
+                f"needs an isotropic material and {material.name!r} is anisotropic; choose one of "
+                f"{', '.join(map(repr, fitting or able))}"
+            )
         told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]
         for name, value in told:
             if isinstance(value, bool) or not (isinstance(value, int | float | np.number) and LEAST <= value <= MOST):
@@ -186,6 +197,7 @@ def definition(
     cells: tuple[int, ...] = (3, 4),
     uniaxial: bool = False,
     needs: str = "",
+    anisotropic: bool = False,
 ) -> Callable[[Function], Function]:
     """Declare a function to be a definition, by a decorator that returns it as it is.
 
@@ -195,7 +207,7 @@ def definition(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels: a number between those of its neighbours; at the end without.
-    uniform, cells, uniaxial, needs
+    uniform, cells, uniaxial, needs, anisotropic
         As of `Definition`.
 
     Returns
@@ -228,10 +240,17 @@ def definition(
             raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
         if needs not in NEEDS:
             raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        DEFINITIONS.declare(Definition(name, function, order, uniform, tuple(cells), uniaxial, needs))
+        DEFINITIONS.declare(Definition(name, function, order, uniform, tuple(cells), uniaxial, needs, anisotropic))
         return function
 
     return declare
+
+
+def membrane_stiffness(material: AnyMaterial, thickness: float) -> float:
+    """Reference stiffness [N/m] for any material: E t, or the largest stiffness in plane stress by the thickness."""
+    if isinstance(material, Material):
+        return material.young_modulus * thickness
+    return float(np.diag(material.plane_stress).max()) * thickness
 
 
 def zero(mesh: Mesh) -> np.ndarray:

@@ -7,24 +7,26 @@ bilinear rectangle (four Gauss points). After Natsupakpong and Cavusoglu (Graph.
 matches the constrained modulus rather than E: on an equilateral triangle E is wrong by 8 / (9 (1 - nu^2)).
 """
 
-from itertools import combinations
-
 import numpy as np
 
 from ..mesh import Mesh, signed_areas
 from ..mesh.cells import DIAGONALS, SIDES
-from ..problem.materials import Material
-from .base import Springs, definition
+from ..problem.materials import AnyMaterial, Material
+from .base import Springs, definition, membrane_stiffness
+from .fitting import least_squares
 
 
-@definition("element-fit", order=140)
-def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+@definition("element-fit", order=140, anisotropic=True)
+def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Springs fitted by least squares to the stiffness matrix of each finite element, none negative.
 
     Parameters and returns as in `springtune.springs.lattice.springs`.
     """
-    nu = material.poisson_ratio
-    elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
+    if isinstance(material, Material):
+        nu = material.poisson_ratio
+        elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
+    else:
+        elasticity = material.plane_stress / membrane_stiffness(material, 1.0)
     parts = {}
     for count, corners in mesh.cells.items():
         here = mesh.points[corners] - mesh.points[corners[:, :1]]
@@ -33,7 +35,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         _, first, which = np.unique(shapes, axis=0, return_index=True, return_inverse=True)
         matrices = _element_matrices(here[first], elasticity)
         parts[count] = _fit(here[first], SIDES[count] + DIAGONALS[count], matrices)[which.ravel()]
-    return Springs(material.young_modulus * thickness, mesh.sum_to_edges(parts))
+    return Springs(membrane_stiffness(material, thickness), mesh.sum_to_edges(parts))
 
 
 def _element_matrices(here: np.ndarray, elasticity: np.ndarray) -> np.ndarray:
@@ -74,23 +76,4 @@ def _fit(here: np.ndarray, pairs: tuple[tuple[int, int], ...], matrices: np.ndar
     springs = parts.reshape(count, len(pairs), -1)
     products = np.einsum("npi,nqi->npq", springs, springs) ** 2
     wanted = np.einsum("npi,nij,npj->np", springs, matrices, springs)
-    # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.
-    best, cost = np.zeros((count, len(pairs))), np.zeros(count)
-    open_cells = np.arange(count)
-    for size in range(len(pairs), 0, -1):
-        for chosen in combinations(range(len(pairs)), size):
-            places = np.array(chosen)
-            found = np.linalg.solve(
-                products[open_cells][:, places[:, None], places], wanted[open_cells][:, places, None]
-            )[..., 0]
-            trial = -(found * wanted[open_cells][:, places]).sum(axis=1)
-            better = (found >= 0).all(axis=1) & (trial < cost[open_cells])
-            where = open_cells[better]
-            cost[where] = trial[better]
-            best[where] = 0.0
-            best[where[:, None], places] = found[better]
-            if size == len(pairs):  # without a constraint at work no other set is better
-                open_cells = open_cells[~better]
-                if not len(open_cells):
-                    return best
-    return best
+    return least_squares(products, wanted)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..mesh import Mesh
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .identification import SPAN, Case, Misfit
 
@@ -18,9 +18,9 @@ MAX_EVALUATIONS = 1000
 POPULATION = 20
 
 
-@definition("evolved", order=160, needs="cases")
+@definition("evolved", order=160, needs="cases", anisotropic=True)
 def springs(
-    mesh: Mesh, material: Material, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
+    mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
     """Stiffness of each spring by a genetic search on a scene's reference displacements.
 

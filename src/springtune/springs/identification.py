@@ -5,7 +5,8 @@ A case is a load and the displacements that it should cause. The misfit of a net
     J = 1/2 sum over cases |u - u*|^2 / |u*|^2
 
 over all particles. Unknown are the logarithms of the stiffnesses, from a tenth to ten times those of
-`springtune.springs.lattice`.
+`springtune.springs.lattice`; where the material is not isotropic those of `springtune.springs.energy_fit`, springs that
+are nothing there taken for a tenth of their mean.
 """
 
 from collections.abc import Sequence
@@ -14,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh import Mesh
-from ..problem.materials import Material
-from . import lattice
+from ..problem.materials import AnyMaterial, Material
+from . import energy_fit, lattice
+from .base import membrane_stiffness
 
 SPAN = 10.0
 """Largest factor between a spring and where its search starts [1]."""
@@ -40,13 +42,13 @@ class Case:
     displacements: np.ndarray
 
 
-def patch_cases(mesh: Mesh, material: Material, thickness: float) -> list[Case]:
+def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Case]:
     """Tension along x and y and shear of the free mesh under even tractions; what it should do is known exactly.
 
     Parameters
     ----------
     mesh : Mesh
-    material : Material
+    material : Material or AnisotropicMaterial
     thickness : float
         Thickness of the sheet [m].
 
@@ -60,16 +62,31 @@ def patch_cases(mesh: Mesh, material: Material, thickness: float) -> list[Case]:
     held[corner] = True
     held[np.argmax(x - y), 1] = True  # the other end of the lower side
     points = mesh.points - mesh.points[corner]
-    modulus, nu = material.young_modulus, material.poisson_ratio
+    modulus, gradients = _gradients(material)
     cases = []
-    for stress, gradient in (
-        ([[1, 0], [0, 0]], [[1, 0], [0, -nu]]),
-        ([[0, 0], [0, 1]], [[-nu, 0], [0, 1]]),
-        ([[0, 1], [1, 0]], [[0, 2 * (1 + nu)], [0, 0]]),
-    ):
+    for stress, gradient in zip(([[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 1], [1, 0]]), gradients):
         forces = modulus * thickness * outline_forces(mesh, np.array(stress, dtype=float))
         cases.append(Case(held, forces, points @ np.array(gradient, dtype=float).T))
     return cases
+
+
+def _gradients(material: AnyMaterial) -> tuple[float, list[list[list[float]]]]:
+    """A stress, and the displacement gradients of it along x, along y and in shear, the lower side staying level."""
+    if isinstance(material, Material):
+        nu = material.poisson_ratio
+        return material.young_modulus, [[[1, 0], [0, -nu]], [[-nu, 0], [0, 1]], [[0, 2 * (1 + nu)], [0, 0]]]
+    modulus = membrane_stiffness(material, 1.0)
+    strains = np.linalg.inv(material.plane_stress / modulus).T.tolist()
+    return modulus, [[[along, sheared], [0, across]] for along, across, sheared in strains]
+
+
+def _start(mesh: Mesh, material: AnyMaterial, thickness: float) -> tuple[float, np.ndarray]:
+    """Reference stiffness and relative ones from which searches start."""
+    if isinstance(material, Material):
+        found = lattice.springs(mesh, material, thickness)
+        return found.reference, found.relative
+    found = energy_fit.springs(mesh, material, thickness)
+    return found.reference, np.maximum(found.relative, 0.1 * found.relative.mean())
 
 
 def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
@@ -90,16 +107,15 @@ class Misfit:
     Parameters
     ----------
     mesh : Mesh
-    material : Material
+    material : Material or AnisotropicMaterial
     thickness : float
     cases : sequence of Case
     """
 
-    def __init__(self, mesh: Mesh, material: Material, thickness: float, cases: Sequence[Case]):
+    def __init__(self, mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]):
         from ..mechanics.network import Network  # here: see `springtune.springs`
 
-        start = lattice.springs(mesh, material, thickness)
-        self.reference, self.start = start.reference, start.relative
+        self.reference, self.start = _start(mesh, material, thickness)
         self.mesh, self.evaluations = mesh, 0
         self.groups: dict[bytes, list[Case]] = {}
         for case in cases:

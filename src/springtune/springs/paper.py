@@ -5,19 +5,19 @@ The paper chose one stiffness by hand from the sensitivity curve of its 200x30 b
 """
 
 from ..mesh import Mesh
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .lattice import uniform
 
 
-@definition("paper", order=10, uniform=True, needs="stiffness")
-def springs(mesh: Mesh, material: Material, thickness: float, stiffness: float) -> Springs:
+@definition("paper", order=10, uniform=True, needs="stiffness", anisotropic=True)
+def springs(mesh: Mesh, material: AnyMaterial, thickness: float, stiffness: float) -> Springs:
     """Uniform stiffness as printed: the value that the study states for a mesh type and material.
 
     Parameters
     ----------
     mesh : Mesh
-    material : Material
+    material : Material or AnisotropicMaterial
         Not used: the stiffness is stated, not derived.
     thickness : float
         Not used.

@@ -38,6 +38,17 @@ def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, n
         problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
 
 
+def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
+    """A material of beams: one that the study declares, and isotropic."""
+    check_known(problems, path, "material", name, config.materials)
+    if name in config.materials and config.materials[name].young_modulus is None:
+        problems.add(
+            path,
+            f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are; put the sheet "
+            "under 'shapes', whose references take any material",
+        )
+
+
 def check_names(config: StudyConfig, problems: Problems) -> None:
     """Names that refer to what the study declares, and pairs of numbers."""
     mesh_types = mesh_type_names(config)
@@ -54,7 +65,7 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
         for beam in grid.beam:
             check_known(problems, ("grids", name, "beam"), "beam", beam, config.beams)
         for material in grid.material:
-            check_known(problems, ("grids", name, "material"), "material", material, config.materials)
+            check_beam_material(problems, ("grids", name, "material"), material, config)
         for beam in grid.force or ():
             if beam is not None:
                 check_known(problems, ("grids", name, "force", beam), "beam", beam, config.beams)
@@ -286,6 +297,8 @@ def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Seque
             )
     for number, row in enumerate(stated_rows(config)):
         modulus = config.materials[row.material].young_modulus
+        if modulus is None:
+            continue  # there is no E t to judge it by
         every = {(beam.thickness, modulus): None for beam in config.beams.values()}
         for thickness, modulus in sheets.get((row.mesh_type, row.material), every):
             expected = COEFFICIENT * modulus * thickness

@@ -8,8 +8,10 @@ from pydantic.fields import FieldInfo
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
+from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material
 from ..problem.quantities import nearest
 from .fields import (
+    Angle,
     BeamName,
     DefinitionName,
     Density,
@@ -28,6 +30,7 @@ from .fields import (
     MeshType,
     Named,
     OneOrMore,
+    OrthotropicRatio,
     PerBeam,
     Points,
     PoissonRatio,
@@ -35,6 +38,7 @@ from .fields import (
     Ratio,
     Ratios,
     Sections,
+    SignedStress,
     Stiffness,
     Stress,
     Stresses,
@@ -105,14 +109,82 @@ class BeamConfig(Section):
     thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
 
 
-class MaterialConfig(Section):
-    """An isotropic, linearly elastic material."""
+class StiffnessConfig(Section):
+    """Stiffness of a sheet in plane stress, in the order xx, yy and xy with the shear angle; positive definite."""
 
-    young_modulus: Stress = Field(description="Young's modulus E.")
-    poisson_ratio: PoissonRatio = Field(
-        description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress."
+    C11: Stress = Field(description="Stress along x for a strain along x.")
+    C22: Stress = Field(description="Stress along y for a strain along y.")
+    C12: SignedStress = Field(description="Stress along x for a strain along y.")
+    C66: Stress = Field(description="Shear stress for a shear angle.")
+    C16: SignedStress = Field("0 Pa", validate_default=True, description="Shear stress for a strain along x.")
+    C26: SignedStress = Field("0 Pa", validate_default=True, description="Shear stress for a strain along y.")
+
+
+MATERIAL_FORMS = (
+    ("young_modulus", "poisson_ratio"),
+    ("young_modulus_x", "young_modulus_y", "poisson_ratio_xy", "shear_modulus"),
+    ("stiffness",),
+)
+"""Keys that say what a material is: those of one form go together, and no other's with them."""
+
+
+def _one_form(schema: dict[str, Any]) -> None:
+    schema["oneOf"] = [{"required": list(form)} for form in MATERIAL_FORMS]
+
+
+class MaterialConfig(Section):
+    """A linearly elastic material, in one of three forms.
+
+    Isotropic: `young_modulus` and `poisson_ratio`. Orthotropic, such as a ply of fibres: `young_modulus_x`,
+    `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, turned by `angle`. Of any anisotropy:
+    `stiffness`. Only an isotropic one can be a beam's.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_one_form)
+
+    young_modulus: Stress | None = Field(None, description="Young's modulus E.")
+    poisson_ratio: PoissonRatio | None = Field(
+        None, description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress."
     )
+    young_modulus_x: Stress | None = Field(None, description="Young's modulus along the fibres.")
+    young_modulus_y: Stress | None = Field(None, description="Young's modulus across the fibres.")
+    poisson_ratio_xy: OrthotropicRatio | None = Field(
+        None, description="Contraction across over extension along the fibres, pulled along them."
+    )
+    shear_modulus: Stress | None = Field(None, description="Shear modulus along and across the fibres.")
+    angle: Angle | None = Field(
+        None, description="By which the fibres are turned from the x axis, counter-clockwise; not at all without."
+    )
+    stiffness: StiffnessConfig | None = Field(None, description="Its constants in plane stress.")
     density: Density | None = Field(None, description="Density rho; for dynamics, statics need none.")
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        given = [[key for key in form if getattr(self, key) is not None] for form in MATERIAL_FORMS]
+        keys = [keys for keys in given if keys]
+        if len(keys) > 1:
+            both = f"both '{keys[0][0]}' and '{keys[1][0]}', which are of two forms; a material is isotropic"
+            raise refuse(f"{both}, orthotropic or has a stiffness: keep the keys of one", keys[1][0])
+        form = next((form for form, own in zip(MATERIAL_FORMS, given) if own), MATERIAL_FORMS[0])
+        if self.angle is not None and form is not MATERIAL_FORMS[1]:
+            raise refuse("turns the axes of an orthotropic material, and this is none; remove it", "angle")
+        for key in form:
+            if getattr(self, key) is None:
+                raise refuse(f"'{key}' is missing; give {expected_value(type(self).model_fields[key])}", key)
+        try:
+            self.material("material")
+        except ValueError as error:
+            raise refuse(str(error).removeprefix("material 'material': ")) from None
+        return self
+
+    def material(self, name: str) -> AnyMaterial:
+        """The material."""
+        if self.young_modulus is not None and self.poisson_ratio is not None:
+            return Material(self.young_modulus, self.poisson_ratio, self.density, name)
+        if self.stiffness is not None:
+            return AnisotropicMaterial(**self.stiffness.model_dump(), density=self.density, name=name)
+        own = {key: getattr(self, key) for key in MATERIAL_FORMS[1]}
+        return AnisotropicMaterial.orthotropic(**own, angle=self.angle or 0.0, density=self.density, name=name)
 
 
 class StatedStiffness(Section):

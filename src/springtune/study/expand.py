@@ -10,7 +10,7 @@ from ..mesh import MESH_TYPES
 from ..mesh.formats import LARGEST_FILE
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS, LOADS
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material, only_isotropic
 from ..problem.parameters import SWEPT
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
@@ -76,13 +76,13 @@ class Declared:
     Attributes
     ----------
     beams : dict of str to Beam
-    materials : dict of str to Material
+    materials : dict of str to Material or AnisotropicMaterial
     folder : Path
         Folder that the names of the study's files are seen from.
     """
 
     beams: dict[str, Beam]
-    materials: dict[str, Material]
+    materials: dict[str, AnyMaterial]
     folder: Path = Path()
 
 
@@ -101,10 +101,7 @@ def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
     """
     return Declared(
         {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
-        {
-            name: Material(material.young_modulus, material.poisson_ratio, material.density, name)
-            for name, material in config.materials.items()
-        },
+        {name: material.material(name) for name, material in config.materials.items()},
         folder,
     )
 
@@ -196,7 +193,8 @@ class _Bodies:
         key = one["material"], one.get("young_modulus"), one.get("poisson_ratio")
         if key not in self._materials:
             own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
-            self._materials[key] = replace(self._declared.materials[key[0]], **own)
+            material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
+            self._materials[key] = replace(material, **own)
         return self._materials[key]
 
     def mesh(self, beam: Beam, one: Combination) -> MeshSpec | None:

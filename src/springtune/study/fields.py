@@ -69,11 +69,26 @@ def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
         if not number > 0:
             raise refuse(f"{show(value)} is not above zero; {negative}, such as '{example}'")
         if beyond(number, kind):
-            raise refuse(f"{show(value)} is beyond all measure; give a {kind} such as '{example}'")
+            raise refuse(f"{show(value)} is beyond all measure; give {units.QUANTITY_KINDS[kind].words}")
         return number
 
     schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
-    return Scalar(read, schema, f"a {kind} such as '{example}'")
+    return Scalar(read, schema, units.QUANTITY_KINDS[kind].words)
+
+
+def signed(kind: str) -> Scalar:
+    """Annotation of a quantity of either sign, of a key of `springtune.units.QUANTITY_KINDS`."""
+    words = units.QUANTITY_KINDS[kind].words
+
+    def read(value: str) -> float:
+        try:
+            return units.parse(value, kind)
+        except units.UnitError as error:
+            raise refuse(str(error)) from None
+
+    pattern = r"^\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
+    schema = {"type": "string", "pattern": pattern, "examples": [units.QUANTITY_KINDS[kind].example]}
+    return Scalar(read, schema, words)
 
 
 def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:
@@ -127,6 +142,9 @@ Force = Annotated[float, quantity("force", "the load's name carries the sign: gi
 Stiffness = Annotated[float, quantity("stiffness")]
 Stress = Annotated[float, quantity("stress")]
 Density = Annotated[float, quantity("density")]
+Angle = Annotated[float, signed("angle")]
+SignedStress = Annotated[float, signed("stress")]
+OrthotropicRatio = Annotated[float, number("a number such as 0.3", -100, 100)]
 PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0, 0.5)]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]

@@ -12,7 +12,7 @@ from ...problem.loads import LOADS
 from ...problem.materials import Material
 from ...problem.quantities import nearest
 from ...springs import DEFINITIONS
-from ...study.checks import check_density, check_known, check_particles, check_product
+from ...study.checks import check_beam_material, check_density, check_known, check_particles, check_product
 from ...study.config import Section
 from ...study.fields import (
     BeamName,
@@ -143,7 +143,7 @@ def _check(config, problems):
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)
         check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
-        check_known(problems, (*place, "material"), "material", scene.material, config.materials)
+        check_beam_material(problems, (*place, "material"), scene.material, config)
         check_density(config, scene.material, (*place, "material"), problems)
         if not in_benchmark(scene.load):
             able = ", ".join(filter(in_benchmark, LOADS))

@@ -9,7 +9,7 @@ from pydantic import Field
 from ...problem.geometry import Strip, Trapezoid
 from ...problem.materials import Material
 from ...springs import DEFINITIONS
-from ...study.checks import check_for_triangles, check_known, check_particles, check_product
+from ...study.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
 from ...study.config import Section
 from ...study.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ..base import Kind
@@ -120,7 +120,7 @@ def _check(config, problems):
         return
     check_known(problems, ("laying", "strip"), "beam", config.laying.strip, config.beams)
     for key in ("material", "support"):
-        check_known(problems, ("laying", key), "material", getattr(config.laying, key), config.materials)
+        check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
     check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
     check_product(problems, config.laying, ("laying",), ("definition", "mesh_size", "loading", "friction"), MOST_STRIPS)
     if config.laying.strip in config.beams:

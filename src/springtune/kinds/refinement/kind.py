@@ -10,7 +10,7 @@ from ...problem.geometry import Beam
 from ...problem.loads import LOADS
 from ...problem.materials import Material
 from ...springs import DEFINITIONS
-from ...study.checks import check_known, check_particles
+from ...study.checks import check_beam_material, check_known, check_particles
 from ...study.config import Section
 from ...study.fields import (
     BeamName,
@@ -141,7 +141,7 @@ def _check(config, problems):
     for name, section in (config.refine or {}).items():
         path = "refine", name
         check_known(problems, (*path, "beam"), "beam", section.beam, config.beams)
-        check_known(problems, (*path, "material"), "material", section.material, config.materials)
+        check_beam_material(problems, (*path, "material"), section.material, config)
         _check_definitions(section, path, problems)
         for made in MADE:
             given = getattr(section, made) is not None

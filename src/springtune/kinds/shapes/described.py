@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 from math import isfinite
 from typing import Any
 
-from ...problem.materials import Material
+from ...problem.materials import AnisotropicMaterial, AnyMaterial, Material
 from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
 UNNAMED, CASE = "shape", "load"
@@ -155,6 +155,9 @@ def _pair(values: Any) -> tuple[float, float]:
     return x, y
 
 
-def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, Material]:
+def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, AnyMaterial]:
     """Materials by part, of what `springtune.jobs.keys.material_key` gives of each."""
-    return {part: Material(**one) for part, one in described.items()}
+    return {
+        part: Material(**one) if "young_modulus" in one else AnisotropicMaterial(**one)
+        for part, one in described.items()
+    }

@@ -8,7 +8,7 @@ from pydantic import Field
 from ...mesh import MESH_TYPES
 from ...problem.geometry import Beam
 from ...problem.materials import Material
-from ...study.checks import check_density, check_for_triangles, check_known, check_particles
+from ...study.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
 from ...study.config import Section
 from ...study.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
 from ..base import Kind
@@ -74,7 +74,7 @@ def _check(config, problems):
         return
     section = config.stability
     check_known(problems, ("stability", "beam"), "beam", section.beam, config.beams)
-    check_known(problems, ("stability", "material"), "material", section.material, config.materials)
+    check_beam_material(problems, ("stability", "material"), section.material, config)
     check_density(config, section.material, ("stability", "material"), problems)
     check_for_triangles(section.definition, ("stability", "definition"), problems)
     made = [name for name, one in MESH_TYPES.items() if one.corners == 3]

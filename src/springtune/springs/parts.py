@@ -1,0 +1,254 @@
+"""Springs of a body of several materials: a definition on each part, added up.
+
+Parts of one material are one body, whose springs the definition derives as if it were alone; then
+
+- springs that two materials share, on the edges between them, are added: each side gives what it gives to an outline.
+  Definitions that give each cell's share to its edges (half weight on the outline among them) are so derived exactly:
+  with equal materials the sum is what one material gives, to rounding;
+- energies of one kind are one, of the cells of all parts that have it; all are over the first part's reference
+  stiffness;
+- a definition that gives all springs one stiffness gives each part its own, and springs between parts the mean.
+
+`patch`, `patch-area` and `adjoint` test each part alone, and `density` and `oriented` count each part's own springs:
+with equal materials they give nearly what one material gives, not exactly.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ..mesh import Mesh
+from ..mesh.cells import no_cells
+from ..mesh.groups import GroupedMesh
+from ..problem.materials import ANY_MATERIAL, AnyMaterial
+from ..problem.quantities import nearest
+from .base import DefinitionError, Springs
+
+if TYPE_CHECKING:
+    from ..mechanics.energies import Energy
+
+MAIN = ""
+"""Name of the part that has no other."""
+
+
+class Derives(Protocol):
+    """What a definition has to have: one of `springtune.springs.DEFINITIONS`, or of one's own."""
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all springs have one stiffness."""
+
+    @property
+    def uniaxial(self) -> bool:
+        """Whether it is for loads alone that stretch a beam along its length."""
+
+    @property
+    def needs(self) -> str:
+        """What it is told besides mesh, material and thickness."""
+
+    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
+        """Springs of a mesh."""
+
+
+def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
+    """Cells of each part, the main one's among them.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+
+    Returns
+    -------
+    dict of str to dict of int to ndarray of bool, shape (n_cells,)
+        By part and number of corners; parts without cells are left out.
+
+    Examples
+    --------
+    >>> from springtune.mesh import right
+    >>> mesh = right(0.02, 0.01, 5e-3)
+    >>> left = mesh.points[mesh.triangles, 0].max(axis=1) < 0.011
+    >>> found = cells_of_parts(GroupedMesh(mesh, parts={"left": {3: left}}))
+    >>> {name: int(cells[3].sum()) for name, cells in found.items()}
+    {'': 8, 'left': 8}
+    """
+    rest = {count: np.ones(len(corners), dtype=bool) for count, corners in grouped.mesh.cells.items()}
+    found: dict[str, dict[int, np.ndarray]] = {MAIN: rest}
+    for name, chosen in grouped.parts.items():
+        own = {}
+        for count, everything in rest.items():
+            own[count] = np.asarray(chosen.get(count, np.zeros(len(everything))), dtype=bool)
+            everything &= ~own[count]
+        found[name] = own
+    return {name: cells for name, cells in found.items() if any(mask.any() for mask in cells.values())}
+
+
+def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
+    """Refuse materials that do not go with the parts of a body.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    materials : mapping of str to Material or AnisotropicMaterial
+        By part; ``""`` is the main one.
+
+    Raises
+    ------
+    DefinitionError
+        If a part has no material, or there is a material of no part.
+
+    Examples
+    --------
+    >>> from springtune.mesh import right
+    >>> from springtune.problem.materials import Material
+    >>> check_materials(GroupedMesh(right(0.02, 0.01, 5e-3)), {"rim": Material(210e9, 0.3)})
+    Traceback (most recent call last):
+    ...
+    springtune.springs.base.DefinitionError: the main part of the body has no material; add one of the name ''
+    """
+    parts = cells_of_parts(grouped)
+    for name in parts:
+        if name not in materials:
+            what = f"part {name!r}" if name else "the main part"
+            raise DefinitionError(f"{what} of the body has no material; add one of the name {name!r}")
+    for name, material in materials.items():
+        if not isinstance(material, ANY_MATERIAL):
+            raise DefinitionError(f"material of part {name!r}: {material!r} is none; give a springtune.Material")
+        if name and name not in grouped.parts:
+            raise DefinitionError(f"material of part {name!r}: the body has no such part; {nearest(name, parts)}")
+
+
+def derive_by_parts(
+    definition: Derives,
+    grouped: GroupedMesh,
+    materials: Mapping[str, AnyMaterial],
+    thickness: float,
+    given: object = None,
+) -> Springs:
+    """Springs of a body whose parts are of several materials.
+
+    Parameters
+    ----------
+    definition : Definition
+    grouped : GroupedMesh
+    materials : mapping of str to Material or AnisotropicMaterial
+        By part; ``""`` is the main one.
+    thickness : float
+        Of the sheet [m].
+    given : float or sequence of Case, optional
+        What the definition `needs`, where all parts are of one material.
+
+    Returns
+    -------
+    Springs
+
+    Raises
+    ------
+    DefinitionError
+        If a part has no material, the definition cannot live on a part, or it is told one thing for the whole body.
+
+    Examples
+    --------
+    A strip of steel beside one of aluminium; a spring between them has half of each:
+
+    >>> from springtune.mesh import right
+    >>> from springtune.problem.materials import Material
+    >>> from springtune.springs import DEFINITIONS
+    >>> mesh = right(0.02, 0.01, 5e-3)
+    >>> upper = mesh.points[mesh.triangles, 1].min(axis=1) > 4e-3
+    >>> body = GroupedMesh(mesh, parts={"upper": {3: upper}})
+    >>> materials = {"": Material(70e9, 0.33), "upper": Material(210e9, 0.3)}
+    >>> springs = derive_by_parts(DEFINITIONS["van-gelder"], body, materials, 1e-3)
+    >>> middles = mesh.points[mesh.edges].mean(axis=1)[:, 1]
+    >>> level = abs(np.diff(mesh.points[mesh.edges, 1])[:, 0]) < 1e-9
+    >>> for y in (0.0, 5e-3, 0.01):
+    ...     here = (springs.reference * springs.relative)[level & (abs(middles - y) < 1e-9)]
+    ...     print(f"{1e3 * y:g} mm: {here[0] / 1e6:.1f} MN/m")
+    0 mm: 35.0 MN/m
+    5 mm: 140.0 MN/m
+    10 mm: 105.0 MN/m
+    """
+    check_materials(grouped, materials)
+    mesh, parts = grouped.mesh, cells_of_parts(grouped)
+    groups: dict[AnyMaterial, list[str]] = {}
+    for name in parts:
+        groups.setdefault(materials[name], []).append(name)
+    if len(groups) == 1:
+        return definition.springs(mesh, next(iter(groups)), thickness, given)
+    if definition.needs or definition.uniaxial:
+        why = f"is told {definition.needs}" if definition.needs == "stiffness" else "is told what the whole body does"
+        raise DefinitionError(
+            f"{'is for sheets of one stress' if definition.uniaxial else why} and the body has {len(groups)} "
+            "materials; choose one that derives each part's springs, such as 'van-gelder', 'area' or 'delingette'"
+        )
+    found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray]]] = []
+    for material, names in groups.items():
+        cells = {count: np.any([parts[name][count] for name in names], axis=0) for count in mesh.cells}
+        part, edges = _part(mesh, cells)
+        try:
+            found.append((definition.springs(part, material, thickness), edges, cells))
+        except DefinitionError as error:
+            shown = " and ".join(repr(name) if name else "the main part" for name in names)
+            raise DefinitionError(f"on {shown}: {error}") from None
+    return _sum(mesh, found, definition.uniform)
+
+
+def _part(mesh: Mesh, cells: Mapping[int, np.ndarray]) -> tuple[Mesh, np.ndarray]:
+    """Mesh of some cells, its particles in the order of the whole one's, and the edge of that for each of its own."""
+    chosen = {count: corners[cells[count]] for count, corners in mesh.cells.items()}
+    particles = np.unique(np.concatenate([corners.ravel() for corners in chosen.values()]))
+    numbers = np.full(len(mesh.points), -1)
+    numbers[particles] = np.arange(len(particles))
+    part = Mesh(mesh.points[particles], *(numbers[chosen.get(count, no_cells(count))] for count in (3, 4)))
+    codes = particles[part.edges] @ [len(mesh.points), 1]
+    return part, np.searchsorted(mesh.edges @ [len(mesh.points), 1], codes)
+
+
+def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray]]], uniform: bool) -> Springs:
+    """Springs of all parts over the first one's reference stiffness."""
+    reference, count = found[0][0].reference, len(mesh.edges)
+    relative, linear, owners = np.zeros(count), np.zeros(count), np.zeros(count)
+    energies: dict[tuple[type, int, int], list[tuple[Energy, np.ndarray, float]]] = {}
+    for springs, edges, cells in found:
+        scale = springs.reference / reference
+        relative[edges] += scale * springs.relative
+        linear[edges] += scale * (springs.relative if springs.linear_springs is None else springs.linear_springs)
+        owners[edges] += 1
+        kinds: list[tuple[type, int]] = []
+        for energy in springs.energies:
+            kind = type(energy), energy.corners.shape[1]
+            where = np.flatnonzero(cells[kind[1]])
+            energies.setdefault((*kind, kinds.count(kind)), []).append((energy, where, scale))
+            kinds.append(kind)
+    if uniform:
+        relative, linear = relative / owners, linear / owners
+    lawful = any(springs.linear_springs is not None for springs, _, _ in found)
+    return Springs(
+        reference,
+        relative,
+        tuple(_joined(mesh, parts) for parts in energies.values()),
+        evaluations=sum(springs.evaluations for springs, _, _ in found),
+        linear_springs=linear if lawful else None,
+    )
+
+
+def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Energy":
+    """One energy of those of several parts: each with its cells in the whole mesh, and the factor on its moduli."""
+    first = parts[0][0]
+    if any(len(energy.corners) != len(where) for energy, where, _ in parts):
+        raise DefinitionError("has an energy of some cells alone; derive it for one material")
+    cells = np.concatenate([where for _, where, _ in parts])
+    order = np.argsort(cells)
+    moduli: dict[str, Any] = {}
+    for part in fields(first):  # type: ignore[arg-type]
+        own = [getattr(energy, part.name) for energy, _, _ in parts]
+        given = [one for one in own if one is not None]
+        if part.name in ("points", "corners") or not given:
+            continue
+        # What an energy has besides its cells is in proportion to its stiffness; a part may lack it.
+        full = [np.zeros((len(where), *given[0].shape[1:])) for _, where, _ in parts]
+        scaled = [none if one is None else scale * one for one, none, (_, _, scale) in zip(own, full, parts)]
+        moduli[part.name] = np.concatenate(scaled)[order]
+    corners = mesh.cells[first.corners.shape[1]][cells[order]]
+    return replace(first, points=mesh.points, corners=corners, **moduli)  # type: ignore[type-var]

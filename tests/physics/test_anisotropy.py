@@ -1,0 +1,423 @@
+"""Sheets of any anisotropy, and bodies of several materials: closed forms, linear triangles, what springs cannot."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springtune.mechanics.moduli import affine_stiffness, axial_moduli, effective_stiffness
+from springtune.mechanics.network import Network
+from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
+from springtune.mesh.groups import GroupedMesh
+from springtune.prediction import predict
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import AnisotropicMaterial, Material
+from springtune.scene.moduli import moduli
+from springtune.scene.single import Scene
+from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.springs.parts import cells_of_parts, derive_by_parts
+
+THICKNESS = 2e-3
+PLY = AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", name="ply")
+BOARD = AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa", name="board")
+
+
+def random_stiffness(generator, scale=1e9):
+    """Symmetric, positive definite, its eigenvalues within two decades."""
+    turned, _ = np.linalg.qr(generator.standard_normal((3, 3)))
+    return scale * turned * 10 ** generator.uniform(-1, 1, 3) @ turned.T
+
+
+def random_mesh(generator):
+    """Free triangles of any shape: each particle moved by up to a third of the shortest edge at it."""
+    mesh = MESH_TYPES["free"](0.02, 0.01, 3e-3)
+    moved = mesh.points + mesh.edge_lengths.min() / 3 * generator.uniform(-0.7, 0.7, mesh.points.shape)
+    return Mesh(moved, mesh.triangles)
+
+
+def braced(ratio, turn=0.0):
+    """Rectangles with both diagonals, so many times as long as high, turned."""
+    mesh = MESH_TYPES["braced"](0.02, 0.01, 2e-3)
+    c, s = np.cos(turn), np.sin(turn)
+    return Mesh(mesh.points * [ratio, 1] @ np.array([[c, s], [-s, c]]), mesh.triangles, mesh.quads)
+
+
+def affine(name, mesh, material):
+    """Stiffness in plane stress of a definition's network, were all particles to follow an even strain [Pa]."""
+    springs = DEFINITIONS[name].springs(mesh, material, THICKNESS)
+    return affine_stiffness(mesh, springs) * springs.reference / THICKNESS
+
+
+def differ(found, wanted):
+    return np.abs(found - wanted).max() / np.abs(wanted).max()
+
+
+# -- exact constructions -----------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**31))
+def test_delingette_at_rest_is_the_linear_triangle_of_any_material(seed):
+    generator = np.random.default_rng(seed)
+    mesh, elasticity = random_mesh(generator), random_stiffness(generator)
+    springs = DEFINITIONS["delingette"].springs(mesh, AnisotropicMaterial.of(elasticity), THICKNESS)
+    free = np.zeros(mesh.points.shape, dtype=bool)
+    ours = springs.reference * Network(mesh, free, springs.relative, springs.energies).tangent().toarray()
+    expected = np.zeros(ours.shape)
+    for corners, area in zip(mesh.triangles, signed_areas(mesh.points, mesh.triangles)):
+        sides = mesh.points[corners[[2, 0, 1]]] - mesh.points[corners[[1, 2, 0]]]
+        slopes = np.stack([-sides[:, 1], sides[:, 0]]) / (2 * area)
+        strain = np.zeros((3, 6))
+        strain[0, ::2] = strain[2, 1::2] = slopes[0]
+        strain[1, 1::2] = strain[2, ::2] = slopes[1]
+        places = np.stack([2 * corners, 2 * corners + 1], axis=1).ravel()
+        expected[np.ix_(places, places)] += THICKNESS * area * strain.T @ elasticity @ strain
+    assert np.linalg.norm(ours - expected) <= 1e-12 * np.linalg.norm(expected)
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-5, 5e-4))
+def test_delingette_is_saint_venant_kirchhoff_of_any_material_at_any_strain(seed, amplitude):
+    generator = np.random.default_rng(seed)
+    mesh, elasticity = random_mesh(generator), random_stiffness(generator)
+    springs = DEFINITIONS["delingette"].springs(mesh, AnisotropicMaterial.of(elasticity), THICKNESS)
+    moved = amplitude * generator.standard_normal(mesh.points.shape)
+    rest, now = mesh.points[mesh.triangles], (mesh.points + moved)[mesh.triangles]
+    rest, now = ((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1) for corners in (rest, now))
+    gradient = now @ np.linalg.inv(rest)
+    green = 0.5 * (gradient.transpose(0, 2, 1) @ gradient - np.eye(2))
+    strain = np.stack([green[:, 0, 0], green[:, 1, 1], 2 * green[:, 0, 1]], axis=1)
+    density = 0.5 * np.einsum("ni,ij,nj->n", strain, elasticity, strain)
+    expected = THICKNESS * (density * signed_areas(mesh.points, mesh.triangles)).sum()
+    # Green's strain is a difference of numbers of order one: its rounding over the strain, some 0.01.
+    assert springs.reference * springs.energies[0].value(moved) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delingette", "delingette-tensile", "element-fit", "energy-fit"])
+@pytest.mark.parametrize("nu", [-0.3, 0.0, 0.3, 0.5])
+def test_isotropic_constants_give_the_isotropic_springs(name, nu):
+    mesh, steel = MESH_TYPES["free"](0.02, 0.01, 3e-3), Material(210e9, nu)
+    theirs = DEFINITIONS[name].springs(mesh, steel, THICKNESS)
+    ours = DEFINITIONS[name].springs(mesh, AnisotropicMaterial.of(steel.plane_stress), THICKNESS)
+    for one, other in zip(
+        (ours.relative, *(energy.tensile for energy in ours.energies)),
+        (theirs.relative, *(energy.tensile for energy in theirs.energies)),
+    ):
+        wanted = theirs.reference * other
+        assert np.abs(ours.reference * one - wanted).max() <= 1e-11 * np.abs(wanted).max()
+
+
+@settings(max_examples=30)
+@given(
+    along=st.floats(1, 50), across=st.floats(1, 50), shear=st.floats(0.1, 3), coupling=st.floats(-0.9, 0.9),
+    ratio=st.floats(0.5, 2), turn=st.floats(-3, 3),
+)  # fmt: skip
+def test_orthotropic_rectangles_have_all_four_constants(along, across, shear, coupling, ratio, turn):
+    """Affine energies to rounding, wherever no spring is negative; and the network relaxes to nothing else."""
+    mesh = braced(ratio, turn)
+    material = AnisotropicMaterial(along, across, coupling * min(along, across), shear).rotated(turn)
+    try:
+        found = affine("orthotropic", mesh, material)
+    except DefinitionError as error:
+        assert "negative stiffness" in str(error)
+        own = material.rotated(-turn)
+        rest = own.C12 - own.C66
+        assert min(own.C11 - rest - own.C66 * ratio**2, own.C22 - rest - own.C66 / ratio**2) < 1e-9 * along
+        return
+    assert differ(found, material.plane_stress) <= 1e-12
+    springs = DEFINITIONS["orthotropic"].springs(mesh, material, THICKNESS)
+    relaxed = effective_stiffness(mesh, springs) * springs.reference / THICKNESS
+    assert differ(relaxed, material.plane_stress) <= 1e-10
+
+
+def test_orthotropic_squares_have_the_closed_form():
+    mesh = braced(1.0)
+    springs = DEFINITIONS["orthotropic"].springs(mesh, BOARD, THICKNESS)
+    stiffness, cells = springs.reference * springs.relative, mesh.cell_edges[4]
+    inside = (mesh.cells_per_edge[cells[:, :4]] == 2).all(axis=1)  # sides that two squares share
+    wanted = THICKNESS * np.array([7.5e9, 2.5e9, 7.5e9, 2.5e9, 2e9, 2e9])  # C11 - C12, C22 - C12, C66
+    assert inside.any()
+    assert stiffness[cells[inside]] == pytest.approx(np.tile(wanted, (inside.sum(), 1)), rel=1e-12)
+    assert springs.reference * springs.energies[0].modulus == pytest.approx(THICKNESS * (1.5e9 - 2e9), rel=1e-12)
+
+
+@settings(max_examples=20)
+@given(along=st.floats(1, 20), across=st.floats(0.6, 20), shear=st.floats(0.2, 0.99))
+def test_springs_alone_are_exact_for_cauchy_materials_on_rows_made_for_them(along, across, shear):
+    """C12 = C66: rows of height a/2 sqrt(C22 / C12), and rectangles of a ratio between two bounds."""
+    shear *= np.sqrt(along * across)
+    material = AnisotropicMaterial(along, across, shear, shear)
+    rows = lattice(5, 4, 1e-3, 0.5e-3 * np.sqrt(across / shear))
+    springs = DEFINITIONS["energy-fit"].springs(rows, material, THICKNESS)
+    assert springs.relative.min() >= 0
+    whole = effective_stiffness(rows, springs) * springs.reference / THICKNESS
+    assert differ(whole, material.plane_stress) <= 1e-9
+    rectangles = braced((along / across) ** 0.25)  # between sqrt(C12 / C22) and sqrt(C11 / C12), their geometric mean
+    assert differ(affine("energy-fit", rectangles, material), material.plane_stress) <= 1e-9
+
+
+@pytest.mark.parametrize("name", ["lattice", "van-gelder", "energy-fit"])
+def test_energy_fit_is_the_lattice_at_a_third(name):
+    mesh, material = lattice(6, 4, 1e-3), Material(1.0, 1 / 3)
+    springs = DEFINITIONS[name].springs(mesh, material, 1.0)
+    wanted = np.sqrt(3) / 4 * mesh.cells_per_edge
+    assert springs.reference * springs.relative == pytest.approx(wanted, rel=1e-12)
+
+
+def test_energy_fit_is_the_least_of_relative_energies():
+    """Every other set of springs of a triangle has the larger norm, negative ones excluded."""
+    generator = np.random.default_rng(2)
+    triangle = Mesh(np.array([[0, 0], [1, 0.1], [0.3, 0.9]]), np.array([[0, 1, 2]]))
+    for material in (BOARD, PLY, PLY.rotated("30 deg")):
+        values, vectors = np.linalg.eigh(material.plane_stress)
+        root = vectors / np.sqrt(values) @ vectors.T
+
+        def norm(stiffness, root=root):
+            return np.linalg.norm(root @ stiffness @ root - np.eye(3))
+
+        springs = DEFINITIONS["energy-fit"].springs(triangle, material, THICKNESS)
+        best = norm(affine_stiffness(triangle, springs) * springs.reference / THICKNESS)
+        unit = [
+            affine_stiffness(triangle, type(springs)(1.0, np.eye(3)[i])) * springs.reference / THICKNESS
+            for i in range(3)
+        ]
+        for _ in range(200):
+            other = np.abs(springs.relative + 0.1 * springs.relative.max() * generator.standard_normal(3))
+            assert norm(np.einsum("i,ijk->jk", other, unit)) >= best * (1 - 1e-12)
+
+
+@settings(max_examples=40)
+@given(
+    along=st.floats(1, 10), across=st.floats(1, 10), coupling=st.floats(0.05, 0.9), shear=st.floats(0.05, 1),
+    mesh=st.sampled_from([braced(1.0), braced(1.5), lattice(2, 2), MESH_TYPES["free"](0.02, 0.01, 4e-3)]),
+)  # fmt: skip
+def test_no_springs_alone_are_nearer_than_the_bound(along, across, coupling, shear, mesh):
+    """Whatever the mesh, some strain's energy is off by |C12 - C66| / (C66 + sqrt(C11 C22))."""
+    mean = np.sqrt(along * across)
+    material = AnisotropicMaterial(along, across, coupling * mean, shear * mean)
+    values, vectors = np.linalg.eigh(material.plane_stress)
+    root = vectors / np.sqrt(values)
+    for name in ("energy-fit", "element-fit"):
+        found = affine(name, mesh, material)
+        error = np.abs(np.linalg.eigvalsh(root.T @ found @ root) - 1).max()
+        assert error >= abs(coupling - shear) / (shear + 1) - 1e-9
+
+
+# -- moduli ------------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 2**31))
+def test_effective_stiffness_is_that_of_linear_triangles_on_any_mesh(seed):
+    generator = np.random.default_rng(seed)
+    mesh, material = random_mesh(generator), AnisotropicMaterial.of(random_stiffness(generator))
+    found = moduli(mesh, material, "delingette")
+    assert found.stiffness_error <= 1e-10
+    assert np.isnan([found.young_modulus_error, found.poisson_ratio, found.shear_modulus_error]).all()
+
+
+@pytest.mark.parametrize("name", ["lattice", "van-gelder", "element-fit", "energy-fit", "uniform", "patch"])
+def test_springs_alone_obey_cauchy_and_relax_below_the_affine_stiffness(name):
+    mesh = MESH_TYPES["free"](0.04, 0.02, 3e-3)
+    springs = DEFINITIONS[name].springs(mesh, Material(1.0, 0.3), 1.0)
+    upper, found = affine_stiffness(mesh, springs), effective_stiffness(mesh, springs)
+    assert upper[0, 1] == pytest.approx(upper[2, 2], rel=1e-12)
+    values = np.linalg.eigvalsh(upper - found)
+    assert values.min() >= -1e-12 * upper.max() and values.max() > 1e-4 * upper.max()
+
+
+def test_springs_of_stress_that_depends_on_the_load_have_no_stiffness():
+    mesh = braced(1.0)
+    assert np.isnan(moduli(mesh, Material(1.0, 0.3), "baudet-corrected").stiffness).all()
+    assert moduli(mesh, Material(1.0, 0.3), "area").stiffness_error <= 1e-10
+
+
+def test_adjoint_brings_springs_alone_nearer_to_what_is_not_cauchy():
+    mesh = MESH_TYPES["free"](0.04, 0.0133, 2.5e-3)
+    fitted, searched = (moduli(mesh, BOARD, name).stiffness_error for name in ("energy-fit", "adjoint"))
+    assert searched < 0.6 * fitted
+
+
+# -- refusals ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name, one in DEFINITIONS.items() if not one.anisotropic])
+def test_definitions_of_isotropic_materials_refuse_others_by_name(name):
+    mesh = MESH_TYPES["braced" if 3 not in DEFINITIONS[name].cells else "right"](0.02, 0.01, 2e-3)
+    with pytest.raises(DefinitionError, match="needs an isotropic material and 'ply' is anisotropic; choose one of"):
+        DEFINITIONS[name].springs(mesh, PLY, THICKNESS, 1.0)
+
+
+def test_what_is_chosen_instead_fits_the_mesh():
+    with pytest.raises(DefinitionError) as caught:
+        DEFINITIONS["lattice"].springs(braced(1.0), PLY, THICKNESS)
+    assert "'orthotropic'" in str(caught.value) and "'delingette'" not in str(caught.value)
+
+
+def test_orthotropic_names_the_bound_and_the_rectangles_that_serve():
+    stiff = AnisotropicMaterial(9.0, 1.0, 1.2, 0.8)
+    with pytest.raises(
+        DefinitionError, match=r"C12 <= C11 and C12 <= C22.*C22 = 1 Pa.*rectangles 1\.155 to 3\.279"
+    ) as caught:
+        DEFINITIONS["orthotropic"].springs(braced(1.0), stiff, THICKNESS)
+    assert "these have 1" in str(caught.value)
+    for ratio in (1.156, 3.278):
+        assert differ(affine("orthotropic", braced(ratio), stiff), stiff.plane_stress) <= 1e-12
+    with pytest.raises(DefinitionError, match="no rectangle serves; choose 'delingette'"):
+        DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(9.0, 1.0, 1.5, 0.4), THICKNESS)
+    with pytest.raises(
+        DefinitionError, match="axes of the material along the sides.*C16 = .*'delingette' on triangles"
+    ):
+        DEFINITIONS["orthotropic"].springs(braced(1.0), PLY.rotated("30 deg"), THICKNESS)
+
+
+# -- several materials -------------------------------------------------------------------------------------------------
+
+
+def halves(mesh, axis):
+    """Two parts: cells beyond the middle along an axis are the part ``far``."""
+    middle = 0.5 * (mesh.points[:, axis].min() + mesh.points[:, axis].max())
+    far = {count: mesh.points[corners][..., axis].mean(axis=1) > middle for count, corners in mesh.cells.items()}
+    return GroupedMesh(mesh, parts={"far": far})
+
+
+ADDITIVE = [name for name, one in DEFINITIONS.items() if not one.needs and not one.uniaxial]
+NOT_ADDITIVE = {"density", "oriented", "patch", "patch-area", "adjoint"}
+"""Definitions that count or test the springs of each part alone."""
+
+
+@pytest.mark.parametrize("name", ADDITIVE)
+def test_parts_of_equal_materials_are_one_body(name):
+    cells = DEFINITIONS[name].cells
+    mesh = MESH_TYPES["structured" if 3 in cells else "braced"](0.04, 0.0104, 2e-3)  # six rows
+    one, other = Material(1.0, 1 / 3, name="one"), Material(1.0, 1 / 3, name="other")
+    if name == "axis-exact":
+        mesh = MESH_TYPES["braced"](0.04, 0.0104, 2e-3)
+    whole = DEFINITIONS[name].springs(mesh, one, THICKNESS)
+    parts = derive_by_parts(DEFINITIONS[name], halves(mesh, 1), {"": one, "far": other}, THICKNESS)
+    free = np.zeros(mesh.points.shape, dtype=bool)
+    ours, theirs = (
+        one.reference * Network(mesh, free, one.relative, one.energies).tangent().toarray() for one in (parts, whole)
+    )
+    wrong = np.linalg.norm(ours - theirs) / np.linalg.norm(theirs)
+    assert wrong <= (0.5 if name in NOT_ADDITIVE else 1e-12)
+    assert (parts.linear_springs is None) == (whole.linear_springs is None)
+    same = derive_by_parts(DEFINITIONS[name], halves(mesh, 1), {"": one, "far": one}, THICKNESS)
+    assert (same.relative == whole.relative).all() and same.reference == whole.reference
+
+
+@pytest.mark.parametrize("name", ["delingette", "area", "orthotropic"])
+@pytest.mark.parametrize("nu", [0.0, 0.3])
+def test_strips_side_by_side_share_a_pull_by_their_stiffness(name, nu):
+    """Of one Poisson's ratio two strips strain alike, so E is the mean by height: exact on any mesh of these."""
+    mesh = MESH_TYPES["right" if name == "delingette" else "braced"](0.04, 0.012, 2e-3)
+    springs = derive_by_parts(
+        DEFINITIONS[name], halves(mesh, 1), {"": Material(1.0, nu), "far": Material(7.0, nu)}, THICKNESS
+    )
+    young, ratio = axial_moduli(mesh, springs)
+    assert (young * springs.reference / THICKNESS, ratio) == pytest.approx((4.0, nu), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delingette", "orthotropic"])
+def test_bars_end_to_end_give_way_one_after_the_other(name):
+    mesh = MESH_TYPES["right" if name == "delingette" else "braced"](0.04, 0.012, 2e-3)
+    materials = {"": Material(1.0, 0.0), "far": AnisotropicMaterial(7.0, 3.0, 0.0, 2.0)}
+    springs = derive_by_parts(DEFINITIONS[name], halves(mesh, 0), materials, THICKNESS)
+    young, _ = axial_moduli(mesh, springs)
+    assert young * springs.reference / THICKNESS == pytest.approx(2 / (1 / 1 + 1 / 7), rel=1e-9)
+
+
+def test_half_weight_of_the_lattice_adds_up_between_materials():
+    """A row between two materials has the mean of theirs, so strips of a lattice have the mean modulus, exactly."""
+    mesh = lattice(20, 8, 1e-3)
+    grouped = halves(mesh, 1)
+    springs = derive_by_parts(
+        DEFINITIONS["lattice"], grouped, {"": Material(1.0, 0.2), "far": Material(7.0, 0.3)}, THICKNESS
+    )
+    young, ratio = axial_moduli(mesh, springs)
+    assert (young * springs.reference / THICKNESS, ratio) == pytest.approx((4.0, 1 / 3), rel=1e-9)
+    heights = mesh.points[mesh.edges, 1]
+    between = np.abs(heights - heights.max() / 2).max(axis=1) < 1e-9
+    assert springs.reference * springs.relative[between] == pytest.approx(np.sqrt(3) / 4 * 8 * THICKNESS, rel=1e-12)
+
+
+def test_energies_of_parts_are_of_their_cells():
+    """A part whose energy vanishes has none, and the network is what both parts are."""
+    mesh = MESH_TYPES["braced"](0.04, 0.012, 2e-3)
+    grouped = halves(mesh, 0)
+    third, fifth = Material(1.0, 1 / 3), Material(1.0, 0.2)
+    springs = derive_by_parts(DEFINITIONS["area"], grouped, {"": third, "far": fifth}, THICKNESS)
+    (energy,) = springs.energies
+    assert np.array_equal(energy.corners, mesh.quads[grouped.parts["far"][4]])
+    free = np.zeros(mesh.points.shape, dtype=bool)
+    direction = np.random.default_rng(1).standard_normal(mesh.points.shape)
+    network = Network(mesh, free, springs.relative, springs.energies)
+    exact = (network.resistance(1e-9 * direction) - network.resistance(-1e-9 * direction)) / 2e-9
+    assert network.tangent() @ direction.ravel() == pytest.approx(exact, abs=1e-6 * np.abs(exact).max())
+
+
+def test_uniform_springs_between_parts_have_the_mean():
+    mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
+    springs = derive_by_parts(
+        DEFINITIONS["uniform"], halves(mesh, 1), {"": Material(1.0, 0.3), "far": Material(3.0, 0.3)}, THICKNESS
+    )
+    assert np.unique(springs.relative.round(12)).tolist() == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("materials", "message"),
+    [
+        ({"": Material(1.0, 0.3)}, "part 'far' of the body has no material; add one of the name 'far'"),
+        ({"far": Material(1.0, 0.3)}, "the main part of the body has no material"),
+        (
+            {"": Material(1.0, 0.3), "far": BOARD, "fat": BOARD},
+            "part 'fat': the body has no such part; did you mean 'far'",
+        ),
+        ({"": Material(1.0, 0.3), "far": "steel"}, "material of part 'far': 'steel' is none"),
+    ],
+)
+def test_materials_that_do_not_go_with_the_parts_are_refused(materials, message):
+    with pytest.raises(DefinitionError, match=message):
+        derive_by_parts(
+            DEFINITIONS["delingette"], halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0), materials, THICKNESS
+        )
+
+
+def test_definitions_that_know_one_body_refuse_parts():
+    grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
+    two = {"": Material(1.0, 0.3), "far": Material(2.0, 0.3)}
+    with pytest.raises(DefinitionError, match="is told stiffness and the body has 2 materials; choose"):
+        derive_by_parts(DEFINITIONS["paper"], grouped, two, THICKNESS, 1e6)
+    with pytest.raises(DefinitionError, match="is told what the whole body does"):
+        derive_by_parts(DEFINITIONS["evolved"], grouped, two, THICKNESS, [1])
+    with pytest.raises(DefinitionError, match="on 'far': needs an isotropic material and 'board' is anisotropic"):
+        derive_by_parts(DEFINITIONS["lattice"], grouped, two | {"far": BOARD}, THICKNESS)
+
+
+def test_cells_that_are_in_no_part_are_the_main_one():
+    grouped = halves(MESH_TYPES["braced"](0.02, 0.01, 5e-3), 0)
+    found = cells_of_parts(grouped)
+    assert list(found) == ["", "far"] and not (found[""][4] & found["far"][4]).any()
+    everything = GroupedMesh(grouped.mesh, parts={"all": {4: np.ones(len(grouped.mesh.quads), dtype=bool)}})
+    assert list(cells_of_parts(everything)) == ["all"]
+
+
+def test_energies_of_different_parts_are_told_apart():
+    mesh = MESH_TYPES["braced"](0.04, 0.012, 2e-3)
+    third, fifth = Material(1.0, 1 / 3), Material(1.0, 0.2)
+    keys = {
+        derive_by_parts(DEFINITIONS["area"], halves(mesh, 0), {"": one, "far": other}, THICKNESS).energies[0].key
+        for one, other in ((third, fifth), (fifth, third))
+    }
+    assert len(keys) == 2
+
+
+def test_beams_refuse_what_is_not_isotropic_by_name():
+    beam = Beam("100 mm", "20 mm")
+    mesh = MESH_TYPES["right"](0.1, 0.02, 5e-3)
+    with pytest.raises(ValueError, match="material: 'board' is anisotropic, and beams are of isotropic ones.*Shape"):
+        Scene(beam, mesh, BOARD, "traction", "1 kN")
+    with pytest.raises(ValueError, match="material: 'ply' is anisotropic, and beams are of isotropic ones.*Shape"):
+        predict(beam, mesh, PLY)
+    with pytest.raises(DefinitionError, match="definition 'lattice': needs an isotropic material and 'ply' is"):
+        moduli(mesh, PLY, "lattice")

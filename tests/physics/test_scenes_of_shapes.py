@@ -1,0 +1,690 @@
+"""Shapes: supports, loads and quantities on groups, prescribed displacements, recovered stress."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+import springtune as st
+from springtune.mechanics.network import Network
+from springtune.mechanics.statics import StaticProblem
+from springtune.mechanics.stress import cell_stresses, particle_stresses
+from springtune.mesh import MESH_TYPES, lattice
+from springtune.mesh.groups import GroupedMesh
+from springtune.problem.boundary import (
+    cell_at,
+    displacement_weights,
+    forces,
+    held,
+    interpolation,
+    measured,
+    particle_masses,
+    reaction_weights,
+    weights,
+)
+from springtune.problem.loads import LOAD_KINDS
+from springtune.springs import DEFINITIONS
+
+STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+THIRD = st.Material("210 GPa", 1 / 3, name="third")
+RUBBER = st.Material("1 MPa", 0.45, density="1000 kg/m^3", name="rubber")
+
+LENGTH, HEIGHT = 0.1, 0.04
+ROLLERS = (st.Support("left", x=0.0), st.Support("lower", y=0.0))
+CLAMP = (st.Support("left", x=0.0, y=0.0),)
+END = st.Quantity("end", "displacement", "right", "x")
+
+
+def plate(*cases, points=None, holes=()):
+    return st.Shape.rectangle(LENGTH, HEIGHT, holes=holes, points=points or {}, loads={one.name: one for one in cases})
+
+
+def load(*quantities, supports=ROLLERS, name="pull", **parts):
+    return st.LoadCase(name, supports, quantities=quantities or (END,), **parts)
+
+
+def solved(shape, grouped, material=STEEL, definition="delingette", kinematics="linear", **options):
+    name = options.pop("name", "pull")
+    result = st.Scene(shape, grouped, material, name, definition=definition, kinematics=kinematics, **options).solve()
+    assert result.message == ""
+    return result
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "braced", "isosceles-0.3"])
+@pytest.mark.parametrize("kind", LOAD_KINDS.values(), ids=str)
+def test_a_beam_is_the_special_case_bit_by_bit(mesh_type, kind):
+    """As it was written for beams alone."""
+    mesh = MESH_TYPES[mesh_type](0.1, 0.03, 3.1e-3)
+
+    def edges(side):
+        return mesh.outline_edges(side.axis, side.place(*mesh.points.max(axis=0)))
+
+    directions = np.zeros(mesh.points.shape, dtype=bool)
+    for side, axes in kind.held:
+        for axis in axes:
+            directions[edges(side), axis] = True
+    assert np.array_equal(held(mesh, kind), directions)
+    pattern = np.zeros(mesh.points.shape)
+    pattern[:, kind.axis] = mesh.side_shares(edges(kind.loaded), kind.along)
+    pattern /= pattern.sum()
+    assert np.array_equal(weights(mesh, kind), pattern)
+    if kind.pressed:
+        ends = mesh.points[edges(kind.loaded), kind.along]
+        middle = 0.5 * (mesh.points[:, kind.along].min() + mesh.points[:, kind.along].max())
+        found = int(np.argmax((ends.min(axis=1) <= middle) & (middle <= ends.max(axis=1))))
+        share = (middle - ends[found, 0]) / (ends[found, 1] - ends[found, 0])
+        pattern = np.zeros(mesh.points.shape)
+        pattern[edges(kind.loaded)[found], kind.axis] = 1 - share, share
+    assert np.array_equal(measured(mesh, kind), pattern)
+
+
+class TestAffineFields:
+    """A plate that is pulled between rollers: everything is known."""
+
+    force, stress = 8e3, 8e3 / (HEIGHT * 1e-3)
+
+    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
+    def test_all_quantities(self, kinematics):
+        size = 1e-3 if kinematics == "linear" else 1e-6
+        expected = {
+            "end": self.stress / 210e9 * LENGTH,
+            "side": -0.3 * self.stress / 210e9 * 0.013,
+            "held": -self.force,
+            "xx": self.stress,
+            "energy": 0.5 * self.force * self.stress / 210e9 * LENGTH,
+            "area": self.stress / 210e9 * 0.7 * LENGTH * HEIGHT,
+        }
+        quantities = [
+            END,
+            st.Quantity("side", "displacement", "somewhere", "y"),
+            st.Quantity("held", "reaction", "left", "x"),
+            st.Quantity("xx", "stress", "somewhere", "xx"),
+            st.Quantity("energy", "energy"),
+            st.Quantity("area", "area"),
+            st.Quantity("yy", "stress", "corner", "yy"),
+        ]
+        pull = load(*quantities, tractions=[st.Traction("right", (self.force, 0.0))])
+        shape = plate(pull, points={"somewhere": (0.037, 0.013), "corner": (0.0, 0.04)})
+        found = solved(shape, st.mesh_shape(shape, 6e-3), kinematics=kinematics, scale=size)
+        assert abs(found.values.pop("yy")) < 1e-8 * size * self.stress
+        powers = {"energy": 2}
+        # In nonlinear kinematics a strain of 1e-9 is small enough.
+        for name, value in found.values.items():
+            assert value == pytest.approx(size ** powers.get(name, 1) * expected[name], rel=1e-8)
+        assert found.displacement == found.values["end"]
+
+    def test_a_mesh_of_quadrilaterals(self):
+        mesh = MESH_TYPES["braced"](LENGTH, HEIGHT, 7e-3)
+        sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
+        sides["lower"] = mesh.outline_edges(1, 0.0)
+        grouped = GroupedMesh(mesh, sides, {"somewhere": np.array([0.037, 0.013])})
+        pull = load(
+            END,
+            st.Quantity("side", "displacement", "somewhere", "y"),
+            st.Quantity("xx", "stress", "somewhere", "xx"),
+            tractions=[st.Traction("right", (self.force, 0.0))],
+        )
+        shape = plate(pull, points={"somewhere": (0.037, 0.013)})
+        values = solved(shape, grouped, THIRD, "lattice").values
+        assert values["end"] == pytest.approx(self.stress / 210e9 * LENGTH, rel=1e-10)
+        assert values["side"] == pytest.approx(-self.stress / 210e9 * 0.013 / 3, rel=1e-10)
+        assert values["xx"] == pytest.approx(self.stress, rel=1e-10)
+
+    def test_a_prescribed_displacement_is_the_force_that_it_takes(self):
+        reaction = st.Quantity("force", "reaction", "right", "x")
+        stretch = load(END, reaction, supports=(*ROLLERS, st.Support("right", x=1e-4)))
+        shape = plate(stretch)
+        values = solved(shape, st.mesh_shape(shape, 6e-3)).values
+        assert values["end"] == pytest.approx(1e-4, rel=1e-14)
+        assert values["force"] == pytest.approx(210e9 * 1e-3 * HEIGHT * 1e-4 / LENGTH, rel=1e-10)
+
+
+def test_a_rigid_motion_takes_no_force():
+    """All that is prescribed: a residual has no load to be over."""
+    move = load(
+        st.Quantity("middle", "displacement", "middle", "x"),
+        st.Quantity("energy", "energy"),
+        supports=(st.Support("left", x=1e-3, y=2e-3), st.Support("right", x=1e-3, y=2e-3)),
+    )
+    shape = plate(move, points={"middle": (0.05, 0.02)})
+    for kinematics in ("linear", "nonlinear"):
+        values = solved(shape, st.mesh_shape(shape, 8e-3), kinematics=kinematics).values
+        assert values["middle"] == pytest.approx(1e-3, rel=1e-12)
+        assert abs(values["energy"]) < 1e-12 * 210e9 * 1e-3 * (1e-3) ** 2
+
+
+@pytest.mark.parametrize("definition", ["delingette", "area", "lattice"])
+def test_a_prescribed_stretch_is_the_equilibrium_under_its_forces(definition):
+    """By 60 %, between clamps, in nonlinear kinematics: the forces of the moved side, given as forces."""
+    stretch = load(END, supports=(*CLAMP, st.Support("right", x=0.6 * LENGTH, y=0.0)))
+    shape = plate(stretch)
+    grouped = st.mesh_shape(shape, 8e-3)
+    scene = st.Scene(shape, grouped, RUBBER, "pull", definition=definition)
+    result = scene.solve()
+    assert result.status is st.Status.SOLVED
+    reference, moved = scene.springs.reference, result.displacements
+    clamp = np.zeros(scene.held.shape, dtype=bool)
+    clamp[grouped.sides["left"]] = True
+    pulled = np.where(scene.held & ~clamp, scene.network.forces(moved), 0.0)
+    network = Network(grouped.mesh, clamp, scene.springs.relative, scene.springs.energies)
+    driven = StaticProblem(network, pulled).newton(1.0, moved + 1e-6 * LENGTH * ~clamp)
+    assert driven.converged
+    np.testing.assert_allclose(driven.displacements, moved, atol=1e-8 * LENGTH)
+    energy = st.Quantity("energy", "energy")
+    finer = plate(replace(stretch, quantities=(energy, st.Quantity("force", "reaction", "right", "x"))))
+    step = 1e-4
+    low, high = (solved(finer, grouped, RUBBER, definition, "nonlinear", scale=1 + sign * step) for sign in (-1, 1))
+    slope = (high.values["energy"] - low.values["energy"]) / (2 * step * 0.6 * LENGTH)
+    force = (pulled * reference)[:, 0].sum()
+    # Castigliano, by central differences: their error is of second order in the step.
+    assert slope == pytest.approx(force, rel=1e-5)
+
+
+class TestEquilibrium:
+    """Whatever is pulled, pushed and heavy: supports carry it, moments included."""
+
+    case = load(
+        END,
+        st.Quantity("energy", "energy"),
+        supports=CLAMP,
+        tractions=[st.Traction("right", (300.0, -200.0)), st.Traction("tip", (0.0, -100.0))],
+        pressures=[st.Pressure("upper", 2e4), st.Pressure("hole", 1e5, follower=True)],
+        gravity=(0.0, -9.81),
+    )
+    shape = plate(case, points={"tip": (LENGTH, HEIGHT)}, holes=[st.Hole.circle((0.05, 0.02), 0.008)])
+    soft = st.Material("1 GPa", 0.3, density="7850 kg/m^3")
+
+    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
+    def test_of_forces_and_moments(self, kinematics):
+        grouped = st.mesh_shape(self.shape, 4e-3)
+        scene = st.Scene(self.shape, grouped, self.soft, "pull", definition="delingette", kinematics=kinematics)
+        solution = scene.statement.solve(scene.sheet, scene.springs)
+        assert solution.message == ""
+        moved = solution.equilibrium.displacements
+        acting = scene.forces
+        if kinematics == "nonlinear":
+            loading = scene.statement.loading
+            acting = loading.dead + loading.follower.forces(moved)
+        total = acting + scene.statement.reactions(scene.springs, solution)
+        place = grouped.mesh.points + (moved if kinematics == "nonlinear" else 0.0)
+        size = np.abs(acting).sum()
+        np.testing.assert_allclose(total.sum(axis=0), 0.0, atol=1e-9 * size)
+        moment = total[:, 1] @ place[:, 0] - total[:, 0] @ place[:, 1]
+        assert abs(moment) < 1e-9 * size * LENGTH
+
+    def test_energy_is_half_the_work(self):
+        scene = st.Scene(self.shape, st.mesh_shape(self.shape, 4e-3), self.soft, "pull", definition="area",
+                         kinematics="linear")  # fmt: skip
+        result = scene.solve()
+        work = float((scene.forces * result.displacements).sum())
+        assert result.values["energy"] == pytest.approx(0.5 * work, rel=1e-10)
+
+    def test_loads_have_their_sizes(self):
+        grouped = st.mesh_shape(self.shape, 4e-3)
+        area = LENGTH * HEIGHT - grouped_hole_area(grouped)
+        pull = forces(grouped, self.case, 1e-3, {"": 7850.0}).sum(axis=0)
+        # An even pressure on a closed round has no resultant.
+        expected = [300.0, -300.0 - 2e4 * LENGTH * 1e-3 - 9.81 * 7850 * area * 1e-3]
+        np.testing.assert_allclose(pull, expected, rtol=1e-10)
+
+    def test_two_clamps_share_their_corner(self):
+        held_twice = load(
+            *(st.Quantity(name, "reaction", name, "x") for name in ("left", "lower")),
+            supports=(st.Support("left", x=0.0, y=0.0), st.Support("lower", x=0.0, y=0.0)),
+            tractions=[st.Traction("right", (1e3, 0.0))],
+        )
+        shape = plate(held_twice)
+        values = solved(shape, st.mesh_shape(shape, 6e-3)).values
+        assert sum(values.values()) == pytest.approx(-1e3, rel=1e-10)
+        assert min(map(abs, values.values())) > 10
+
+
+def grouped_hole_area(grouped):
+    first, last = (grouped.mesh.points[grouped.sides["hole"][:, end]] for end in (0, 1))
+    return abs(0.5 * (first[:, 0] * last[:, 1] - last[:, 0] * first[:, 1]).sum())
+
+
+def test_a_bar_hangs_by_its_weight():
+    """Its end moves by rho g L^2 / (2 E), on any mesh: an even pull on the end, which linear triangles answer exactly,
+    does the same work on both. Its support carries all of it.
+    """
+    hang = load(
+        END,
+        st.Quantity("carried", "reaction", "left", "x"),
+        gravity=(9.81, 0.0),
+    )
+    shape = plate(hang)
+    material = st.Material("1 MPa", 0.0, density="1000 kg/m^3")
+    values = solved(shape, st.mesh_shape(shape, 7e-3), material).values
+    assert values["carried"] == pytest.approx(-1000 * 9.81 * LENGTH * HEIGHT * 1e-3, rel=1e-10)
+    assert values["end"] == pytest.approx(1000 * 9.81 * LENGTH**2 / 2 / 1e6, rel=1e-10)
+
+
+INNER, OUTER, PRESSURE = 0.05, 0.1, 1e6
+
+
+def ring(*quantities):
+    """Quarter of a ring under inner pressure."""
+    o = (0.0, 0.0)
+    outline = (
+        st.Segment((INNER, 0.0), group="lower"),
+        st.Segment((OUTER, 0.0), centre=o, group="outer"),
+        st.Segment((0.0, OUTER), group="left"),
+        st.Segment((0.0, INNER), centre=o, group="inner"),
+    )
+    push = load(*quantities, pressures=[st.Pressure("inner", PRESSURE)])
+    return st.Shape("ring", 1e-3, outline, points={"rim": (INNER, 0.0)}, loads={"pull": push})
+
+
+def test_a_ring_under_pressure():
+    """Lame: second order in displacement, and the recovered stress on its rim within .5 %."""
+    shape = ring(st.Quantity("u", "displacement", "rim", "x"), st.Quantity("hoop", "stress", "rim", "yy"))
+    ratio = INNER**2 / (OUTER**2 - INNER**2)
+    radial = PRESSURE * ratio / 210e9 * (0.7 * INNER + 1.3 * OUTER**2 / INNER)
+    hoop = PRESSURE * ratio * (1 + OUTER**2 / INNER**2)
+    errors = []
+    for size in (8e-3, 4e-3, 2e-3):
+        values = solved(shape, st.mesh_shape(shape, size)).values
+        errors.append((values["u"] / radial - 1, values["hoop"] / hoop - 1))
+    moved, stress = np.transpose(errors)
+    assert np.log2(moved[0] / moved[-1]) / 2 == pytest.approx(2, abs=0.3)
+    assert abs(moved[-1]) < 2e-3
+    # That of the stress changes its sign.
+    assert np.abs(stress).max() < 5e-3
+
+
+def kirsch(points, radius=1.0):
+    """Displacements over stress and shear modulus, and stress over stress, of a plate with a hole that is pulled along
+    x, in plane stress with nu = 0.3 (G. Kirsch, Z. VDI 42:797, 1898).
+    """
+    x, y = points.T
+    r, turn = np.hypot(x, y), np.arctan2(y, x)
+    kappa, a = (3 - 0.3) / (1 + 0.3), radius
+    c1, c2, c3 = np.cos(turn), np.cos(2 * turn), np.cos(3 * turn)
+    s1, s2, s3 = np.sin(turn), np.sin(2 * turn), np.sin(3 * turn)
+    u = a / 8 * (r / a * (kappa + 1) * c1 + 2 * a / r * ((1 + kappa) * c1 + c3) - 2 * a**3 / r**3 * c3)
+    v = a / 8 * (r / a * (kappa - 3) * s1 + 2 * a / r * ((1 - kappa) * s1 + s3) - 2 * a**3 / r**3 * s3)
+    c4, s4, p, q = np.cos(4 * turn), np.sin(4 * turn), a**2 / r**2, 1.5 * a**4 / r**4
+    xx = 1 - p * (1.5 * c2 + c4) + q * c4
+    yy = -p * (0.5 * c2 - c4) - q * c4
+    xy = -p * (0.5 * s2 + s4) + q * s4
+    return np.stack([u, v], axis=1), np.stack([xx, yy, xy], axis=1)
+
+
+def test_recovered_stress_around_a_hole():
+    """Exact displacements on all of the outline but the hole: order two inside, three halves and more at the rim.
+
+    Inside are the neighbours of the rim, too, hence the tolerance.
+    """
+    o = (0.0, 0.0)
+    outline = (
+        st.Segment((1.0, 0.0), group="cut"),
+        st.Segment((4.0, 0.0), group="far"),
+        st.Segment((4.0, 4.0), group="far"),
+        st.Segment((0.0, 4.0), group="cut"),
+        st.Segment((0.0, 1.0), centre=o, group="hole"),
+    )
+    shape = st.Shape("plate", 1.0, outline)
+    inside, rim = [], []
+    material = st.Material(2.6, 0.3)  # of shear modulus 1
+    for size in (0.1, 0.05):
+        grouped = st.mesh_shape(shape, size)
+        mesh = grouped.mesh
+        springs = DEFINITIONS["delingette"].springs(mesh, material, 1.0)
+        directions = np.zeros(mesh.points.shape, dtype=bool)
+        directions[np.concatenate([grouped.sides["cut"], grouped.sides["far"]])] = True
+        exact, stress = kirsch(mesh.points)
+        network = Network(mesh, directions, springs.relative, springs.energies)
+        problem = StaticProblem(network, np.zeros(mesh.points.shape), given=np.where(directions, exact, 0.0))
+        found = problem.linear(1.0)
+        assert found.converged
+        recovered = springs.reference * particle_stresses(mesh, cell_stresses(network, found.displacements, True))
+        away = np.linalg.norm(recovered - stress, axis=1)
+        on_rim = np.zeros(len(mesh.points), dtype=bool)
+        on_rim[grouped.sides["hole"]] = True
+        outline_ = np.zeros(len(mesh.points), dtype=bool)
+        outline_[mesh.edges[mesh.on_outline]] = True
+        inside.append(np.sqrt((away[~outline_] ** 2).mean()))
+        rim.append(np.sqrt((away[on_rim] ** 2).mean()))
+    assert np.log2(inside[0] / inside[1]) > 1.75
+    assert np.log2(rim[0] / rim[1]) > 1.5
+    assert rim[-1] < 0.02  # of the stress far away, a third of the largest one
+
+
+def test_stress_of_the_elliptic_membrane():
+    """NAFEMS LE1: 92.7 MPa at D, here from triangles of 35 mm, some 5,100 particles."""
+    o = (0.0, 0.0)
+    outline = (
+        st.Segment((2.0, 0.0), group="lower"),
+        st.Segment((3.25, 0.0), centre=o, group="outer"),
+        st.Segment((0.0, 2.75), group="left"),
+        st.Segment((0.0, 1.0), centre=o, group="inner"),
+    )
+    pull = load(st.Quantity("yy", "stress", "D", "yy"), pressures=[st.Pressure("outer", "-10 MPa")])
+    shape = st.Shape("LE1", 0.1, outline, points={"D": (2.0, 0.0)}, loads={"pull": pull})
+    found = solved(shape, st.mesh_shape(shape, 0.035))
+    assert found.values["yy"] == pytest.approx(92.7e6, rel=0.01)
+
+
+class TestStress:
+    @settings(max_examples=20, deadline=None)
+    @given(some.integers(0, 2**32 - 1), some.booleans())
+    def test_an_even_strain_has_an_even_stress(self, seed, linear):
+        """On any mesh, of linear triangles: to rounding, at cells and at all particles."""
+        random = np.random.default_rng(seed)
+        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
+        nudged = mesh.points + 1e-3 * random.uniform(-1, 1, mesh.points.shape)
+        mesh = st.Mesh(nudged, mesh.triangles)
+        gradient = 1e-3 * random.standard_normal((2, 2))
+        springs = DEFINITIONS["delingette"].springs(mesh, STEEL, 1e-3)
+        network = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
+        found = cell_stresses(network, mesh.points @ gradient.T, linear)
+        strain = 0.5 * (gradient + gradient.T)
+        if not linear:  # St. Venant-Kirchhoff
+            strain = strain + 0.5 * gradient.T @ gradient
+        xx, yy, xy = STEEL.plane_stress @ [strain[0, 0], strain[1, 1], 2 * strain[0, 1]]
+        expected = np.array([[xx, xy], [xy, yy]])
+        if not linear:
+            turn = np.eye(2) + gradient
+            expected = turn @ expected @ turn.T / np.linalg.det(turn)
+        expected = expected[[0, 1, 0], [0, 1, 1]]
+        scale = np.abs(expected).max()
+        for values in (found[3], particle_stresses(mesh, found)):
+            np.testing.assert_allclose(springs.reference / 1e-3 * values, np.broadcast_to(expected, values.shape),
+                                       atol=1e-10 * scale)  # fmt: skip
+
+    @pytest.mark.parametrize("mesh", [lattice(12, 8), MESH_TYPES["braced"](1.0, 0.4, 0.1)], ids=["lattice", "squares"])
+    def test_of_springs_alone(self, mesh):
+        """Exact on equilateral triangles and on squares, outline included, at nu = 1/3."""
+        gradient = 1e-3 * np.array([[1.0, 0.3], [-0.4, 0.7]])
+        springs = DEFINITIONS["lattice"].springs(mesh, THIRD, 1.0)
+        network = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative)
+        found = cell_stresses(network, mesh.points @ gradient.T, True)
+        expected = THIRD.plane_stress @ [1e-3, 0.7e-3, -0.1e-3]
+        for values in (*found.values(), particle_stresses(mesh, found)):
+            np.testing.assert_allclose(springs.reference * values, np.broadcast_to(expected, values.shape), rtol=1e-11)
+
+    def test_parts_are_recovered_apart(self):
+        """Stress that jumps from one part to the next is constant in either."""
+        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 6e-3)
+        left = mesh.points[mesh.triangles].mean(axis=1)[:, 0] < 0.5 * LENGTH
+        jump = {3: np.where(left[:, None], [1.0, 2.0, 3.0], [5.0, 0.0, -1.0])}
+        for part, value in ((left, [1.0, 2.0, 3.0]), (~left, [5.0, 0.0, -1.0])):
+            found = particle_stresses(mesh, jump, {3: part})
+            here = np.unique(mesh.triangles[part])
+            np.testing.assert_allclose(found[here], np.broadcast_to(value, (len(here), 3)), atol=1e-12)
+            assert np.isnan(np.delete(found, here, axis=0)).all()
+
+
+class TestQuantities:
+    @settings(max_examples=30, deadline=None)
+    @given(some.floats(0, 1), some.floats(0, 1), some.sampled_from(["free", "braced", "right"]))
+    def test_points_are_interpolated(self, along, across, mesh_type):
+        mesh = MESH_TYPES[mesh_type](LENGTH, HEIGHT, 9e-3)
+        point = np.array([along * LENGTH, across * HEIGHT])
+        grouped = GroupedMesh(mesh, points={"here": point})
+        particles, shares = interpolation(grouped, "here")
+        assert shares.sum() == pytest.approx(1, rel=1e-12)
+        np.testing.assert_allclose(shares @ mesh.points[particles], point, atol=1e-12)
+        count, cell, shares = cell_at(grouped, "here")
+        np.testing.assert_allclose(shares @ mesh.points[mesh.cells[count][cell]], point, atol=1e-12)
+        assert shares.min() > -1e-9
+
+    def test_a_particle_is_itself(self):
+        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
+        inside = int(np.argmin(np.abs(mesh.points - [0.05, 0.02]).sum(axis=1)))
+        grouped = GroupedMesh(mesh, points={"here": mesh.points[inside]})
+        field = displacement_weights(grouped, st.Quantity("u", "displacement", "here", "y"))
+        assert field[inside, 1] == 1.0
+        assert np.abs(field).sum() == 1.0
+
+    def test_a_mean_is_by_length(self):
+        """Of a field that is linear along a side whose edges differ."""
+        mesh = MESH_TYPES["right"](LENGTH, HEIGHT, 9e-3)
+        points = mesh.points.copy()
+        points[:, 1] = points[:, 1] ** 2 / HEIGHT
+        mesh = st.Mesh(points, mesh.triangles)
+        grouped = GroupedMesh(mesh, {"right": mesh.outline_edges(0, LENGTH)})
+        field = displacement_weights(grouped, END)
+        assert (field[:, 0] * points[:, 1]).sum() == pytest.approx(HEIGHT / 2, rel=1e-12)
+
+    def test_masses_of_parts(self):
+        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
+        heavy = {3: mesh.points[mesh.triangles].mean(axis=1)[:, 0] < 0.5 * LENGTH}
+        grouped = GroupedMesh(mesh, parts={"heavy": heavy})
+        found = particle_masses(grouped, 1e-3, {"": 1.0, "heavy": 3.0})
+        alone = st.Mesh(mesh.points, mesh.triangles[heavy[3]])
+        assert found.sum() == pytest.approx(1e-3 * (mesh.area + 2 * alone.area), rel=1e-12)
+        with pytest.raises(ValueError, match="the material of part 'heavy' has none"):
+            particle_masses(grouped, 1e-3, {"": 1.0, "heavy": None})
+
+
+class TestMaterials:
+    def bar(self, mesh_type="right"):
+        """Two halves, one beyond the other, with sides and points."""
+        mesh = MESH_TYPES[mesh_type](LENGTH, HEIGHT, 1e-2)
+        sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
+        sides["lower"] = mesh.outline_edges(1, 0.0)
+        far = {3: mesh.points[mesh.triangles].mean(axis=1)[:, 0] > LENGTH / 2}
+        points = {"near": np.array([0.02, 0.02]), "far": np.array([0.08, 0.02])}
+        return GroupedMesh(mesh, sides, points, {"far": far})
+
+    def test_a_bar_of_two(self):
+        """In series, without lateral strain: exact, as is the stress on either side of where they meet."""
+        stresses = [st.Quantity(f"in-{name}", "stress", name, "xx") for name in ("near", "far")]
+        pull = load(END, *stresses, tractions=[st.Traction("right", (1e3, 0.0))], gravity=(0.0, 0.0))
+        shape = plate(pull, points={"near": (0.02, 0.02), "far": (0.08, 0.02)})
+        materials = {"": st.Material(2e9, 0.0), "far": st.Material(1e9, 0.0)}
+        values = solved(shape, self.bar(), materials, "delingette").values
+        stress = 1e3 / (HEIGHT * 1e-3)
+        assert values["end"] == pytest.approx(stress * LENGTH / 2 * (1 / 2e9 + 1 / 1e9), rel=1e-10)
+        for name in ("in-near", "in-far"):
+            assert values[name] == pytest.approx(stress, rel=1e-9)
+
+    def test_one_material_given_by_parts_is_that_material(self):
+        pull = load(END, tractions=[st.Traction("right", (1e3, 0.0))])
+        shape, grouped = plate(pull), self.bar()
+        alone = solved(shape, grouped, STEEL).displacement
+        assert solved(shape, grouped, {"": STEEL, "far": STEEL}).displacement == pytest.approx(alone, rel=1e-12)
+
+    def test_an_anisotropic_sheet(self):
+        """Even stress, and the strains that the compliance says."""
+        board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa", name="board")
+        quantities = END, st.Quantity("xx", "stress", "near", "xx"), st.Quantity("v", "displacement", "near", "y")
+        pull = load(*quantities, tractions=[st.Traction("right", (1e3, 0.0))])
+        shape = plate(pull, points={"near": (0.02, 0.02)})
+        stress = 1e3 / (HEIGHT * 1e-3)
+        compliance = np.linalg.inv(board.plane_stress)
+        values = solved(shape, st.mesh_shape(shape, 8e-3), board).values
+        assert values["end"] == pytest.approx(stress * compliance[0, 0] * LENGTH, rel=1e-9)
+        assert values["v"] == pytest.approx(stress * compliance[0, 1] * 0.02, rel=1e-9)
+        assert values["xx"] == pytest.approx(stress, rel=1e-9)
+
+
+class TestRefusals:
+    """Each names what is wrong, and what there is."""
+
+    traction = st.Traction("right", (1e3, 0.0))
+    pull = load(tractions=[traction])
+    shape = plate(pull)
+    grouped = st.mesh_shape(shape, 8e-3)
+
+    def scene(self, shape=None, grouped=None, material=STEEL, name="pull", **options):
+        return st.Scene(shape or self.shape, grouped or self.grouped, material, name, **options)
+
+    def test_of_arguments(self):
+        with pytest.raises(ValueError, match=r"mesh: is of no groups.*mesh_shape"):
+            self.scene(grouped=self.grouped.mesh)
+        with pytest.raises(ValueError, match="load: 'pul' is unknown; did you mean 'pull'"):
+            self.scene(name="pul")
+        with pytest.raises(ValueError, match="force: '1 kN' is not used"):
+            st.Scene(self.shape, self.grouped, STEEL, "pull", "1 kN")
+        for scale in (0, np.inf, "2", True):
+            with pytest.raises(ValueError, match="scale: .* is no factor"):
+                self.scene(scale=scale)
+        with pytest.raises(ValueError, match="material: 210 is not a Material"):
+            self.scene(material=210)
+        with pytest.raises(ValueError, match="material: 'rim' is no part of the mesh"):
+            self.scene(material={"": STEEL, "rim": RUBBER})
+        with pytest.raises(ValueError, match="main part, '' has none; given: 'rim'"):
+            self.scene(material={"rim": RUBBER})
+        beam = st.Beam("100 mm", "40 mm")
+        mesh = st.make_mesh(beam, "right", "10 mm")
+        with pytest.raises(ValueError, match="scale: 2 is of loads of shapes alone"):
+            st.Scene(beam, mesh, STEEL, "traction", "1 kN", scale=2)
+        with pytest.raises(ValueError, match="force: none"):
+            st.Scene(beam, mesh, STEEL, "traction")
+        with pytest.raises(ValueError, match="is of a shape, and a curve is of a beam"):
+            st.sensitivity(self.scene(definition="lattice"))
+
+    def test_of_definitions(self):
+        uniaxial = [name for name, one in DEFINITIONS.items() if one.uniaxial]
+        assert uniaxial
+        for name in uniaxial:
+            with pytest.raises(ValueError, match=f"{name}.* is for loads that stretch a beam"):
+                self.scene(definition=name)
+        stretch = load(supports=(*CLAMP, st.Support("right", x=1e-4)))
+        with pytest.raises(ValueError, match="prescribes displacements; choose another definition"):
+            self.scene(shape=plate(stretch), definition="annealed")
+        with pytest.raises(ValueError, match="needs a uniform one"):
+            self.scene(definition="paper")
+
+    def test_of_supports(self):
+        apart = load(supports=(st.Support("left", x=0.0), st.Support("lower", x=1e-3)), tractions=[self.traction])
+        with pytest.raises(
+            ValueError, match=r"support of 'lower' moves the particle at \(0, 0\) mm by 0.001 m along x"
+        ):
+            self.scene(shape=plate(apart))
+        idle = load(supports=CLAMP, tractions=[st.Traction("left", (1.0, 0.0))])
+        with pytest.raises(ValueError, match="neither pulls what is free nor moves a support"):
+            self.scene(shape=plate(idle))
+        grouped = GroupedMesh(self.grouped.mesh, self.grouped.sides, {"there": np.array([0.0501, 0.0201])})
+        pointed = load(supports=(*CLAMP, st.Support("there", y=0.0)), tractions=[self.traction])
+        shape = plate(pointed, points={"there": (0.0501, 0.0201)})
+        with pytest.raises(ValueError, match=r"'there' at \(50.1, 20.1\) mm is no particle of the mesh"):
+            self.scene(shape=shape, grouped=grouped)
+        sides = {name: edges for name, edges in self.grouped.sides.items() if name != "right"}
+        with pytest.raises(ValueError, match="group: 'right' is unknown; .*known: lower"):
+            self.scene(grouped=GroupedMesh(self.grouped.mesh, sides))
+
+    def test_of_quantities(self):
+        unheld = replace(self.pull, quantities=(st.Quantity("r", "reaction", "left", "y"),), supports=CLAMP)
+        case = replace(unheld, supports=ROLLERS[:1])
+        with pytest.raises(ValueError, match="no support holds it so; held along y: none"):
+            reaction_weights(self.grouped, case, unheld.quantities[0])
+        grouped = GroupedMesh(self.grouped.mesh, points={"out": np.array([0.2, 0.0])})
+        for find in (interpolation, cell_at):
+            with pytest.raises(ValueError, match=r"'out' at \(200, 0\) mm is outside of the mesh"):
+                find(grouped, "out")
+
+    def test_of_gravity_without_density(self):
+        with pytest.raises(ValueError, match="density: the material of the body has none"):
+            self.scene(shape=plate(load(gravity=(0.0, -9.81))), material=THIRD)
+
+    def test_what_is_not_held_is_told(self):
+        loose = plate(load(supports=ROLLERS[:1], tractions=[self.traction]))
+        result = self.scene(shape=loose, definition="delingette", kinematics="linear").solve()
+        assert result.status is not st.Status.SOLVED
+        assert result.message
+        assert np.isnan(result.values["end"])
+
+
+class TestAgainstReferences:
+    """A plate with a hole: what networks come to, and their errors."""
+
+    pull = load(
+        END,
+        st.Quantity("force", "reaction", "left", "x"),
+        supports=CLAMP,
+        tractions=[st.Traction("right", (4e3, 0.0))],
+    )
+    shape = plate(pull, holes=[st.Hole.circle((0.05, 0.02), 0.008)])
+    grouped = st.mesh_shape(shape, 3e-3)
+
+    def test_errors_are_those_of_the_values(self):
+        scene = st.Scene(self.shape, self.grouped, THIRD, "pull", definition="delingette", kinematics="linear", scale=2)
+        result, known = scene.solve(), scene.reference_values()
+        assert known["force"] == pytest.approx(-8e3, rel=1e-6)
+        assert result.errors["end"] == pytest.approx(result.values["end"] / known["end"] - 1, rel=1e-9)
+        assert -0.02 < result.error < 0  # linear triangles are too stiff
+        again = st.Scene(self.shape, self.grouped, THIRD, "pull", definition="area", sheet=scene.sheet, scale=2)
+        assert again.reference() is scene.reference()
+        assert again.objection == ""
+        far = st.Scene(self.shape, self.grouped, RUBBER, "pull", definition="delingette")
+        assert "the linear reference does not apply" in far.objection
+
+    def test_predictions_are_scenes(self):
+        choices = {one.definition: one for one in st.predict(self.shape, self.grouped, STEEL)}
+        sheet = None
+        for name in ("lattice", "area", "delingette"):
+            scene = st.Scene(self.shape, self.grouped, STEEL, "pull", definition=name, kinematics="linear", sheet=sheet)
+            sheet = scene.sheet
+            assert choices[name].errors == scene.solve().errors
+        for choice in choices.values():
+            assert choice.failures or np.isfinite(choice.worst)
+        with pytest.raises(ValueError, match="load: 'traction' is of shapes alone"):
+            beam = st.Beam("100 mm", "40 mm")
+            st.predict(beam, st.make_mesh(beam, "right", "10 mm"), STEEL, load="traction")
+        with pytest.raises(ValueError, match="load: none, and .* has 2; give one of them"):
+            st.predict(plate(self.pull, replace(self.pull, name="other")), self.grouped, STEEL)
+
+    def test_springs_fitted_to_the_reference(self):
+        """Definitions that are told cases get the reference's displacements."""
+        scene = st.Scene(self.shape, st.mesh_shape(self.shape, 8e-3), THIRD, "pull", definition="annealed",
+                         kinematics="linear")  # fmt: skip
+        plain = st.Scene(self.shape, scene.grouped, THIRD, "pull", definition="lattice", kinematics="linear")
+        assert DEFINITIONS["annealed"].needs == "cases"
+        assert abs(scene.solve().error) < 0.7 * abs(plain.solve().error)
+
+    def test_is_drawn_and_written(self, tmp_path):
+        result = solved(self.shape, self.grouped, STEEL, "lattice", "nonlinear")
+        assert result.plot().get_title(loc="left").startswith("pull: 0.0")
+        assert result.write(tmp_path / "pull.vtu")[0].exists()
+        assert len(result.write(tmp_path / "pull.pvd", steps=2)) == 4
+        net = st.SpringNet.from_scene(result.scene)
+        assert net.header["expected_error"].keys() == {"end", "force"}
+        np.testing.assert_allclose(net.forces.sum(axis=0), [4e3, 0.0], atol=1e-8)
+        assert net.masses.sum() == pytest.approx(7850 * 1e-3 * self.grouped.mesh.area, rel=1e-12)
+        net.write(tmp_path / "net.csv")
+        scene = result.scene
+        scene.springs.write(tmp_path / "net.xml", errors=False)
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.xml"))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_forward(model, data)
+        # At our equilibrium its forces balance the load.
+        assert np.abs(data.qacc * model.body_mass[model.dof_bodyid]).max() < 1e-9 * 4e3
+
+    def test_prescribed_displacements_are_in_no_file_of_springs(self, tmp_path):
+        stretch = load(supports=(*CLAMP, st.Support("right", x=1e-4)))
+        result = solved(plate(stretch), self.grouped_plain(), STEEL, "lattice")
+        assert result.write(tmp_path / "moved.vtu")[0].exists()
+        before = sorted(tmp_path.iterdir())
+        with pytest.raises(ValueError, match="load 'pull': prescribes displacements"):
+            result.scene.springs.write(tmp_path / "net.csv", errors=False)
+        assert sorted(tmp_path.iterdir()) == before
+        for refused in (result.scene.motion, result.scene.buckling_load):
+            with pytest.raises(ValueError, match="prescribes displacements"):
+                refused()
+
+    @staticmethod
+    def grouped_plain():
+        return st.mesh_shape(plate(), 8e-3)
+
+
+def test_a_shape_buckles_and_moves_as_the_beam_does():
+    """The same column as a beam and as a shape with groups."""
+    beam = st.Beam(LENGTH, 4e-3)
+    mesh = st.make_mesh(beam, "right", "2 mm")
+    press = load(END, supports=CLAMP, tractions=[st.Traction("right", (-100.0, 0.0))])
+    shape = st.Shape.rectangle(LENGTH, 4e-3, loads={"pull": press})
+    sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
+    column = st.Scene(beam, mesh, STEEL, "compression", 100.0, definition="delingette")
+    other = st.Scene(shape, GroupedMesh(mesh, sides), STEEL, "pull", definition="delingette")
+    assert other.buckling_load() == pytest.approx(column.buckling_load() / 100.0, rel=1e-9)
+    assert other.solve().displacement == pytest.approx(column.solve().displacement, rel=1e-9)
+    steps = [one.motion().step_limit("central-difference") for one in (column, other)]
+    assert steps[0] == pytest.approx(steps[1], rel=1e-9)

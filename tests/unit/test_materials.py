@@ -1,0 +1,236 @@
+"""Materials: closed forms of their constants, what is refused, and what results of studies are found by."""
+
+import math
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from springtune import StudyError, load_study
+from springtune.jobs.hashing import hash_of
+from springtune.jobs.keys import material_key
+from springtune.kinds import kinds
+from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, engineering_constants, material_of
+from springtune.study import study_model
+from springtune.study.expand import declared
+
+REPOSITORY = Path(__file__).parents[2]
+
+PLY = AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", name="ply")
+
+
+# -- constants ---------------------------------------------------------------------------------------------------------
+
+
+def test_engineering_constants_are_those_that_were_given():
+    found = PLY.constants_at(0)
+    assert found[:4] == pytest.approx((140e9, 10e9, 0.3, 5e9), rel=1e-12)
+    assert found.shear_by_x == pytest.approx(0, abs=1e-12)
+    turned = AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", "-25 deg").constants_at("-25 deg")
+    assert turned[:4] == pytest.approx(found[:4], rel=1e-9)
+
+
+@given(angle=st.floats(-7, 7))
+def test_young_modulus_at_an_angle_has_the_textbook_form(angle):
+    """1/E = c4/E_x + s4/E_y + c2 s2 (1/G - 2 nu/E_x) (Jones, Mechanics of composite materials)."""
+    c, s = math.cos(angle), math.sin(angle)
+    expected = c**4 / 140e9 + s**4 / 10e9 + c * c * s * s * (1 / 5e9 - 2 * 0.3 / 140e9)
+    assert 1 / PLY.constants_at(angle).young_modulus_x == pytest.approx(expected, rel=1e-9)
+    shear = 4 * c * c * s * s * (1 / 140e9 + 1 / 10e9 + 2 * 0.3 / 140e9) + (c * c - s * s) ** 2 / 5e9
+    assert 1 / PLY.constants_at(angle).shear_modulus == pytest.approx(shear, rel=1e-9)
+
+
+@given(angle=st.floats(-7, 7), other=st.floats(-7, 7))
+def test_turning_keeps_what_no_turn_changes(angle, other):
+    turned = PLY.rotated(angle)
+    assert turned.C11 + turned.C22 + 2 * turned.C12 == pytest.approx(PLY.C11 + PLY.C22 + 2 * PLY.C12, rel=1e-12)
+    assert turned.C66 - turned.C12 == pytest.approx(PLY.C66 - PLY.C12, rel=1e-9)
+    twice, once = turned.rotated(other).plane_stress, PLY.rotated(angle + other).plane_stress
+    assert np.abs(twice - once).max() <= 1e-12 * PLY.C11
+
+
+def test_turning_is_counter_clockwise():
+    """Fibres that rise to the right give a positive shear stress as they are stretched."""
+    assert PLY.rotated("30 deg").C16 > 0 > PLY.rotated("-30 deg").C16
+    assert PLY.rotated("90 deg").C22 == pytest.approx(PLY.C11, rel=1e-12)
+
+
+@given(nu=st.floats(-0.9, 0.5), angle=st.floats(-7, 7))
+def test_isotropic_constants_are_the_same_at_every_angle(nu, angle):
+    steel = Material(210e9, nu)
+    found = engineering_constants(steel.plane_stress, angle)
+    assert found[:4] == pytest.approx((210e9, 210e9, nu, 210e9 / (2 * (1 + nu))), rel=1e-9, abs=1e-9)
+
+
+def test_a_laminate_is_the_mean_of_its_plies():
+    cross = AnisotropicMaterial.laminate([(PLY, 0, "0.25 mm"), (PLY, "90 deg", "0.5 mm"), (PLY, 0, "0.25 mm")])
+    assert (cross.C11, cross.C66) == pytest.approx(((PLY.C11 + PLY.C22) / 2, PLY.C66), rel=1e-12)
+    assert cross.C11 == pytest.approx(cross.C22, rel=1e-12)
+    angle_ply = AnisotropicMaterial.laminate([(PLY, "45 deg", 1), (PLY, "-45 deg", 1)])
+    assert abs(angle_ply.C16) <= 1e-9 * angle_ply.C11
+    heavy, light = replace(PLY, density=2000.0), Material("1 GPa", 0.3, "1000 kg/m^3")
+    assert AnisotropicMaterial.laminate([(heavy, 0, 3), (light, 0, 1)]).density == pytest.approx(1750)
+    assert AnisotropicMaterial.laminate([(heavy, 0, 3), (PLY, 0, 1)]).density is None
+
+
+# -- refusals ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: AnisotropicMaterial("9 GPa", "4 GPa", "7 GPa", "2 GPa"), r"C12 is 7e\+09.*sqrt\(C11 C22\) = 6e\+09"),
+        (lambda: AnisotropicMaterial("9 GPa", "4 GPa", "-6 GPa", "2 GPa"), r"C12 is -6e\+09"),
+        (
+            lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 1.0, C16=3.0),
+            "C66 is 1 Pa.*above 1 Pa.*correct it, or the other two",
+        ),
+        (lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 0.0), "C66: 0.0 is not above zero"),
+        (lambda: AnisotropicMaterial("9 mm", 4.0, 0.0, 1.0), "C11: '9 mm' is a length; give a stress"),
+        (lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 1.0, density=-1), "density: -1 is not above zero"),
+        (lambda: AnisotropicMaterial(9.0, 4.0, math.nan, 1.0), "C12: nan is not a finite number"),
+        (lambda: AnisotropicMaterial(9.0, 4.0, 0.0, 1.0, name=3), "name: 3 is not a text"),
+        (lambda: AnisotropicMaterial.orthotropic(16.0, 1.0, 4, 1.0), r"poisson_ratio_xy is 4.*= 4; give the ratio"),
+        (lambda: AnisotropicMaterial.orthotropic(16.0, 1.0, "x", 1.0), "poisson_ratio_xy is 'x'"),
+        (
+            lambda: AnisotropicMaterial.orthotropic(16.0, 1.0, 0.3, 1.0, "3 mm"),
+            "angle: '3 mm' is a length; give an angle",
+        ),
+        (lambda: AnisotropicMaterial.laminate([]), "plies: there are none"),
+        (lambda: AnisotropicMaterial.laminate([(PLY, 0)]), "ply 0: .* is none; give a material, an angle"),
+        (lambda: AnisotropicMaterial.laminate([(PLY, 0, -1)]), "thickness of ply 0: -1 is not above zero"),
+        (lambda: AnisotropicMaterial.of(np.eye(2)), "no symmetric array of shape"),
+        (lambda: AnisotropicMaterial.of([[1, 2, 0], [0, 1, 0], [0, 0, 1]]), "no symmetric array of shape"),
+    ],
+)
+def test_what_is_no_material_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+@given(st.lists(st.floats(-2, 2), min_size=6, max_size=6))
+def test_what_is_accepted_is_positive_definite_and_nothing_else(numbers):
+    c11, c22, c12, c66, c16, c26 = numbers
+    matrix = np.array([[c11, c12, c16], [c12, c22, c26], [c16, c26, c66]])
+    least = np.linalg.eigvalsh(matrix)[0]
+    try:
+        AnisotropicMaterial(c11, c22, c12, c66, c16, c26)
+    except ValueError:
+        assert least <= 1e-9
+    else:
+        assert least >= -1e-9
+
+
+# -- keys --------------------------------------------------------------------------------------------------------------
+
+
+def test_results_depend_on_every_constant_and_on_no_label():
+    known = hash_of(material_key(PLY))
+    assert hash_of(material_key(replace(PLY, name="other", density=3.0))) == known
+    for constant in CONSTANTS:
+        assert hash_of(material_key(replace(PLY, **{constant: getattr(PLY, constant) + 1e6}))) != known
+    assert hash_of(material_key(replace(PLY, density=3.0), density=True)) != hash_of(material_key(PLY, density=True))
+
+
+def test_keys_of_isotropic_materials_are_what_they_were():
+    """Results that are stored are found."""
+    assert material_key(Material(210e9, 0.3, 7850.0, "steel")) == {
+        "young_modulus": 210e9,
+        "poisson_ratio": 0.3,
+        "name": "",
+    }
+    assert asdict(Material(210e9, 0.3)) == {
+        "young_modulus": 210e9, "poisson_ratio": 0.3, "density": None, "name": "material"
+    }  # fmt: skip
+
+
+def test_a_material_is_made_again_of_its_fields():
+    for material in (PLY, PLY.rotated(0.3), Material(210e9, 0.3, 7850.0, "steel")):
+        assert material_of(asdict(material)) == material
+        assert material.isotropic == isinstance(material, Material)
+
+
+# -- studies -----------------------------------------------------------------------------------------------------------
+
+STUDY = """\
+title: materials
+beams: {bar: {length: 100 mm, height: 20 mm}}
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
+  ply: {young_modulus_x: 140 GPa, young_modulus_y: 10 GPa, poisson_ratio_xy: 0.3, shear_modulus: 5 GPa, angle: -30 deg}
+  board: {stiffness: {C11: 9 GPa, C22: 4 GPa, C12: -1.5 GPa, C66: 2 GPa}, density: 600 kg/m^3}
+grids:
+  one: {beam: bar, mesh_type: right, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN, definition: lattice}
+"""
+
+
+def test_a_study_declares_all_three_forms(tmp_path):
+    (tmp_path / "mine.yaml").write_text(STUDY)
+    assert len(load_study(tmp_path / "mine.yaml").scenes) == 1
+    config = study_model(kinds()).model_validate(yaml.load(STUDY, yaml.BaseLoader))
+    found = declared(config).materials
+    assert found["ply"] == replace(PLY.rotated("-30 deg"), name="ply")
+    assert found["board"] == AnisotropicMaterial(9e9, 4e9, -1.5e9, 2e9, density=600.0, name="board")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("material: steel", "material: ply", "mine.yaml:8: grids.one.material: 'ply' is anisotropic.*under 'shapes'"),
+        ("material: steel", "material: board", "grids.one.material: 'board' is anisotropic"),
+        ("-30 deg", "-30", "materials.ply.angle: '-30' has no unit; give an angle such as '30 deg'"),
+        ("angle: -30 deg", "young_modulus: 3 GPa", "materials.ply.young_modulus_x: both 'young_modulus' and .*keep"),
+        ("shear_modulus: 5 GPa, ", "", "materials.ply.shear_modulus: 'shear_modulus' is missing; give a stress"),
+        ("young_modulus: 210 GPa, ", "", "materials.steel.young_modulus: 'young_modulus' is missing; give a stress"),
+        ("0.3}", "0.3, angle: 3 deg}", "materials.steel.angle: turns the axes of an orthotropic material"),
+        (
+            "xy: 0.3",
+            "xy: 4",
+            r"materials.ply: poisson_ratio_xy is 4.0.*sqrt\(young_modulus_x / young_modulus_y\) = 3.74",
+        ),
+        ("-1.5 GPa", "-7 GPa", r"materials.board: C12 is -7e\+09 Pa.*below sqrt\(C11 C22\) = 6e\+09"),
+        ("C66: 2 GPa", "C66: 2 GPa, C16: 6 GPa", r"materials.board: C66 is 2e\+09 Pa.*above 4.26667e\+09 Pa"),
+        ("C12: -1.5 GPa, ", "", "materials.board.stiffness.C12: 'C12' is missing"),
+        ("C66: 2 GPa", "c66: 2 GPa", "unknown key 'c66'; did you mean 'C66'"),
+    ],
+)
+def test_what_a_study_cannot_mean_is_refused(tmp_path, old, new, message):
+    assert STUDY.count(old) >= 1
+    (tmp_path / "mine.yaml").write_text(STUDY.replace(old, new, 1))
+    with pytest.raises(StudyError, match=message):
+        load_study(tmp_path / "mine.yaml")
+
+
+REFINE = """
+refine:
+  one: {beam: bar, mesh_type: right, mesh_size: 5 mm, material: ply, load: traction, definition: lattice,
+        parameter: force, from: 1 kN, to: 2 kN}
+"""
+
+
+def sections():
+    """Studies that have a section with a material, and where it stands."""
+    yield (REPOSITORY / "config/laying.yaml").read_text(), "laying", "material"
+    yield (REPOSITORY / "config/laying.yaml").read_text(), "laying", "support"
+    yield (REPOSITORY / "config/stability.yaml").read_text(), "stability", "material"
+    yield (REPOSITORY / "config/benchmark.yaml").read_text(), "benchmark", "scenes"
+    yield STUDY + REFINE, "refine", "one"
+
+
+@pytest.mark.parametrize(("text", "section", "key"), list(sections()))
+def test_sections_of_beams_take_isotropic_materials_alone(tmp_path, text, section, key):
+    study = yaml.load(text, yaml.BaseLoader)
+    study["materials"]["ply"] = yaml.load(STUDY, yaml.BaseLoader)["materials"]["ply"]
+    inside = study[section]
+    if section == "benchmark":
+        inside, key = next(iter(inside["scenes"].values())), "material"
+    elif section == "refine":
+        inside, key = inside[key], "material"
+    inside[key] = "ply"
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(study))
+    with pytest.raises(StudyError, match=f"{section}.*: 'ply' is anisotropic, and beams are of isotropic materials"):
+        load_study(tmp_path / "mine.yaml")
