@@ -29,6 +29,7 @@ _NAMES = {
     "kinds.samples.figures": ("plot_effects", "plot_sobol"),
     "kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
     "kinds.scenes.sweeps": ("plot_sweep",),
+    "kinds.shapes.figures": ("plot_shape", "plot_shape_errors", "plot_shapes"),
     "kinds.stability.figures": (
         "plot_stability_buckling",
         "plot_stability_energy",
@@ -116,6 +117,9 @@ __all__ = [
     "plot_moduli",
     "plot_refinement",
     "plot_sensitivity",
+    "plot_shape",
+    "plot_shape_errors",
+    "plot_shapes",
     "plot_size",
     "plot_sobol",
     "plot_stability_buckling",

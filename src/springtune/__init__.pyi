@@ -18,6 +18,9 @@ from .kinds.scenes.figures import plot_deformed as plot_deformed
 from .kinds.scenes.figures import plot_sensitivity as plot_sensitivity
 from .kinds.scenes.figures import plot_size as plot_size
 from .kinds.scenes.sweeps import plot_sweep as plot_sweep
+from .kinds.shapes.figures import plot_shape as plot_shape
+from .kinds.shapes.figures import plot_shape_errors as plot_shape_errors
+from .kinds.shapes.figures import plot_shapes as plot_shapes
 from .kinds.stability.figures import plot_stability_buckling as plot_stability_buckling
 from .kinds.stability.figures import plot_stability_energy as plot_stability_energy
 from .kinds.stability.figures import plot_stability_limits as plot_stability_limits

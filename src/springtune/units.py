@@ -53,6 +53,9 @@ QUANTITY_KINDS = {
         Kind("stiffness", "N/m", "170e6 N/m"),
         Kind("stress", "Pa", "210 GPa"),
         Kind("density", "kg/m^3", "7850 kg/m^3"),
+        Kind("area", "m^2", "12 mm^2"),
+        Kind("energy", "J", "3.5 J"),
+        Kind("acceleration", "m/s^2", "-9.81 m/s^2"),
         Kind("angle", "rad", "30 deg"),
     )
 }
@@ -64,6 +67,9 @@ COMMON = {
     "stiffness": {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6", "N/cm": "1e2"},
     "stress": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/m^2": "1", "N/mm^2": "1e6"},
     "density": {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"},
+    "area": {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"},
+    "energy": {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"},
+    "acceleration": {"m/s^2": "1", "mm/s^2": "1e-3"},
     "angle": {"rad": "1", "deg": "0.01745329251994329576923690768488612713", "mrad": "1e-3"},
 }
 """Usual units of each kind and their size in its SI unit."""

@@ -192,10 +192,57 @@ def sobol():
     return data.assign(base_samples=counted, base_samples_without=0 * counted).assign_attrs(bands="", failures="")
 
 
+def shapes():
+    """Two shapes under one load: of each two quantities, one of which others have computed."""
+    labels = {"shape": ["cook", "hole"], "quantity": ["tip", "work"]} | LABELS
+    mesh, case = ("shape", "mesh_type", "mesh_size"), ("shape", "material", "load")
+    scene, asked = (*mesh, *SCENE[3:]), ("shape", "load", "quantity")
+    data = variables(
+        labels, error=(*scene, "quantity"), value=(*scene, "quantity"), reference_value=(*case, "quantity"),
+        expected_error=(*scene, "quantity"), reference_expected_error=(*case, "quantity"), solve_seconds=scene,
+        definition_seconds=scene, particles=mesh,
+    )  # fmt: skip
+    data["particles"] = 1e3 * data.particles.max() - 1e3 * data.particles
+    data["reference_error_estimate"] = xr.full_like(data.reference_value, 1e-5)
+    words = {"kind": ["displacement", "energy"], "component": ["y", ""], "of": ["tip", ""], "units": ["m", "J"]}
+    for name, texts in words.items():
+        data[f"quantity_{name}"] = asked, np.broadcast_to(np.array(texts, dtype=object), (2, len(LOADS), 2)).copy()
+    data["status"] = xr.zeros_like(data.solve_seconds, dtype=np.int8)
+    data.status.loc[{"load": "traction"}] = 1
+    data["message"] = xr.full_like(data.status, "", dtype=object)
+    return data.assign(reference_applies=xr.ones_like(data.status.isel(dict.fromkeys(
+        ("mesh_type", "mesh_size", "definition"), 0), drop=True)))  # fmt: skip
+
+
+def shape_fields():
+    """A square of each shape, drawn on the free mesh of 1 mm."""
+    labels = {"case": ["cook, traction", "hole, traction"], "definition": DEFINITIONS}
+    places = {"particle": range(4), "spring": range(3), "outline_point": range(4)}
+    drawn = ("case", "definition")
+    data = variables(
+        labels | places, displacement_x=(*drawn, "particle"), displacement_y=(*drawn, "particle"),
+        spring_force=(*drawn, "spring"), reference_displacement_x=("case", "outline_point"),
+        reference_displacement_y=("case", "outline_point"),
+    )  # fmt: skip
+    about = {"shape_name": ["cook", "hole"], "load_name": "traction", "material_name": "steel"}
+    about |= {"kinematics_name": "linear", "mesh_type_name": "free"}
+    for name, texts in about.items():
+        data[name] = "case", np.broadcast_to(np.array(texts, dtype=object), 2).copy()
+    square = {"x": [0.0, 0.1, 0.1, 0.0], "y": [0.0, 0.0, 0.1, 0.1]}
+    for axis, values in square.items():
+        data[axis] = ("case", "particle"), np.array([values, values])
+        data[f"outline_{axis}"] = ("case", "outline_point"), np.array([values, values])
+    ends = np.array([[0, 1], [1, 2], [2, 3]])
+    data["spring_nodes"] = ("case", "spring", "spring_end"), np.array([ends, ends])
+    data["case_mesh_size"] = "case", [1e-3, 1e-3]
+    return data.assign(outline_round=xr.zeros_like(data.outline_x, dtype=int))
+
+
 def dataset():
     """The tree of a study of all kinds: every label that the groups share is in each of them, and all is solved."""
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
     groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
+    groups |= {"shapes": shapes, "shape_fields": shape_fields}
     groups |= {"samples": samples, "effects": effects, "sobol": sobol}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})

@@ -38,6 +38,7 @@ from springtune.kinds.scenes.figures import (
     plot_sensitivity,
     plot_size,
 )
+from springtune.kinds.shapes.figures import plot_shape, plot_shape_errors, plot_shapes
 from springtune.kinds.stability.figures import (
     PLOTS,
     plot_stability_buckling,
@@ -85,6 +86,9 @@ EVERY_PLOT = {
     plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
     plot_laying: ({}, (4, 3)),
     plot_refinement: ({}, 2),
+    plot_shapes: ({}, None),
+    plot_shape_errors: ({"shape": "cook"}, (2, 2)),
+    plot_shape: ({"shape": "hole"}, 2),
     plot_benchmark: ({"scene": "bending"}, None),
     plot_benchmark_rates: ({}, (2, 2)),
     plot_benchmark_costs: ({"scene": "bending"}, 2),

@@ -47,6 +47,29 @@ def test_the_chapters_can_be_followed(reader, repository):
         assert (reader.folder / figure).stat().st_size > 5000
 
 
+def test_a_plate_goes_from_its_file_to_springs_error_and_picture(reader, repository):
+    """The study of fifteen lines, by Snakemake: nothing of it is a hole, and nothing is left to do."""
+
+    def study(path):
+        code, output = reader.snakemake(path)
+        assert code == 0, output
+
+    steps = [block for block, _ in follow(repository / "docs/tutorial/own-shape.md", reader.folder, study)]
+    (text,) = (block.code for block in steps if block.code.startswith("# config/plate.yaml"))
+    assert len(text.splitlines()) <= 16
+    results = reader.folder / "results/plate"
+    with st.open(results) as tree:
+        data = tree["shapes"].to_dataset().squeeze(drop=True)
+        assert (data.status == 1).all() and (data.reference_error_estimate < 1e-4).all()
+        assert (abs(data.error.sel(definition="delingette", quantity="stretch")) < 0.01).all()
+        assert float(data.reference_value.sel(quantity="stretch")) > 4e3 * 0.1 / (210e9 * 0.04 * 1e-3)
+    for name in ("shapes_overview", "shapes_errors_plate_pull", "shapes_deformed_plate_pull"):
+        assert (results / f"figures/{name}.png").stat().st_size > 5000
+    assert (results / "tables/shapes.csv").exists() and (results / "index.html").exists()
+    code, output = reader.snakemake("config/plate.yaml", "--dry-run")
+    assert code == 0 and "Nothing to be done" in output
+
+
 def test_the_change_of_the_first_chapter_adds_the_cells_that_it_shows(reader, repository):
     page = repository / "docs/tutorial/from-clone-to-paper.md"
     (diff,) = (block for block in blocks(page) if block.language == "diff")

@@ -28,7 +28,8 @@ OUTPUT_FILES = {
 
 STORED, STORES = (
     ".h5",
-    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement", "samples"},
+    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement", "samples"}
+    | {"shape_meshes", "shape_references", "shape_solutions"},
 )
 """Ending of what stages store, see `springtune.jobs.store`, and the folders where they do."""
 
@@ -59,7 +60,7 @@ def orphans(study: "Study", folder: Path) -> list[Path]:
 
 def _candidates(folder: Path) -> Iterator[Path]:
     """Files of the kinds that runs make, in a study's folder and those directly in it that are no links elsewhere."""
-    names = {stage.name for stage in plan.stages()} | {due.PRESENT}
+    names = tuple(f"{name}_" for name in (*(stage.name for stage in plan.stages()), due.PRESENT))
     for path in _files(folder):
         if _is_left(path):
             yield path
@@ -69,9 +70,8 @@ def _candidates(folder: Path) -> Iterator[Path]:
         if below.name in OUTPUT_FILES and COLLECTED in OUTPUT_FILES[below.name]:
             yield from (path for path in sorted(below.glob(f"*/*{PIECE}")) if path.is_file() and not path.is_symlink())
         for path in _files(below):
-            stage, mark, _ = path.name.partition("_")
             made = path.suffix in OUTPUT_FILES.get(below.name, ())
-            made |= below.name in JOB_FILES and bool(mark) and stage in names
+            made |= below.name in JOB_FILES and path.name.startswith(names)
             made |= below.name in STORES and path.suffix == STORED
             made |= below.name == "meshes" and path.suffix in (".vtu", ".json")
             if made or _is_left(path):

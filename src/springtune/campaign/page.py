@@ -37,8 +37,7 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("springtune.output", ""), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    names = [str(name) for name in tree.kinematics.values]
-    scenes = [_scenes(table, names) for table in tables if "title" not in table]
+    scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
     written["index.html"] = environment.get_template("page.html").render(
         tables=scenes,
         further=[_further(table) for table in tables if "title" in table],

@@ -65,7 +65,8 @@ def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
     """
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
-    lines = [title, "", aligned(rows, left=2, right=(1,)), *_worst(groups[SCENES], groups.get(FINITE))]
+    lines = [title, "", aligned(rows, left=2, right=(1,))]
+    lines += _worst(groups[SCENES], groups.get(FINITE)) if SCENES in groups else ()
     for name, data in groups.items():
         if REFERRED <= set(data):
             lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from ..study import Study
     from .base import Kind, Output
 
-KINDS = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement")
+KINDS = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement", "shapes")
 """Packages of the study kinds, in the order of the dataset's groups."""
 
 

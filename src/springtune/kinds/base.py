@@ -135,6 +135,10 @@ class Kind:
         Where it is.
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to its grids: type and pydantic's field.
+    alone : tuple of str
+        Those keys of a study in the place of which it may have neither beams nor grids.
+    files : callable, optional
+        Of its part of a study: files that it is made from besides.
     check : callable, optional
         Of a config and a `springtune.study.messages.Problems`: adds what is wrong with its values.
     expand : callable, optional
@@ -155,6 +159,8 @@ class Kind:
     package: str
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    alone: tuple[str, ...] = ()
+    files: Callable[[Any], Iterable[Path]] = lambda part: ()
     check: Callable[[StudyConfig, Problems], None] = lambda config, problems: None
     expand: Callable[[StudyConfig, Declared], Any] = lambda config, declared: ()
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}

@@ -61,7 +61,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
     text, content, lines = read_study(path)
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
-    problems = Problems(file, lines)
+    problems = Problems(file, lines, beside)
     content = with_rows(content, beside, problems)
     config = _validate(study_model(kinds), content, problems)
     check_names(config, problems)

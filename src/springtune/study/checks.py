@@ -139,8 +139,8 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
 
 def _check_labels(config: StudyConfig, problems: Problems) -> None:
     """How large the dataset becomes, as far as lists tell before they are expanded."""
-    if any(grid.exclude for grid in config.grids.values()):
-        return  # which may leave labels out
+    if not config.grids or any(grid.exclude for grid in config.grids.values()):
+        return  # exclusions may leave labels out
     lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in LABELLED}
     check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
 
@@ -180,6 +180,8 @@ def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, p
             f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}; parameters that change "
             "together are better drawn under 'samples'",
         )
+    if not cells:
+        return  # a study of study kinds alone
     once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))
     points = once * config.sensitivity.points
     if curves and points > MOST_CURVE_POINTS:
@@ -333,7 +335,7 @@ def check_files(
         (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
         (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
     ):
-        name, count = Counter(name.casefold() for name in names).most_common(1)[0]
-        if count > 1:
-            problems.add(path, f"{count} different {what} are all named '{name}'; {remedy}")
-            return
+        for name, number in Counter(name.casefold() for name in names).most_common(1):
+            if number > 1:
+                problems.add(path, f"{number} different {what} are all named '{name}'; {remedy}")
+                return

@@ -1,7 +1,7 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
-from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Self, get_args, get_origin
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
@@ -89,10 +89,16 @@ class Section(BaseModel):
             if key not in names:
                 raise refuse(f"unknown key {show(key)}; {nearest(key, names)}", key)
         given = {key: content for key, content in value.items() if content is not None}
-        for name, field in names.items():
-            if field.is_required() and name not in given:
-                raise refuse(f"'{name}' is missing; give {expected_value(field)}", name)
+        for name, remedy in cls._needed(given).items():
+            if name not in given:
+                raise refuse(f"'{name}' is missing; give {expected_value(names[name])}{remedy}", name)
         return given
+
+    @classmethod
+    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
+        """Keys that have to be given beside those that are, and what else would do."""
+        names = {field.alias or name: field for name, field in cls.model_fields.items()}
+        return {name: "" for name, field in names.items() if field.is_required()}
 
 
 class BeamConfig(Section):
@@ -402,7 +408,7 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="What the study is, in one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field(description="Beams.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams; needed by grids.")
     materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(description="Materials.")
     definitions: DefinitionsConfig = Field(
         default_factory=DefinitionsConfig, description="Parameters of the definitions that have any."
@@ -424,7 +430,22 @@ class StudyConfig(Section):
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )
-    grids: dict[str, GridConfig]
+    grids: dict[str, GridConfig] = Field({})
+
+    alone: ClassVar[tuple[str, ...]] = ()
+    """Keys of study kinds in the place of which a study may have neither beams nor grids."""
+
+    @classmethod
+    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
+        found = super()._needed(given)
+        if "grids" in given or not set(cls.alone) & set(given):
+            found |= {"beams": "", "grids": "".join(f", or '{name}'" for name in cls.alone)}
+        return {name: found[name] for name in cls.model_fields if name in found}
+
+
+def _beams_or(alone: Sequence[str]) -> dict[str, Any]:
+    """What the schema of a study says besides: which keys it has without beams and grids."""
+    return {"anyOf": [{"required": ["beams", "grids"]}, *({"required": [name]} for name in alone)]}
 
 
 def study_model(kinds: Sequence[StudyKind]) -> type[StudyConfig]:
@@ -462,10 +483,11 @@ def study_model(kinds: Sequence[StudyKind]) -> type[StudyConfig]:
     )
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field(description="Grids: what is to be computed."),
+        Field({}, description="Grids: what is to be computed."),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
-    model.__doc__ = StudyConfig.__doc__
+    model.__doc__, model.alone = StudyConfig.__doc__, tuple(name for kind in kinds for name in kind.alone)
+    model.model_config["json_schema_extra"] = _beams_or(model.alone)
     return model
 
 

@@ -47,7 +47,7 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
         for number, row in enumerate(rows):
             path, label = folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
-            fault = _file_fault(path)
+            fault = file_fault(path)
             if fault:
                 problems.add((*where, "file"), f"'{path}' {fault}")
             if label in found:
@@ -57,7 +57,7 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
     return found
 
 
-def _file_fault(path: Path) -> str:
+def file_fault(path: Path) -> str:
     """Why a mesh file cannot be what is meant, and the remedy; empty where it may be. Its content is not looked at."""
     try:
         if path.is_file():
@@ -77,18 +77,23 @@ class Declared:
     ----------
     beams : dict of str to Beam
     materials : dict of str to Material or AnisotropicMaterial
+    folder : Path
+        Folder that the names of the study's files are seen from.
     """
 
     beams: dict[str, Beam]
     materials: dict[str, AnyMaterial]
+    folder: Path = Path()
 
 
-def declared(config: StudyConfig) -> Declared:
+def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
     """What a study declares.
 
     Parameters
     ----------
     config : StudyConfig
+    folder : Path, optional
+        As of `Declared`.
 
     Returns
     -------
@@ -97,6 +102,7 @@ def declared(config: StudyConfig) -> Declared:
     return Declared(
         {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
         {name: material.material(name) for name, material in config.materials.items()},
+        folder,
     )
 
 
@@ -312,7 +318,7 @@ def build(
     check_numbers(used, problems)
     check_cells(config, used, bool(curves), problems)
     problems.stop()
-    parts = {kind.name: kind.expand(config, declared(config)) for kind in kinds}
+    parts = {kind.name: kind.expand(config, declared(config, problems.folder)) for kind in kinds}
     if config.printed and names:
         problems.add(
             ("printed",),
@@ -380,11 +386,15 @@ def _axes(
 ) -> dict[str, tuple[str | float, ...]]:
     """Labels of each dimension; groups of a dataset share those that its root has."""
     used, own = dict(used), {}
+    # A study kind may have labels that no beam has, such as loads of its own.
+    order = {name: dict.fromkeys(labels) for name, labels in ranks.items()}
     for labels in further:
         for name, values in labels.items():
             if name in used:
                 used[name] = used[name] | set(values)
+                if name in order:
+                    order[name] |= dict.fromkeys(values)
             else:
                 own[name] = values
-    axes = {name: tuple(label for label in ranks[name] if label in used[name]) for name in ranks}
+    axes = {name: tuple(label for label in labels if label in used[name]) for name, labels in order.items()}
     return axes | {name: tuple(sorted(used[name])) for name in ("mesh_size", *names)} | own

@@ -1,6 +1,7 @@
 """What is wrong with a file: messages that name file, line, key, value and remedy."""
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from pydantic_core import PydanticCustomError
 
@@ -37,6 +38,8 @@ class Problems:
         The file as its user named it.
     lines : dict of tuple to int, optional
         Line of each path of keys.
+    folder : Path, optional
+        Folder that the names of its files are seen from.
 
     Examples
     --------
@@ -48,8 +51,8 @@ class Problems:
     springtune.study.messages.StudyError: study.yaml:3: beams.small: no length; give one such as '200 mm'
     """
 
-    def __init__(self, file: str, lines: Mapping[tuple[Key, ...], int] | None = None) -> None:
-        self._file, self._lines = file, lines or {}
+    def __init__(self, file: str, lines: Mapping[tuple[Key, ...], int] | None = None, folder: Path = Path()) -> None:
+        self._file, self._lines, self.folder = file, lines or {}, folder
         self._places: dict[tuple[Key, ...], str] = {}
         self._found: list[tuple[int, str]] = []
 

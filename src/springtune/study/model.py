@@ -349,6 +349,10 @@ class StudyKind(Protocol):
         """Keys that it adds to its grids."""
 
     @property
+    def alone(self) -> Sequence[str]:
+        """Keys in the place of which a study may have neither beams nor grids."""
+
+    @property
     def check(self) -> Callable[[Any, Problems], None]:
         """Adds what is wrong with a config's values."""
 

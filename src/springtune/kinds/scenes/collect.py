@@ -328,7 +328,7 @@ def _fields(study, folder, axes):
     ]
     meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
-    cells = {spec: _cells(mesh) for spec, mesh in meshes.items()}
+    cells = {spec: cells_of(mesh) for spec, mesh in meshes.items()}
     lengths = {
         "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
         "spring": max((len(mesh.edges) for mesh in meshes.values()), default=1),
@@ -357,7 +357,7 @@ def _fields(study, folder, axes):
     return fields
 
 
-def _cells(mesh):
+def cells_of(mesh):
     """Corners of the cells of a mesh, -1 where a cell has fewer than another one, shape (n_cells, n_corners)."""
     cells = np.full((sum(map(len, mesh.cells.values())), max(mesh.cells)), NO_NODE)
     start = 0

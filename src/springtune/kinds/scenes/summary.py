@@ -29,6 +29,9 @@ def summary(study: Study, further: list[list[object]]) -> str:
     -------
     str
     """
+    title = f"{study.name}: {study.title}"
+    if not study.scenes:
+        return "\n".join([title, "", aligned(further, left=0, right=(1,))])
     solutions = _solutions(study)
     networks = _networks(study)
     requested = sum(len(grid.scenes) for grid in study.grids)
@@ -54,7 +57,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
     rows += further
     if study.printed:
         rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
-    lines = [f"{study.name}: {study.title}", "", aligned(rows, left=0, right=(1,)), ""]
+    lines = [title, "", aligned(rows, left=0, right=(1,)), ""]
     return "\n".join([*lines, aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))])
 
 

@@ -26,6 +26,8 @@ def tables(tree):
         of what is ``swept``; the others with ``title`` and ``note``.
     """
     root = tree.to_dataset()
+    if "status" not in root:  # a study without scenes
+        return []
     finite = _finite(tree)
     found = [_table(root.sel(selection), selection, finite) for selection in _selections(root)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))

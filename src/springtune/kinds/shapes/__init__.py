@@ -1,0 +1,1 @@
+"""Shapes: bodies of any outline under loads on named groups, their networks beside references and others' numbers."""

@@ -1,0 +1,114 @@
+"""Variables of the groups ``/shapes`` and ``/shape_fields``."""
+
+import numpy as np
+
+from ...output.dataset import NO_NODE, Group
+
+MESH = ("shape", "mesh_type", "mesh_size")
+CASE = ("shape", "material", "load")
+SCENE = (*MESH, "material", "load", "definition", "kinematics")
+ASKED = ("shape", "load", "quantity")
+
+MIXED = {"comment": "in SI units: quantity_units says which"}
+
+SHAPES = Group(
+    "/shapes",
+    {
+        "value": ((*SCENE, "quantity"), "1", "quantity of interest, network", np.nan),
+        "reference_value": ((*CASE, "quantity"), "1", "quantity of interest, reference", np.nan),
+        "reference_error_estimate": ((*CASE, "quantity"), "1", "estimated relative error of the reference", np.nan),
+        "error": ((*SCENE, "quantity"), "1", "signed error, (network - reference) / |reference|", np.nan),
+        "expected_value": (ASKED, "1", "quantity of interest, as others give it", np.nan),
+        "expected_error": ((*SCENE, "quantity"), "1", "signed difference, (network - expected) / |expected|", np.nan),
+        "reference_expected_error": (
+            (*CASE, "quantity"),
+            "1",
+            "signed difference, (reference - expected) / |expected|",
+            np.nan,
+        ),
+        "quantity_kind": (ASKED, "1", "what the quantity is", ""),
+        "quantity_component": (ASKED, "1", "its component", ""),
+        "quantity_of": (ASKED, "1", "the group or point that it is of", ""),
+        "quantity_units": (ASKED, "1", "units of its values", ""),
+        "source": (ASKED, "1", "who gives the expected value", ""),
+        "status": (SCENE, "1", "what became of the scene", 0),
+        "message": (SCENE, "1", "why the scene is not solved, or what there is against its reference", ""),
+        "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
+        "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
+        "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
+        "particles": (MESH, "1", "number of particles", np.nan),
+        "springs": (MESH, "1", "number of springs", np.nan),
+        "minimum_angle": (MESH, "degree", "smallest angle of all triangles", np.nan),
+        "edge_length_spread": (MESH, "1", "standard deviation of the edge lengths over their mean", np.nan),
+        "mesh_seconds": (MESH, "s", "time to make the mesh", np.nan),
+        "reference_message": (CASE, "1", "why there is no reference, or none for nonlinear kinematics", ""),
+        "reference_seconds": (CASE, "s", "time to solve the reference", np.nan),
+        "reference_unknowns": (CASE, "1", "unknowns of the finest reference", np.nan),
+        "reference_rotation": (CASE, "rad", "rotation that 95 % of the reference does not exceed", np.nan),
+        "reference_strain": (CASE, "1", "principal strain that 95 % of the reference does not exceed", np.nan),
+        "reference_applies": (
+            (*CASE, "kinematics"),
+            "1",
+            "whether small strain applies to networks of these kinematics, by rotation and strain",
+            -1,
+        ),
+        "shape_thickness": (("shape",), "m", "thickness of the shape", np.nan),
+    },
+    dimensions={"shape": "shape, by name", "quantity": "quantity of interest, by name"},
+    flags={"applies": ("no", "yes")},
+    further={name: MIXED for name in ("value", "reference_value", "expected_value")},
+)
+
+OF_CASE = ("case",)
+NETWORK = ("case", "definition")
+
+SHAPE_FIELDS = Group(
+    "/shape_fields",
+    {
+        "mesh": ((), "1", "topology of a network, of one case", np.int32(0)),
+        "shape_name": (OF_CASE, "1", "shape", ""),
+        "load_name": (OF_CASE, "1", "load", ""),
+        "material_name": (OF_CASE, "1", "material", ""),
+        "kinematics_name": (OF_CASE, "1", "kinematics", ""),
+        "mesh_type_name": (OF_CASE, "1", "mesh type", ""),
+        "case_mesh_size": (OF_CASE, "m", "asked length of an edge; 0 where the mesh is that of a file", np.nan),
+        "x": (("case", "particle"), "m", "position at rest along x", np.nan),
+        "y": (("case", "particle"), "m", "position at rest along y", np.nan),
+        "spring_nodes": (("case", "spring", "spring_end"), "1", "particles at the ends of a spring", NO_NODE),
+        "cell_nodes": (("case", "cell", "cell_corner"), "1", "particles at the corners of a cell", NO_NODE),
+        "displacement_x": ((*NETWORK, "particle"), "m", "displacement along x, network", np.float32(np.nan)),
+        "displacement_y": ((*NETWORK, "particle"), "m", "displacement along y, network", np.float32(np.nan)),
+        "spring_force": (
+            (*NETWORK, "spring"),
+            "N",
+            "axial force of each spring, tension positive, energies' part left out",
+            np.float32(np.nan),
+        ),
+        "outline_round": (("case", "outline_point"), "1", "number of the round that a point is of, from 0", -1),
+        "outline_x": (("case", "outline_point"), "m", "position at rest along x, reference", np.nan),
+        "outline_y": (("case", "outline_point"), "m", "position at rest along y, reference", np.nan),
+        "reference_displacement_x": (("case", "outline_point"), "m", "displacement along x, reference", np.nan),
+        "reference_displacement_y": (("case", "outline_point"), "m", "displacement along y, reference", np.nan),
+    },
+    dimensions={
+        "case": "shape and load",
+    },
+    further={
+        "mesh": {
+            "cf_role": "mesh_topology",
+            "topology_dimension": np.int32(2),
+            "node_coordinates": "x y",
+            "edge_node_connectivity": "spring_nodes",
+            "face_node_connectivity": "cell_nodes",
+            "node_dimension": "particle",
+            "edge_dimension": "spring",
+            "face_dimension": "cell",
+        },
+        "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
+        "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+        **{name: {"mesh": "mesh", "location": "node"} for name in ("displacement_x", "displacement_y")},
+        "spring_force": {"mesh": "mesh", "location": "edge"},
+    },
+)
+"""Networks that are drawn, each shape's and load's on its finest mesh of a size that can be: they are there to be
+looked at, their displacements and forces with seven digits."""

@@ -1,0 +1,371 @@
+"""Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
+
+from dataclasses import replace
+from importlib import import_module
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+import springtune as st
+from springtune.campaign import collect, page, summary
+from springtune.campaign.plan import plan, table_files
+from springtune.jobs.spent import Spent
+from springtune.kinds import load_study, outputs
+from springtune.kinds.shapes import stored
+from springtune.kinds.shapes.described import CASE, geometry, load, named, shape_of
+from springtune.kinds.shapes.plan import mesh_key, reference_task, scene_task
+from springtune.kinds.shapes.reference import rounds_of
+from springtune.mesh import write_mesh
+from springtune.output import dataset
+from springtune.output.dataset import STATUS
+
+COOK = """\
+title: A tapered panel
+materials: {third: {young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}}
+shapes:
+  cook:
+    outline:
+      - {from: [0, 0], group: lower}
+      - {from: [48 mm, 44 mm], group: right}
+      - {from: [48 mm, 60 mm], group: upper}
+      - {from: [0, 44 mm], group: left}
+    points: {tip: [48 mm, 52 mm]}
+    loads:
+      shear:
+        supports: {left: fixed}
+        forces: {right: [0, 1 N]}
+        quantities:
+          tip: {displacement: y, at: tip, expected: 23.96 mm, source: somebody}
+          work: energy
+shape_grids:
+  all: {shape: cook, mesh_size: [16 mm, 8 mm], material: third, definition: [delingette, lattice], kinematics: linear}
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path):
+    """Reads a study from its text, in a folder of its own."""
+
+    def read(text, name="study"):
+        (tmp_path / f"{name}.yaml").write_text(text)
+        return load_study(tmp_path / f"{name}.yaml")
+
+    return read
+
+
+@pytest.fixture
+def refusal(loaded):
+    def read(text):
+        with pytest.raises(st.StudyError) as refused:
+            loaded(text)
+        return str(refused.value)
+
+    return read
+
+
+def done(study, folder):
+    """Tree of the dataset of a study, all stages run in this process."""
+    for job in plan(study, folder, 1).jobs.values():
+        spent = Spent()
+        import_module(f"springtune.{job.stage.module}").run(job.content, spent)
+        assert not spent.broken, spent.broken
+    groups = collect._groups(study, folder)
+    dataset.write(folder / "dataset.nc", groups, {"title": study.title})
+    with xr.open_datatree(folder / "dataset.nc", engine="netcdf4") as tree:
+        tree.load()
+    return tree, groups
+
+
+# -- what a study may hold ---------------------------------------------------------------------------------------------
+
+REFUSED = {
+    "misspelt group": (("right: [0, 1 N]", "rihgt: [0, 1 N]"), "study.yaml:14: shapes.cook.loads.shear.forces.rihgt: "
+                       "unknown group or point 'rihgt'; did you mean 'right'?"),
+    "misspelt point": (("at: tip", "at: tpi"), "quantities.tip.at: unknown point 'tpi'; did you mean 'tip'?"),
+    "misspelt support": (("{left: fixed}", "{felt: fixed}"), "supports.felt: unknown group or point 'felt'"),
+    "no support": (("{left: fixed}", "{left: {x: 0}}"), "loads.shear.supports: leave the body free to move"),
+    "no such support": (("{left: fixed}", "{left: held}"), "'held' is no support; give fixed, or displacements"),
+    "holds nothing": (("{left: fixed}", "{left: {}}"), "holds nothing; give fixed"),
+    "not a length": (("from: [0, 44 mm]", "from: [0, 44 MPa]"), "'44 MPa' is a stress; give a length"),
+    "no unit": (("[0, 1 N]", "[0, 1]"), "'1' has no unit; give a force"),
+    "one coordinate": (("from: [0, 44 mm]", "from: 44 mm"), "'44 mm' instead of lengths along x and y"),
+    "force of one": (("[0, 1 N]", "1 N"), "instead of forces along x and y, such as [400 kN, 0]"),
+    "unknown quantity": (("work: energy", "work: enregy"), "'enregy' is no quantity; give area or energy"),
+    "two quantities": (("displacement: y, at", "displacement: y, stress: yy, at"), "displacement and stress at once"),
+    "stress of a group": (("displacement: y, at: tip, expected: 23.96 mm", "stress: yy, of: right, expected: 1 MPa"),
+                          "a stress has no 'of'; give at: a point"),
+    "expected of another kind": (("23.96 mm", "23.96 MPa"), "expected: '23.96 MPa' is a stress; give a length"),
+    "source of nothing": (("expected: 23.96 mm, ", ""), "source: a source of no value; give 'expected'"),
+    "reaction of what is free": (("work: energy", "work: {reaction: x, of: right}"), "unknown support 'right'"),
+    "sides that cross": (("[48 mm, 60 mm]", "[-20 mm, 10 mm]"), "shapes.cook: "),
+    "unknown material": (("material: third", "material: thrid"), "unknown material 'thrid'; did you mean 'third'?"),
+    "unknown shape": (("shape: cook", "shape: cok"), "unknown shape 'cok'; did you mean 'cook'?"),
+    "unknown load": (("material: third,", "material: third, load: pull,"), "shape 'cook' has no load 'pull'"),
+    "mesh too coarse": (("16 mm", "1 m"), "is larger than shape 'cook'; give at most 48 mm"),
+    "mesh too fine": (("16 mm", "1 nm"), "gives"),
+    "no mesh size": (("mesh_size: [16 mm, 8 mm], ", ""), "'mesh_size' is missing; give a length"),
+    "definition with a reference": (("lattice]", "evolved]"), "'evolved' is for triangles with a reference"),
+    "definition of a beam": (("lattice]", "baudet-corrected]"), "shape_grids.all.definition"),
+    "mesh type of a beam": (("shape: cook,", "shape: cook, mesh_type: structured,"), "unknown mesh type 'structured'"),
+    "no such file": (("    outline:", "    file: none.msh\n    outline:"), "both 'outline' and 'file'; give the sides"),
+    "nothing of shapes": (("shape_grids:", "sensitivity: {points: 3}\nnothing:"), "unknown key 'nothing'"),
+    "unknown part": (("    points:", "    parts: {fibre: third}\n    points:"), "unknown part 'fibre'; no hole has"),
+    "refined nowhere": (("    points:", "    refined: {hole: 0.5}\n    points:"), "refined.hole: unknown group, point"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_wrong_is_refused_with_line_key_and_remedy(refusal, case):
+    (old, new), expected = REFUSED[case]
+    assert COOK.count(old) == 1
+    message = refusal(COOK.replace(old, new))
+    assert message.splitlines()[0].partition("study.yaml:")[2][0].isdigit()
+    assert expected in message
+
+
+def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
+    text = "title: nothing\nmaterials: {one: {young_modulus: 1 MPa, poisson_ratio: 0.3}}\n"
+    message = refusal(text)
+    assert "'beams' is missing; give a section for each beam, by name" in message
+    beams = text + "beams: {small: {length: 1 m, height: 1 m}}\n"
+    assert "'grids' is missing; give a section for each grid, by name; see below, or 'shape_grids'" in refusal(beams)
+    shapes = COOK.partition("shape_grids:")[0]
+    assert "'beams' is missing" in refusal(shapes)
+    assert "'shapes' is missing; add it" in refusal(text + "shape_grids:" + COOK.partition("shape_grids:")[2])
+
+
+# -- what it expands to ------------------------------------------------------------------------------------------------
+
+
+def test_scenes_are_in_one_order_and_each_once(loaded):
+    one = loaded(COOK).parts["shapes"]
+    again = "  again: {shape: cook, mesh_size: 8 mm, material: third, definition: [lattice], kinematics: linear}\n"
+    two = loaded(COOK.replace("[16 mm, 8 mm]", "[8 mm, 16 mm]") + again, "other").parts["shapes"]
+    assert one.scenes == two.scenes and len(one.scenes) == 4
+    assert [(scene.mesh_size, scene.definition) for scene in one.scenes] == [
+        (8e-3, "lattice"), (8e-3, "delingette"), (16e-3, "lattice"), (16e-3, "delingette"),
+    ]  # fmt: skip
+    assert one.referred == (("cook", "third", "shear"),)
+    without = loaded(COOK.replace("kinematics: linear", "reference: false"), "without").parts["shapes"]
+    assert not without.referred and without.scenes[0].kinematics == "nonlinear"
+
+
+def test_keys_know_no_labels(loaded):
+    """A quantity that is renamed, or of which another value is expected, a load, a shape: nothing is solved again."""
+    one = loaded(COOK).parts["shapes"]
+    text = COOK.replace("cook", "panel").replace("shear:", "other:").replace("third", "soft")
+    text = text.replace("tip: {displacement", "end: {displacement").replace("23.96 mm, source: somebody", "24 mm")
+    two = loaded(text, "two").parts["shapes"]
+    for first, second in zip(one.scenes, two.scenes):
+        assert mesh_key(one, first) == mesh_key(two, second)
+        assert scene_task(one, first)["key"] == scene_task(two, second)["key"]
+    assert reference_task(one, "cook", "third", "shear")["key"] == reference_task(two, "panel", "soft", "other")["key"]
+    stiffer = loaded(COOK.replace("1 MPa", "2 MPa"), "stiffer").parts["shapes"]
+    assert mesh_key(one, one.scenes[0]) == mesh_key(stiffer, stiffer.scenes[0])
+    assert scene_task(one, one.scenes[0])["key"] != scene_task(stiffer, stiffer.scenes[0])["key"]
+
+
+def test_grids_and_shapes_share_the_axes_of_a_dataset(loaded):
+    grids = """\
+beams: {small: {length: 50 mm, height: 10 mm}}
+grids: {one: {beam: small, mesh_type: structured, mesh_size: 5 mm, material: third, load: traction, force: 1 N,
+              definition: patch, sensitivity: false}}
+"""
+    study = loaded(COOK + grids)
+    assert study.axes["load"] == ("traction", "shear") and study.axes["mesh_size"] == (5e-3, 8e-3, 16e-3)
+    assert study.axes["definition"] == ("lattice", "patch", "delingette") and study.axes["shape"] == ("cook",)
+
+
+def test_tasks_have_all_of_a_shape():
+    hole = st.Hole.circle((0.05, 0.02), 0.008)
+    case = st.LoadCase(
+        "pull", (st.Support("left", 0.0, 0.0), st.Support("right", x=1e-3)), (st.Traction("upper", (0.0, 1.0)),),
+        (st.Pressure("hole", 1e6, True),), (0.0, -9.81),
+        (st.Quantity("b", "stress", "top", "xx", 1e6, "x"), st.Quantity("a", "area")),
+    )  # fmt: skip
+    points = {"top": (0.05, 0.028)}
+    shape = st.Shape.rectangle(0.1, 0.04, holes=[hole], points=points, loads={"pull": case}, thickness=2e-3)
+    made = shape_of(geometry(shape), 2e-3, load(case))
+    assert (made.outline, made.holes, made.points) == (shape.outline, shape.holes, shape.points)
+    plain = {"name": "pull", "quantities": case.quantities}
+    assert replace(made.loads[CASE], **plain) == case
+    assert [(one.name, one.kind) for one in made.loads[CASE].quantities] == [("q0", "area"), ("q1", "stress")]
+    told = named("reference of shape 'shape', load 'load': 'q1' of 'top'", shape, case)
+    assert told == f"reference of shape '{shape.name}', load 'pull': 'b' of 'top'"
+
+
+def test_a_mesh_is_stored_with_its_groups(tmp_path):
+    from springtune.jobs import store
+
+    core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
+    grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
+    grouped = replace(grouped, unusable={"odd one": "is not on the outline"})
+    store.add(tmp_path / "one.h5", {"key": stored.packed(grouped) | {"message": ""}})
+    again = stored.read(tmp_path, "one", "key")
+    assert again.mesh.shares_cells(grouped.mesh) and np.array_equal(again.mesh.points, grouped.mesh.points)
+    assert list(again.sides) == list(grouped.sides) and again.unusable == grouped.unusable
+    assert all(np.array_equal(again.sides[name], edges) for name, edges in grouped.sides.items())
+    assert np.array_equal(again.points["corner"], grouped.points["corner"])
+    assert all(np.array_equal(again.parts["core"][3], masks[3]) for masks in grouped.parts.values())
+
+
+def test_rounds_follow_each_other():
+    edges = np.array([[0, 1], [2, 0], [1, 2], [5, 4], [3, 4], [5, 6], [6, 3]])
+    found = rounds_of(edges)
+    assert [sorted(one.tolist()) for one in found] == [[0, 1, 2], [3, 4, 5, 6]]
+    for one in found:
+        pairs = {frozenset(pair) for pair in zip(one.tolist(), np.roll(one, -1).tolist())}
+        assert pairs <= {frozenset(edge) for edge in edges.tolist()}
+
+
+# -- what becomes of it ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def cook(tmp_path_factory):
+    """A study of a shape alone, from its text to its dataset."""
+    folder = tmp_path_factory.mktemp("cook")
+    (folder / "study.yaml").write_text(COOK)
+    study = load_study(folder / "study.yaml")
+    return study, *done(study, folder / "results")
+
+
+def test_values_are_those_of_scenes(cook):
+    """The dataset has what the library gives, errors against the reference and against what others give."""
+    _, tree, _ = cook
+    data = tree["shapes"].to_dataset()
+    assert (data.status == STATUS.index("solved")).all() and not (data.message != "").any()
+    cell = data.sel(shape="cook", mesh_type="free", mesh_size=8e-3, material="third", load="shear", kinematics="linear")
+    outline = [(0, 0), (48e-3, 44e-3), (48e-3, 60e-3), (0, 44e-3)]
+    sides = [st.Segment(corner, group=name) for corner, name in zip(outline, ("lower", "right", "upper", "left"))]
+    tip = st.Quantity("tip", "displacement", "tip", "y")
+    case = st.LoadCase("shear", (st.Support("left", 0, 0),), (st.Traction("right", (0, 1)),), quantities=(tip,))
+    shape = st.Shape("cook", 1e-3, sides, points={"tip": (48e-3, 52e-3)}, loads={"shear": case})
+    mesh, third = st.mesh_shape(shape, 8e-3), st.Material(1e6, 1 / 3)
+    for name in ("lattice", "delingette"):
+        found = st.Scene(shape, mesh, third, "shear", definition=name, kinematics="linear").solve()
+        one = cell.sel(definition=name, quantity="tip")
+        assert float(one.value) == pytest.approx(found.values["tip"], rel=1e-9)
+        assert float(one.error) == pytest.approx(float(one.value) / float(one.reference_value) - 1, rel=1e-9)
+        assert float(one.expected_error) == pytest.approx(float(one.value) / 23.96e-3 - 1, rel=1e-9)
+    # Others' value is of fine meshes; what is known of the reference is far less than its distance from it.
+    assert abs(float(cell.reference_expected_error.sel(quantity="tip"))) < 1e-3
+    assert float(cell.reference_error_estimate.sel(quantity="tip")) < 1e-4
+    # Twice the strain energy is the work of the force on the side that it is on.
+    assert (cell.particles > 0).all() and cell.quantity_units.values.tolist() == ["m", "J"]
+
+
+def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
+    study, tree, groups = cook
+    assert not tree.data_vars and set(tree.children) == {"shapes", "shape_fields"}
+    assert "4 solved" in summary.text(groups, study.title)
+    tree.attrs |= {"springtune_version": "0", "git_commit": "", "created": ""}
+    made = {name for name in page.write(tree, tmp_path) if name != "index.html"}
+    assert made == {name for name in table_files(outputs()["tables"], study) if name != "index.html"}
+    rows = (tmp_path / "shapes.csv").read_text().splitlines()
+    assert len(rows) == 1 + 2 * len(study.parts["shapes"].scenes)
+    assert "Sources: cook, tip: somebody." in (tmp_path / "index.html").read_text()
+
+
+def test_networks_that_are_drawn_are_stored(cook):
+    _, tree, _ = cook
+    fields = tree["shape_fields"].to_dataset().sel(case="cook, shear")
+    assert float(fields.case_mesh_size) == 8e-3
+    moved = fields.sel(definition="delingette")
+    tip = int(np.argmin(np.hypot(fields.x - 48e-3, fields.y - 52e-3).values))
+    value = tree["shapes"].value.sel(shape="cook", mesh_size=8e-3, definition="delingette", quantity="tip")
+    assert float(moved.displacement_y[tip]) == pytest.approx(value.item(), rel=1e-6)
+    held = np.abs(fields.outline_x.values) < 1e-12
+    assert np.abs(fields.reference_displacement_y.values[held]).max() < 1e-9
+
+
+def test_what_cannot_be_solved_is_a_hole_that_says_why(loaded, tmp_path):
+    """A definition that cannot live on the mesh costs its own scenes; a reference that does not converge its error."""
+    text = COOK.replace("delingette, lattice", "axis-exact, lattice").replace(
+        "work: energy", "peak: {stress: yy, at: notch}"
+    )
+    text = text.replace("points: {", "points: {notch: [0, 44 mm], ").replace("[16 mm, 8 mm]", "16 mm")
+    tree, groups = done(loaded(text), tmp_path / "results")
+    data = tree["shapes"].to_dataset().squeeze(drop=True)
+    lost = data.sel(definition="axis-exact")
+    assert STATUS[int(lost.status)] == "failed" and "isosceles" in lost.message.item()
+    solved = data.sel(definition="lattice")
+    # The stress at a clamped corner has no bound: no reference for it, and one for the displacement.
+    assert np.isfinite(solved.error.sel(quantity="tip")) and np.isnan(solved.error.sel(quantity="peak"))
+    assert np.isfinite(solved.value.sel(quantity="peak"))
+    assert "no reference" in solved.message.item() and "'peak'" in solved.message.item()
+    assert "1 failed" in summary.text(groups, "title")
+
+
+# -- files -------------------------------------------------------------------------------------------------------------
+
+PLATE = {
+    "title": "A plate of a file",
+    "materials": {"steel": {"young_modulus": "210 GPa", "poisson_ratio": 0.3}},
+    "shapes": {
+        "plate": {
+            "file": "plate.msh",
+            "loads": {
+                "pull": {
+                    "supports": {"left": "fixed"},
+                    "forces": {"right": ["1 kN", 0]},
+                    "quantities": {"stretch": {"displacement": "x", "of": "right"}},
+                }
+            },
+        }
+    },
+    "shape_grids": {"plate": {"shape": "plate", "material": "steel", "definition": "delingette"}},
+}
+
+
+@pytest.fixture
+def plate(tmp_path):
+    grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "10 mm")
+    write_mesh(tmp_path / "plate.msh", grouped)
+    return grouped
+
+
+def test_a_file_is_the_mesh_and_the_geometry(loaded, plate, tmp_path):
+    study = loaded(yaml.safe_dump(PLATE))
+    assert study.parts["shapes"].scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
+    tree, _ = done(study, tmp_path / "results")
+    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
+    assert abs(float(cell.error)) < 0.01
+    # The file is part of the keys, its place is not.
+    part = study.parts["shapes"]
+    before = mesh_key(part, part.scenes[0])
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "plate.msh").rename(tmp_path / "elsewhere/plate.msh")
+    moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.msh"}}}
+    part = loaded(yaml.safe_dump(moved), "moved").parts["shapes"]
+    assert mesh_key(part, part.scenes[0]) == before
+    write_mesh(tmp_path / "elsewhere/plate.msh", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
+    assert mesh_key(part, part.scenes[0]) != before
+
+
+def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate):
+    text = yaml.safe_dump(PLATE)
+    message = refusal(text.replace("right", "rihgt"))
+    assert "shapes.plate.loads.pull" in message and "no group is named 'rihgt'; did you mean 'right'?" in message
+    assert "supports leave the body free to" in refusal(text.replace("left: fixed", "left: {x: 0}"))
+    assert "is not a file; give its path relative to the study's folder" in refusal(text.replace("plate.msh", "no.msh"))
+    assert "'plate' is a mesh file, which has its own; remove it" in refusal(
+        text.replace("definition: delingette", "definition: delingette\n    mesh_size: 5 mm")
+    )
+    assert "unknown part 'core'; the file has none" in refusal(
+        text.replace("    file:", "    parts: {core: steel}\n    file:")
+    )
+
+
+def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path, monkeypatch):
+    monkeypatch.setattr("springtune.kinds.shapes.kind.READ_AT_ONCE", 0)
+    tree, _ = done(loaded(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results")
+    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    assert STATUS[int(cell.status)] == "failed" and "no group is named 'rihgt'" in cell.message.item()
+    (tmp_path / "plate.msh").write_text("$MeshFormat\n")
+    tree, _ = done(loaded(yaml.safe_dump(PLATE)), tmp_path / "broken")
+    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
