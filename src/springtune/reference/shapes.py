@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.materials import Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
 from .limits import most_rotation_and_strain
@@ -133,7 +133,7 @@ class ShapeReference:
 def solve_shape(
     shape: Shape,
     load: LoadCase,
-    materials: Material | Mapping[str, Material],
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
 ) -> ShapeReference:
@@ -143,7 +143,7 @@ def solve_shape(
     ----------
     shape : Shape
     load : LoadCase
-    materials : Material or mapping of str to Material
+    materials : Material, AnisotropicMaterial or mapping of str to one
         By part; that of the main part is ``""``.
     grouped : GroupedMesh, optional
         The mesh as read, of a shape whose body is that of a file: the polygon around its cells is then the geometry.
@@ -175,14 +175,14 @@ def solve_shape(
     Curves are followed by polynomials of the level's degree (isoparametric), reactions are the work of the solution on
     a unit displacement of their group, and stresses are those of the displacements, not smoothed.
     """
-    by_part = {"": materials} if isinstance(materials, Material) else dict(materials)
+    by_part = {"": materials} if isinstance(materials, ANY_MATERIAL) else dict(materials)
     return converge(shape, load, {name: by_part[name] for name in by_part}, grouped, tolerance)
 
 
 def converge(
     shape: Shape,
     load: LoadCase,
-    materials: Mapping[str, Material],
+    materials: Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
     tractions: Mapping[str, Field] | None = None,
@@ -258,7 +258,7 @@ class _Problem:
         self,
         shape: Shape,
         load: LoadCase,
-        materials: Mapping[str, Material],
+        materials: Mapping[str, AnyMaterial],
         grouped: GroupedMesh | None,
         tractions: Mapping[str, Field],
         displacements: Mapping[str, Field],
