@@ -175,7 +175,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
         count += part / (ROW_HEIGHT * value**2) + 4 * lengths.get(name, value) / value
     refusal = too_many(count, min([size, *refined.values()]), smaller, what)
     if refusal:
-        raise MeshError(f"mesh size: {size!r} {refusal}")
+        raise MeshError(f"mesh size: {size!r}{f' with {refined}' if refined else ''} {refusal}")
     return {"": size, **refined}
 
 
