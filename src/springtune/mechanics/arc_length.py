@@ -91,7 +91,7 @@ def follow(
             break
         direction, point = found.u - point.u, found
         points.append(point)
-        if network.inverted(network.expand(point.u)):
+        if network.inverted(problem.moved(point.load, network.expand(point.u))):
             message = "triangles are inverted"
             break
         if limit is not None and np.linalg.norm(point.u) >= limit or point.load / s >= 1.0:
@@ -100,7 +100,7 @@ def follow(
         length = min(length * (1.5 if point.steps <= FEW else 0.5 if point.steps > MANY else 1.0), increment)
     return Path(
         np.array([point.load for point in points]),
-        np.array([network.expand(point.u) for point in points]),
+        np.array([problem.moved(point.load, network.expand(point.u)) for point in points]),
         np.array([point.negative_pivots for point in points]),
         message,
     )
@@ -119,9 +119,9 @@ def _next(
     problem: StaticProblem, s: float, last: _Point, direction: np.ndarray | None, length: float, shortest: float
 ) -> tuple[_Point | None, float]:
     """Point after the last one, and the length of the increment, halved where Newton's method fails; None beyond."""
-    displacements = problem.network.expand(last.u)
+    displacements = problem.moved(last.load, problem.network.expand(last.u))
     try:
-        tangent = problem.factorize_tangent(last.load, displacements).solve(problem.load_at(displacements))
+        tangent = problem.factorize_tangent(last.load, displacements).solve(problem.rate(displacements))
         sign = np.sign(s) if direction is None else np.sign(direction @ tangent) or 1.0
         while length > shortest:
             rise = float(sign * length / np.linalg.norm(tangent))
@@ -141,7 +141,7 @@ def _correct(
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
     for step in range(1, most + 1):
-        displacements = network.expand(u)
+        displacements = problem.moved(at, network.expand(u))
         load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
             missing = at * load - network.resistance(displacements)
@@ -151,7 +151,10 @@ def _correct(
         factor = problem.factorize_tangent(at, displacements)
         if size <= TOLERANCE * scale:
             return _Point(u, at, problem.stability(at, displacements, factor)[0], step)
-        back, forth = factor.solve(missing), factor.solve(load)
+        back, forth = (
+            factor.solve(missing),
+            factor.solve(load if problem.given is None else problem.rate(displacements)),
+        )
         change = -(across @ back) / (across @ forth)
         u, at = u + back + change * forth, at + change
     return None

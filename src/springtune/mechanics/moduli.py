@@ -296,7 +296,7 @@ def lateral_forces(mesh: Mesh) -> np.ndarray:
     return forces
 
 
-def effective_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
+def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     """Stiffness in plane stress of the whole network, of any anisotropy, on any mesh.
 
     The whole outline, holes included, is moved as an even strain moves it, along x, along y and in shear; the particles
@@ -328,7 +328,7 @@ def effective_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     >>> mesh = MESH_TYPES["braced"](0.06, 0.04, 0.01)
     >>> parts = np.ones((len(mesh.quads), 6))
     >>> springs = SimpleNamespace(relative=mesh.sum_to_edges({4: parts}), energies=(), lateral=0.0)
-    >>> abs(effective_stiffness(mesh, springs).round(6)).tolist()
+    >>> abs(outline_stiffness(mesh, springs).round(6)).tolist()
     [[3.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 1.0]]
     """
     held = np.zeros(mesh.points.shape, dtype=bool)
@@ -336,42 +336,6 @@ def effective_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     network = Network(mesh, held, springs.relative, springs.energies)
     if network.unknowns and network.rest_factor.negative_pivots:
         raise SingularError("the network is unstable at rest")
-    return _work(network)
-
-
-def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Stiffness in plane stress that a network had if all its particles followed an even strain (Cauchy and Born).
-
-    Of springs it is the closed form ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66 whatever their
-    stiffness; an upper bound of `effective_stiffness`, which a lattice attains.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    springs : Springs
-
-    Returns
-    -------
-    ndarray of float, shape (3, 3)
-        As of `effective_stiffness` [1].
-
-    Examples
-    --------
-    The equilateral lattice, each spring the mean of two triangles: ``9/8, 3/8, 3/8`` of E t:
-
-    >>> from types import SimpleNamespace
-    >>> from springtune.mesh import lattice
-    >>> mesh = lattice(12, 8)
-    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
-    >>> abs(affine_stiffness(mesh, springs) * 3**0.5 / 2).round(6).tolist()
-    [[1.125, 0.375, 0.0], [0.375, 1.125, 0.0], [0.0, 0.0, 0.375]]
-    """
-    return _work(Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies))
-
-
-def _work(network: Network) -> np.ndarray:
-    """Work of the held directions as they follow even strains, over the area [1], shape (3, 3)."""
-    mesh = network.mesh
     x, y = (mesh.points - mesh.points[0]).T
     none = np.zeros(len(x))
     fields = [np.stack(field, axis=1) for field in ((x, none), (none, y), (0.5 * y, 0.5 * x))]
@@ -379,10 +343,8 @@ def _work(network: Network) -> np.ndarray:
     if network.unknowns:
         # What particles inside lack of an equilibrium, all fields at once.
         forces = np.stack([network.linear_resistance(field) for field in fields], axis=1)
-        moved = [
-            field - network.expand(back)
-            for field, back in zip(fields, network.rest_factor.solve(forces).T, strict=True)
-        ]
+        back = network.rest_factor.solve(forces).T
+        moved = [field - network.expand(one) for field, one in zip(fields, back, strict=True)]
     resisted = [network.linear_forces(field) for field in moved]
     work = np.array([[float((force * field).sum()) for field in fields] for force in resisted]) / mesh.area
     return 0.5 * (work + work.T)

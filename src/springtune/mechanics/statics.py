@@ -331,6 +331,20 @@ class StaticProblem:
         turned = self.network.reduce(self.follower.forces(displacements))
         return turned if self._dead is None else self._dead + turned
 
+    @cached_property
+    def _free(self) -> Network:
+        """The network with nothing held."""
+        network, none = self.network, np.zeros(self.network.held.shape, dtype=bool)
+        return Network(network.mesh, none, network.stiffness, network.energies)
+
+    def rate(self, displacements: np.ndarray) -> np.ndarray:
+        """Load that is missing for a growth of ``s`` by one, prescribed displacements included: [1], (unknowns,)."""
+        load = self.load_at(displacements)
+        if self.given is None:
+            return load
+        pull = self._free.tangent(displacements) @ self.given.ravel()
+        return load - self.network.reduce(pull.reshape(self.given.shape))
+
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
         """Displacements [m] with those that are prescribed at ``s`` in their places, shape (n_points, 2)."""
         return displacements if self.given is None else np.where(self.network.held, s * self.given, displacements)

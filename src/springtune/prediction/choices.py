@@ -15,7 +15,7 @@ from ..mechanics.energies import AreaEnergy
 from ..mechanics.moduli import PatchTest
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import deformation_error
+from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import AnyMaterial, Material
@@ -348,9 +348,7 @@ def _on_shape(
                 failures[load] = f"unstable: {error}"
             else:
                 if found.status is Status.SOLVED:
-                    values = statement.values(sheet, springs, found)
-                    with np.errstate(divide="ignore", invalid="ignore"):
-                        errors |= {one: float(deformation_error(values[one], known[one])) for one in names}
+                    errors |= quantity_errors(statement.values(sheet, springs, found), known)
                 else:
                     failures[load] = found.message
         choices.append(Choice(name, *parts, name in NEED_ENERGIES, errors, nan, nan, failures))

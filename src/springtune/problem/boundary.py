@@ -161,14 +161,13 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
         for axis, value in enumerate((support.x, support.y)):
             if value is None:
                 continue
-            clash = held[particles, axis] & (given[particles, axis] != value)
-            if clash.any():
-                particle = particles[np.argmax(clash)]
-                shown = f"{1e3 * points[particle, 0]:.6g}, {1e3 * points[particle, 1]:.6g}"
+            differ = held[particles, axis] & (given[particles, axis] != value)
+            if differ.any():
+                particle = particles[np.argmax(differ)]
+                others = [one.group for one in case.supports if particle in particles_of(grouped, one.group)]
                 raise ValueError(
-                    f"load {case.name!r}: support of {support.group!r} moves the particle at ({shown}) mm by "
-                    f"{value:g} m along {'xy'[axis]}, and another one by {given[particle, axis]:g} m; let one of the "
-                    "two end before it, or prescribe the same displacement"
+                    f"load {case.name!r}: supports on {others[0]!r} and {support.group!r} move the particle at "
+                    f"{_shown(points[particle])} by different amounts along {'xy'[axis]}; make them agree there"
                 )
             held[particles, axis] = True
             given[particles, axis] = value
@@ -449,8 +448,7 @@ def particles_of(grouped: GroupedMesh, group: str) -> np.ndarray:
     """
     if group in grouped.sides:
         return grouped.sides[group].ravel()
-    point = _point(grouped, group)
-    found = _particle_at(grouped.mesh, point)
+    point, found = _point(grouped, group), grouped.particle(group)
     if found is None:
         raise ValueError(
             f"point: {group!r} at {_shown(point)} is no particle of the mesh, and what is held or pulled has to be "
@@ -467,13 +465,6 @@ def _point(grouped: GroupedMesh, name: str) -> np.ndarray:
 
 def _shown(point: np.ndarray) -> str:
     return f"({1e3 * point[0]:.6g}, {1e3 * point[1]:.6g}) mm"
-
-
-def _particle_at(mesh: Mesh, point: np.ndarray) -> int | None:
-    """Particle at a point, None where there is none."""
-    apart = ((mesh.points - point) ** 2).sum(axis=1)
-    found = int(np.argmin(apart))
-    return found if apart[found] <= (ON_POINT * np.ptp(mesh.points, axis=0).max()) ** 2 else None
 
 
 def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -501,7 +492,7 @@ def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarr
     if edge is not None:
         along, share = edge
         return outline[along], np.array([1 - share, share])
-    particle = _particle_at(mesh, point)
+    particle = grouped.particle(name)
     if particle is not None:
         return np.array([particle]), np.ones(1)
     count, cell, shares = cell_at(grouped, name)

@@ -37,6 +37,8 @@ def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
     load 'pull': its supports leave the body free to move along y; hold it
     >>> check_case(grouped, st.LoadCase("pull", (*pull.supports, st.Support("corner", y=0)), pull.tractions))
     """
+    from .boundary import supported  # here, since it stands on meshes
+
     case.check_names(grouped.sides, grouped.points, grouped.unusable)
     where = f"load {case.name!r}"
     for what, name in [("support", one.group) for one in case.supports] + [
@@ -47,7 +49,7 @@ def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
     for quantity in case.quantities:
         if quantity.of in grouped.points and not _in_body(grouped.mesh, grouped.points[quantity.of]):
             raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
-    held = _held(grouped, case)
+    held = supported(grouped, case)[0]
     components = connected(grouped.mesh)
     count = components.max() + 1
     for number in range(count):
@@ -85,28 +87,6 @@ def connected(mesh: "Mesh") -> np.ndarray:
     count = len(mesh.points)
     joined = coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
-
-
-def _held(grouped: "GroupedMesh", case: LoadCase) -> np.ndarray:
-    """Whether supports hold each particle along x and y, shape (n_points, 2); refused where two differ."""
-    values = np.full((len(grouped.mesh.points), 2), np.nan)
-    groups: dict[tuple[int, int], str] = {}
-    for support in case.supports:
-        particles = grouped.particles(support.group)
-        for axis, value in enumerate((support.x, support.y)):
-            if value is None:
-                continue
-            differ = particles[~np.isnan(values[particles, axis]) & (values[particles, axis] != value)]
-            if len(differ):
-                x, y = 1e3 * grouped.mesh.points[differ[0]]
-                other = groups[int(differ[0]), axis]
-                raise ValueError(
-                    f"load {case.name!r}: supports on {other!r} and {support.group!r} move the particle at "
-                    f"({x:.6g}, {y:.6g}) mm by different amounts along {'xy'[axis]}; make them agree there"
-                )
-            values[particles, axis] = value
-            groups.update(dict.fromkeys(((int(one), axis) for one in particles), support.group))
-    return ~np.isnan(values)
 
 
 def _free_motion(points: np.ndarray, held: np.ndarray) -> str:

@@ -1,6 +1,6 @@
 """Comparing networks with references: errors, and the stiffness at which a sensitivity curve has none."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +32,30 @@ def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarr
     """
     displacement, reference = np.asarray(displacement), np.asarray(reference)
     return (displacement - reference) / np.abs(reference)
+
+
+def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float]:
+    """Error of each quantity of interest, as `deformation_error`.
+
+    Parameters
+    ----------
+    values, known : mapping of str to float
+        Of network and reference by name, in SI units.
+
+    Returns
+    -------
+    dict of str to float
+        [1]; NaN where the reference has none, or exactly zero.
+
+    Examples
+    --------
+    >>> quantity_errors({"end": 1.1, "side": 0.1}, {"end": 1.0, "side": 0.0})["side"]
+    nan
+    """
+    return {
+        name: float(deformation_error(value, known[name])) if known.get(name) else np.nan
+        for name, value in values.items()
+    }
 
 
 @dataclass(frozen=True)

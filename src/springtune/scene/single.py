@@ -15,7 +15,7 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import deformation_error
+from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
@@ -110,6 +110,21 @@ class Scene:
     >>> result = scene.solve()
     >>> print(f"{result.status}: {1e3 * result.displacement:.2f} mm, error {100 * result.error:+.1f} %")
     solved: 9.51 mm, error +0.1 %
+
+    A shape, with the stress beside its hole:
+
+    >>> pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))],
+    ...                    quantities=[st.Quantity("end", "displacement", "right", "x"),
+    ...                                st.Quantity("rim", "stress", "rim", "xx")])
+    >>> hole = st.Hole.circle(("50 mm", "20 mm"), "8 mm")
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[hole], points={"rim": ("50 mm", "28 mm")},
+    ...                            loads={"pull": pull})
+    >>> grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "0.5 mm"})
+    >>> there = st.Scene(plate, grouped, steel, "pull", definition="delingette", kinematics="linear").solve()
+    >>> print(f"{1e6 * there.values['end']:.1f} um, {1e-6 * there.values['rim']:.0f} MPa")
+    55.9 um, 359 MPa
+    >>> print(*(f"{name} {100 * error:+.1f} %" for name, error in there.errors.items()))
+    end -0.5 % rim -4.5 %
 
     The network without units, as the mechanics have it: force and stiffness over the reference stiffness.
 
@@ -656,7 +671,7 @@ class Result:
 
     @property
     def errors(self) -> dict[str, float]:
-        """As `error`, of each quantity of interest [1]; infinite or NaN where the reference has none of it.
+        """As `error`, of each quantity of interest [1]; NaN where the reference has none of it, or exactly zero.
 
         Examples
         --------
@@ -669,9 +684,7 @@ class Result:
         >>> result.values.keys() == result.errors.keys()
         True
         """
-        known = self.scene.reference_values()
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return {name: float(deformation_error(value, known[name])) for name, value in self.values.items()}
+        return quantity_errors(self.values, self.scene.reference_values())
 
     def write(self, path: str | Path, steps: int = 10) -> list[Path]:
         """Write the deformed network for ParaView, or whatever else reads VTU.

@@ -25,6 +25,7 @@ from ..problem.boundary import (
     reaction_weights,
     supported,
 )
+from ..problem.cases import check_case
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
@@ -237,6 +238,7 @@ class ShapeStatement:
             self._check(one)
 
     def _loading(self) -> Loading:
+        check_case(self.grouped, self.case)
         held, given = supported(self.grouped, self.case)
         densities = {name: one.density for name, one in self.by_part.items()}
         all_forces = partial(forces, self.grouped, self.case, self.thickness, densities)

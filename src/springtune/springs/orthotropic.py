@@ -41,10 +41,11 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     first = mesh.points[mesh.quads[:, 1]] - mesh.points[mesh.quads[:, 0]]
     reference = membrane_stiffness(material, 1.0)
     sides, others, diagonals, moduli = (np.empty(len(along)) for _ in range(4))
-    angles = np.round(np.arctan2(first[:, 1], first[:, 0]), 9)
-    for angle in np.unique(angles):  # along x on most meshes
-        here = angles == angle
-        constants = rotated(material.plane_stress, -angle) / reference
+    angles = np.arctan2(first[:, 1], first[:, 0])
+    _, groups = np.unique(angles.round(9), return_inverse=True)
+    for group in range(groups.max() + 1):  # one on most meshes, along x
+        here = groups == group
+        constants = rotated(material.plane_stress, -float(angles[here].mean())) / reference
         if np.abs(constants[2, :2]).max() > COUPLING:
             raise DefinitionError(
                 f"needs the axes of the material along the sides of the rectangles, and {material.name!r} has C16 = "

@@ -29,7 +29,7 @@ from .base import DefinitionError, Springs
 if TYPE_CHECKING:
     from ..mechanics.energies import Energy
 
-MAIN = ""
+MAIN_PART = ""
 """Name of the part that has no other."""
 
 
@@ -74,7 +74,7 @@ def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
     {'': 8, 'left': 8}
     """
     rest = {count: np.ones(len(corners), dtype=bool) for count, corners in grouped.mesh.cells.items()}
-    found: dict[str, dict[int, np.ndarray]] = {MAIN: rest}
+    found: dict[str, dict[int, np.ndarray]] = {MAIN_PART: rest}
     for name, chosen in grouped.parts.items():
         own = {}
         for count, everything in rest.items():

@@ -1,0 +1,47 @@
+"""Stiffness of networks whose particles all follow an even strain: closed forms, before anything relaxes."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..mesh.cells import Mesh
+from .network import Network
+
+if TYPE_CHECKING:
+    from .moduli import Elastic
+
+
+def affine_stiffness(mesh: Mesh, springs: "Elastic") -> np.ndarray:
+    """Stiffness in plane stress that a network had if all its particles followed an even strain (Cauchy and Born).
+
+    Of springs it is the closed form ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66 whatever their
+    stiffness; an upper bound of `springtune.mechanics.moduli.outline_stiffness`, which a lattice attains.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    springs : Springs
+
+    Returns
+    -------
+    ndarray of float, shape (3, 3)
+        As of `springtune.mechanics.moduli.outline_stiffness` [1].
+
+    Examples
+    --------
+    The equilateral lattice, each spring the mean of two triangles: ``9/8, 3/8, 3/8`` of E t:
+
+    >>> from types import SimpleNamespace
+    >>> from springtune.mesh import lattice
+    >>> mesh = lattice(12, 8)
+    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
+    >>> abs(affine_stiffness(mesh, springs) * 3**0.5 / 2).round(6).tolist()
+    [[1.125, 0.375, 0.0], [0.375, 1.125, 0.0], [0.0, 0.0, 0.375]]
+    """
+    network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
+    x, y = (mesh.points - mesh.points[0]).T
+    none = np.zeros(len(x))
+    fields = [np.stack(field, axis=1) for field in ((x, none), (none, y), (0.5 * y, 0.5 * x))]
+    forces = [network.linear_forces(field) for field in fields]
+    work = np.array([[float((force * field).sum()) for field in fields] for force in forces]) / mesh.area
+    return 0.5 * (work + work.T)
