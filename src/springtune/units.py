@@ -55,7 +55,7 @@ QUANTITY_KINDS = {
         Kind("density", "kg/m^3", "7850 kg/m^3"),
         Kind("area", "m^2", "12 mm^2"),
         Kind("energy", "J", "3.5 J"),
-        Kind("acceleration", "m/s^2", "-9.81 m/s^2"),
+        Kind("acceleration", "m/s^2", "9.81 m/s^2"),
         Kind("angle", "rad", "30 deg"),
     )
 }

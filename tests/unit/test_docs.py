@@ -175,7 +175,7 @@ def _run(study):
 def test_commands_are_commands(page, tmp_path):
     """Of pages as a whole, the commands in running text included; studies of one's own are those of the repository."""
     shutil.copytree(REPOSITORY / "config", tmp_path / "config")
-    for name in ("mine", "theirs", "coarse_to_fine", "columns", "sweep"):
+    for name in ("mine", "theirs", "coarse_to_fine", "columns", "sweep", "plate", "outlined"):
         shutil.copy(tmp_path / "config/quick.yaml", tmp_path / f"config/{name}.yaml")
     for words in typed(page):
         check_command(words, tmp_path)

@@ -9,16 +9,16 @@ import xarray as xr
 import yaml
 
 import springtune as st
-from springtune.campaign import collect, page, summary
+from springtune.campaign import collect, page
 from springtune.campaign.plan import plan, table_files
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
 from springtune.kinds.shapes import stored
-from springtune.kinds.shapes.described import CASE, geometry, load, named, shape_of
+from springtune.kinds.shapes.described import ONE_LOAD, geometry, load, named, shape_of
+from springtune.kinds.shapes.kind import READ_AT_ONCE
 from springtune.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.kinds.shapes.reference import rounds_of
 from springtune.mesh import write_mesh
-from springtune.output import dataset
 from springtune.output.dataset import STATUS
 
 COOK = """\
@@ -66,16 +66,15 @@ def refusal(loaded):
 
 
 def done(study, folder):
-    """Tree of the dataset of a study, all stages run in this process."""
+    """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     for job in plan(study, folder, 1).jobs.values():
         spent = Spent()
         import_module(f"springtune.{job.stage.module}").run(job.content, spent)
         assert not spent.broken, spent.broken
-    groups = collect._groups(study, folder)
-    dataset.write(folder / "dataset.nc", groups, {"title": study.title})
-    with xr.open_datatree(folder / "dataset.nc", engine="netcdf4") as tree:
+    made, told = collect.run(study.path, folder, folder / "dataset.nc")
+    with xr.open_datatree(made, engine="netcdf4") as tree:
         tree.load()
-    return tree, groups
+    return tree, told.read_text()
 
 
 # -- what a study may hold ---------------------------------------------------------------------------------------------
@@ -190,8 +189,8 @@ def test_tasks_have_all_of_a_shape():
     made = shape_of(geometry(shape), 2e-3, load(case))
     assert (made.outline, made.holes, made.points) == (shape.outline, shape.holes, shape.points)
     plain = {"name": "pull", "quantities": case.quantities}
-    assert replace(made.loads[CASE], **plain) == case
-    assert [(one.name, one.kind) for one in made.loads[CASE].quantities] == [("q0", "area"), ("q1", "stress")]
+    assert replace(made.loads[ONE_LOAD], **plain) == case
+    assert [(one.name, one.kind) for one in made.loads[ONE_LOAD].quantities] == [("q0", "area"), ("q1", "stress")]
     told = named("reference of shape 'shape', load 'load': 'q1' of 'top'", shape, case)
     assert told == f"reference of shape '{shape.name}', load 'pull': 'b' of 'top'"
 
@@ -229,7 +228,7 @@ def cook(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cook")
     (folder / "study.yaml").write_text(COOK)
     study = load_study(folder / "study.yaml")
-    return study, *done(study, folder / "results")
+    return study, *done(study, folder / "results/study")
 
 
 def test_values_are_those_of_scenes(cook):
@@ -258,10 +257,9 @@ def test_values_are_those_of_scenes(cook):
 
 
 def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
-    study, tree, groups = cook
+    study, tree, told = cook
     assert not tree.data_vars and set(tree.children) == {"shapes", "shape_fields"}
-    assert "4 solved" in summary.text(groups, study.title)
-    tree.attrs |= {"springtune_version": "0", "git_commit": "", "created": ""}
+    assert "4 solved" in told and study.title in told
     made = {name for name in page.write(tree, tmp_path) if name != "index.html"}
     assert made == {name for name in table_files(outputs()["tables"], study) if name != "index.html"}
     rows = (tmp_path / "shapes.csv").read_text().splitlines()
@@ -287,7 +285,7 @@ def test_what_cannot_be_solved_is_a_hole_that_says_why(loaded, tmp_path):
         "work: energy", "peak: {stress: yy, at: notch}"
     )
     text = text.replace("points: {", "points: {notch: [0, 44 mm], ").replace("[16 mm, 8 mm]", "16 mm")
-    tree, groups = done(loaded(text), tmp_path / "results")
+    tree, told = done(loaded(text), tmp_path / "results/study")
     data = tree["shapes"].to_dataset().squeeze(drop=True)
     lost = data.sel(definition="axis-exact")
     assert STATUS[int(lost.status)] == "failed" and "isosceles" in lost.message.item()
@@ -296,7 +294,7 @@ def test_what_cannot_be_solved_is_a_hole_that_says_why(loaded, tmp_path):
     assert np.isfinite(solved.error.sel(quantity="tip")) and np.isnan(solved.error.sel(quantity="peak"))
     assert np.isfinite(solved.value.sel(quantity="peak"))
     assert "no reference" in solved.message.item() and "'peak'" in solved.message.item()
-    assert "1 failed" in summary.text(groups, "title")
+    assert "1 failed" in told
 
 
 # -- files -------------------------------------------------------------------------------------------------------------
@@ -330,7 +328,7 @@ def plate(tmp_path):
 def test_a_file_is_the_mesh_and_the_geometry(loaded, plate, tmp_path):
     study = loaded(yaml.safe_dump(PLATE))
     assert study.parts["shapes"].scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
-    tree, _ = done(study, tmp_path / "results")
+    tree, _ = done(study, tmp_path / "results/study")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
     assert abs(float(cell.error)) < 0.01
@@ -360,12 +358,15 @@ def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate):
     )
 
 
-def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path, monkeypatch):
-    monkeypatch.setattr("springtune.kinds.shapes.kind.READ_AT_ONCE", 0)
-    tree, _ = done(loaded(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results")
+def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path):
+    """What is too large to be looked at as the study is read is looked at by its stages."""
+    comment = b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n"
+    path = tmp_path / "plate.msh"
+    path.write_bytes(comment + path.read_bytes())
+    tree, _ = done(loaded(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and "no group is named 'rihgt'" in cell.message.item()
-    (tmp_path / "plate.msh").write_text("$MeshFormat\n")
-    tree, _ = done(loaded(yaml.safe_dump(PLATE)), tmp_path / "broken")
+    path.write_bytes(comment + b"$MeshFormat\n")
+    tree, _ = done(loaded(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.materials import ANY_MATERIAL, AnyMaterial
+from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
 from .limits import most_rotation_and_strain
@@ -36,8 +36,8 @@ SMALLEST_SHARE = 1e-3
 #: Force on a support at a point, over all of them, that is taken for none.
 SMALLEST_REACTION = 1e-6
 
-#: Most unknowns of a level.
-LARGEST_LEVEL = 600_000
+#: Most entries of the triangles' matrices on a level: half a gigabyte.
+LARGEST_LEVEL = 60_000_000
 
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Vectors, shape (n, 2), at points of sides and their outward normals, shape (n, 2) each."""
@@ -143,7 +143,7 @@ def solve_shape(
     ----------
     shape : Shape
     load : LoadCase
-    materials : Material, AnisotropicMaterial or mapping of str to one
+    materials : Material or mapping of str to Material
         By part; that of the main part is ``""``.
     grouped : GroupedMesh, optional
         The mesh as read, of a shape whose body is that of a file: the polygon around its cells is then the geometry.
@@ -175,8 +175,8 @@ def solve_shape(
     Curves are followed by polynomials of the level's degree (isoparametric), reactions are the work of the solution on
     a unit displacement of their group, and stresses are those of the displacements, not smoothed.
     """
-    by_part = {"": materials} if isinstance(materials, ANY_MATERIAL) else dict(materials)
-    return converge(shape, load, {name: by_part[name] for name in by_part}, grouped, tolerance)
+    by_part = materials if isinstance(materials, Mapping) else {"": materials}
+    return converge(shape, load, by_part, grouped, tolerance)
 
 
 def converge(
@@ -212,9 +212,8 @@ def converge(
     estimates: dict[str, float] = {}
     complaint = ""
     for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
-        unknowns = problem.size(degree)
-        if unknowns > LARGEST_LEVEL and complaint:
-            complaint += f"; the next level has {unknowns} unknowns, the most are {LARGEST_LEVEL}"
+        if complaint and problem.size(degree) > LARGEST_LEVEL:
+            complaint += "; the next level would not fit into memory: a simpler outline has fewer triangles"
             break
         level = _Level(problem, degree)
         values.append(level.values())
@@ -437,8 +436,8 @@ class _Problem:
         return self._graded.copy()
 
     def size(self, degree: int) -> int:
-        """Number of unknowns of a level, about."""
-        return int((len(self._graded.triangles)) * degree**2)
+        """Entries of the matrices of a level, about."""
+        return len(self._graded.triangles) * ((degree + 1) * (degree + 2)) ** 2
 
 
 def _unfolded(mesh: CoarseMesh) -> bool:

@@ -387,7 +387,7 @@ def _axes(
     """Labels of each dimension; groups of a dataset share those that its root has."""
     used, own = dict(used), {}
     # A study kind may have labels that no beam has, such as loads of its own.
-    order = {name: dict.fromkeys(labels) for name, labels in ranks.items()}
+    order: dict[str, dict[str | float, None]] = {name: dict.fromkeys(labels) for name, labels in ranks.items()}
     for labels in further:
         for name, values in labels.items():
             if name in used:

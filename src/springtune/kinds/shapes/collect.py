@@ -9,11 +9,11 @@ from ...problem.status import Status
 from ...reference.limits import beyond_linear
 from . import plan
 from .described import named, quantity_key
-from .names import UNITS
+from .names import QUANTITY_UNITS
 from .variables import SHAPES
 
 OF_MESH = ("particles", "springs", "minimum_angle", "edge_length_spread", "mesh_seconds")
-OF_SCENE = ("status", "message", "definition_seconds", "negative_pivots")
+COPIED_OF_SCENE = ("status", "message", "definition_seconds", "negative_pivots")
 
 
 def groups(study, folder):
@@ -44,7 +44,7 @@ def _quantities(part, found):
                 "quantity_kind": one.kind,
                 "quantity_component": one.component,
                 "quantity_of": one.of,
-                "quantity_units": UNITS[one.kind],
+                "quantity_units": QUANTITY_UNITS[one.kind],
                 "expected_value": known,
                 "source": one.source,
             }
@@ -97,7 +97,7 @@ def _scene(part, one, result, references, expected, found):
         for name in ("shape", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
     }
     reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
-    values = {name: result[name] for name in OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
+    values = {name: result[name] for name in COPIED_OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
     case = part.shape[one.shape].loads[one.load]
     whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
     whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]

@@ -7,7 +7,7 @@ from typing import Any
 from ...problem.materials import AnisotropicMaterial, AnyMaterial, Material
 from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
-UNNAMED, CASE = "shape", "load"
+UNNAMED, ONE_LOAD = "shape", "load"
 """Names of a shape and of its load in tasks."""
 
 
@@ -65,7 +65,7 @@ def load(case: LoadCase) -> dict[str, Any]:
         replace(one, name=f"q{number}", expected=None, source="")
         for number, (_, one) in enumerate(sorted(quantities.items()))
     ]
-    return asdict(replace(case, name=CASE, quantities=tuple(plain)))
+    return asdict(replace(case, name=ONE_LOAD, quantities=tuple(plain)))
 
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
@@ -82,11 +82,11 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
     Returns
     -------
     Shape
-        With the load `CASE`, where there is one.
+        With the load `ONE_LOAD`, where there is one.
     """
     holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
     points = {name: _pair(point) for name, point in described["points"].items()}
-    loads = {} if case is None else {CASE: load_of(case)}
+    loads = {} if case is None else {ONE_LOAD: load_of(case)}
     file = described.get("file", "")
     return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
 
@@ -123,7 +123,7 @@ def named(message: str, shape: Shape, case: LoadCase) -> str:
     -------
     str
     """
-    names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{CASE}'": f"load '{case.name}'"}
+    names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{ONE_LOAD}'": f"load '{case.name}'"}
     order = sorted({quantity_key(one) for one in case.quantities})
     names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}
     for plain, name in names.items():

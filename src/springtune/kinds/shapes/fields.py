@@ -9,7 +9,7 @@ from ..scenes.stored_scene import PACKED, fields_key, unpacked
 from . import plan, stored
 from .variables import SHAPE_FIELDS
 
-ARRAYS = ("outline_points", "outline_displacements", "outline_lengths")
+OUTLINE_ARRAYS = ("outline_points", "outline_displacements", "outline_lengths")
 
 
 def groups(study, folder):
@@ -74,8 +74,8 @@ def _outline(part, one, folder):
     case = one.shape, one.material, one.load
     if case in part.referred:
         key = plan.reference_task(part, *case)["key"]
-        found = store.read_one(folder / "shape_references", key, ARRAYS)
+        found = store.read_one(folder / "shape_references", key, OUTLINE_ARRAYS)
         if not found["message"]:
-            points, moved, sizes = (found[name] for name in ARRAYS)
+            points, moved, sizes = (found[name] for name in OUTLINE_ARRAYS)
             return points, moved, np.repeat(np.arange(len(sizes)), sizes)
     return np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int)

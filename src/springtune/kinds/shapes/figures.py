@@ -11,7 +11,7 @@ from ...output.dataset import NO_NODE, STATUS
 from ...output.selection import choose, group
 from .outputs import DEFORMED, ERRORS, figures
 
-COLUMNS = 3
+NETWORK_COLUMNS = 3
 """Networks side by side."""
 
 MOST_NETWORKS = 6
@@ -392,7 +392,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
     width, height = _extent(case)
-    columns = min(COLUMNS, len(wanted))
+    columns = min(NETWORK_COLUMNS, len(wanted))
     page = style.COLUMN if columns == 1 else style.PAGE
     room = (page - 0.5 - 0.25 * columns) / columns
     tall = float(np.clip(room * height / width * 1.12, 0.8, 3.2))

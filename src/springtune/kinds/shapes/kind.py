@@ -17,7 +17,7 @@ from ...study.checks import FEWER, check_for_triangles, check_known, check_parti
 from ...study.expand import file_fault
 from ...study.fields import Named
 from ..base import Kind
-from .names import FILE, MADE, OWN_SIZE
+from .names import OUTLINED, OWN_FILE, OWN_SIZE
 from .outputs import OUTPUTS, stems
 from .plan import STAGES
 from .sections import ShapeConfig, ShapeGridConfig
@@ -38,7 +38,7 @@ class ShapeScene:
     shape : str
         Its name.
     mesh_type : str
-        Key of `springtune.kinds.shapes.names.MADE`, or ``"file"``.
+        Key of `springtune.kinds.shapes.names.OUTLINED`, or ``"file"``.
     mesh_size : float
         Asked length of an edge [m]; 0 where the mesh is that of a file.
     material : str
@@ -347,7 +347,11 @@ def _scenes(config):
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
-            meshes = [(FILE, OWN_SIZE)] if shape.file is not None else product(grid.mesh_type or MADE, grid.mesh_size)
+            meshes = (
+                [(OWN_FILE, OWN_SIZE)]
+                if shape.file is not None
+                else product(grid.mesh_type or OUTLINED, grid.mesh_size)
+            )
             for mesh, material, load in product(list(meshes), grid.material, grid.load or shape.loads):
                 if grid.reference:
                     referred[name, material, load] = None
@@ -362,7 +366,7 @@ def _expand(config, declared):
     found, referred = _scenes(config)
     ranks = [
         {name: rank for rank, name in enumerate(names)}
-        for names in (config.shapes, (*MADE, FILE), config.materials, DEFINITIONS, KINEMATICS)
+        for names in (config.shapes, (*OUTLINED, OWN_FILE), config.materials, DEFINITIONS, KINEMATICS)
     ]
 
     def order(one):

@@ -2,16 +2,16 @@
 
 from dataclasses import dataclass
 
-MADE = {"free": "Delaunay triangles inside of the outline"}
+OUTLINED = {"free": "Delaunay triangles inside of the outline"}
 """Mesh types of outlines, and what they are."""
 
-FILE = "file"
+OWN_FILE = "file"
 """Mesh type of a shape whose mesh is that of its file."""
 
 OWN_SIZE = 0.0
 """Label of its mesh size [m]."""
 
-AXES = ("x", "y")
+ALONG_AXES = ("x", "y")
 STRESSES = ("xx", "yy", "xy")
 """Components."""
 
@@ -47,5 +47,5 @@ KINDS_OF_QUANTITY = {
 }
 """Kinds of quantity by name, as `springtune.problem.shapes.QUANTITY_KINDS` has them."""
 
-UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
+QUANTITY_UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
 """Units of the values in the dataset."""

@@ -7,7 +7,7 @@ from ..base import Output, stem
 if TYPE_CHECKING:
     from ...study.model import Study
 
-SHOWING = "shapes"
+DRAWING = "shapes"
 """Output that is made of whole networks."""
 
 OVERVIEW = "shapes_overview"
@@ -48,7 +48,7 @@ def stems(study: "Study") -> list[str]:
 
 OUTPUTS = (
     Output(
-        SHOWING,
+        DRAWING,
         "figures of shapes: errors of their quantities, and their deformed networks (and the group `/shape_fields` "
         "behind them)",
         figures=lambda study: figures(_cases(study)),

@@ -9,25 +9,25 @@ from ...jobs.hashing import hash_of
 from ...jobs.keys import definition_key, material_key, stage_key
 from ..base import Stage
 from .described import geometry, load
-from .names import FILE
-from .outputs import SHOWING
+from .names import OWN_FILE
+from .outputs import DRAWING
 
-MOST_SHOWN = 1500
+MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
 
-USUAL_PARTICLES = 2000.0
+FILE_PARTICLES = 2000.0
 """Particles of a mesh from a file, for costs, before it is read."""
 
 
 def mesh_name(one):
     """Stem of the files of a scene's mesh, and of what is solved on it."""
-    return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == FILE else f"_{1e3 * one.mesh_size:.9g}mm")
+    return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
 
 
 def particles(part, one):
     """Number of particles of a scene's mesh, about."""
     shape = part.shape[one.shape]
-    return USUAL_PARTICLES if shape.file else shape.area / (0.866 * one.mesh_size**2)
+    return FILE_PARTICLES if shape.file else shape.area / (0.866 * one.mesh_size**2)
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -94,7 +94,7 @@ def scene_task(part, one, kept=()):
 
 def draws(study):
     """Whether a study's dataset has the networks that are drawn."""
-    return SHOWING in study.outputs
+    return DRAWING in study.outputs
 
 
 def shown(part):
@@ -108,7 +108,7 @@ def shown(part):
         cases[one.shape, one.load].append(one)
     found = set()
     for scenes in cases.values():
-        few = [one for one in scenes if particles(part, one) <= MOST_SHOWN]
+        few = [one for one in scenes if particles(part, one) <= MOST_DRAWN]
         mesh = min(few, key=_size) if few else max(scenes, key=_size)
         alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
         found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}

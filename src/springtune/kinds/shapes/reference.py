@@ -9,7 +9,7 @@ import numpy as np
 from ...jobs import store
 from ...reference.shapes import solve_shape
 from ...reference.small_strain import ReferenceNotConvergedError
-from .described import CASE, by_key, materials_of, quantity_key, shape_of
+from .described import ONE_LOAD, by_key, materials_of, quantity_key, shape_of
 from .mesh import make
 
 ALONG = 24
@@ -57,7 +57,7 @@ def _hole(why):
 def _solved(task):
     grouped = make(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
-    case = shape.loads[CASE]
+    case = shape.loads[ONE_LOAD]
     try:
         found, lacking = _converged(shape, case, materials, grouped)
     except (ReferenceNotConvergedError, ValueError) as error:  # groups that are not there, bodies that are not held

@@ -23,9 +23,9 @@ from ...study.fields import (
     one_of,
 )
 from ...study.messages import refuse, show
-from .names import AXES, KINDS_OF_QUANTITY, MADE, STRESSES
+from .names import ALONG_AXES, KINDS_OF_QUANTITY, OUTLINED, STRESSES
 
-LARGEST = 1e30
+BEYOND_MEASURE = 1e30
 """Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
 
 
@@ -51,7 +51,7 @@ def _signed(text: str, kind: str) -> float:
         value = units.parse(text, kind)
     except units.UnitError as error:
         raise refuse(str(error)) from None
-    if not abs(value) < LARGEST:
+    if not abs(value) < BEYOND_MEASURE:
         raise refuse(f"{show(text)} is beyond all measure; give one such as '{units.QUANTITY_KINDS[kind].example}'")
     return value + 0.0
 
@@ -105,8 +105,8 @@ GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the 
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
 ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape")]
 LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
-MadeType = Annotated[str, one_of("mesh type", MADE)]
-Axis = Annotated[str, one_of("component", AXES)]
+MadeType = Annotated[str, one_of("mesh type", OUTLINED)]
+Axis = Annotated[str, one_of("component", ALONG_AXES)]
 StressComponent = Annotated[str, one_of("component", STRESSES)]
 Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value with its unit")]
 
@@ -135,7 +135,7 @@ class SegmentConfig(Section):
     group: GroupName | None = Field(None, description="Group that it belongs to, for supports, loads and quantities.")
 
 
-SIDES = Words("a list of sections; see below")
+SIDE_WORDS = Words("a list of sections; see below")
 
 
 class CircleConfig(Section):
@@ -149,7 +149,7 @@ class HoleConfig(Section):
     """A hole, or what fills it: a circle, or an outline."""
 
     circle: CircleConfig | None = Field(None, description="Where it is round.")
-    outline: Annotated[list[SegmentConfig], SIDES] | None = Field(
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
         None, description="Where it is not: a round of sides, in either sense."
     )
     group: GroupName | None = Field(
@@ -307,7 +307,7 @@ class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
     thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
-    outline: Annotated[list[SegmentConfig], SIDES] | None = Field(
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
         None, description="Round of its sides, counter-clockwise."
     )
     holes: list[HoleConfig] = Field([], description="Holes, and parts of other materials.")
@@ -352,7 +352,8 @@ class ShapeGridConfig(Section):
         None, description="Lengths of an edge; not of shapes from files, whose mesh is that of the file."
     )
     mesh_type: Annotated[list[MadeType], OneOrMore()] | None = Field(
-        None, description="`free`: " + MADE["free"] + ", which it is without. Shapes from files have the type `file`."
+        None,
+        description="`free`: " + OUTLINED["free"] + ", which it is without. Shapes from files have the type `file`.",
     )
     material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
     load: Annotated[list[LoadName], OneOrMore()] | None = Field(

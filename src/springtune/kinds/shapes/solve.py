@@ -14,7 +14,7 @@ from ...scene.single import Scene
 from ...springs import DefinitionError
 from ..scenes.stored_scene import FIELD_ARRAYS, fields_key, packed
 from . import stored
-from .described import CASE, by_key, materials_of, shape_of
+from .described import ONE_LOAD, by_key, materials_of, shape_of
 
 WITHOUT_MESH = "shape without mesh"
 """What scenes are counted as that have no mesh."""
@@ -93,13 +93,13 @@ def _solved(family, grouped, task, sheets):
     shape = shape_of(family["shape"], task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
     try:
-        check_case(grouped, shape.loads[CASE])
+        check_case(grouped, shape.loads[ONE_LOAD])
     except ValueError as error:
         return _hole(str(error))
     begin, sheet = time.perf_counter(), sheets.get(shape.thickness)
     derived = sheet.deriving if sheet else 0.0
     try:
-        scene = Scene(shape, grouped, materials_of(task["materials"]), CASE, sheet=sheet, **chosen)
+        scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
         sheets[shape.thickness] = scene.sheet
         found = scene.solve()
     except DefinitionError as error:
@@ -111,7 +111,7 @@ def _solved(family, grouped, task, sheets):
         "definition_seconds": found.definition_seconds,
         "deriving": scene.sheet.deriving - derived,
         "negative_pivots": found.negative_pivots,
-        "values": by_key(found.values, shape.loads[CASE]),
+        "values": by_key(found.values, shape.loads[ONE_LOAD]),
     }
     if task.get("keep_fields") and np.isfinite(found.displacements).all():
         result |= {

@@ -9,7 +9,7 @@ from ...jobs import store
 from ...mesh import Mesh
 from ...mesh.groups import GroupedMesh
 
-CELLS = {3: "triangles", 4: "quads"}
+CORNERS = {3: "triangles", 4: "quads"}
 
 
 def packed(grouped: GroupedMesh) -> dict[str, Any]:
@@ -59,14 +59,14 @@ def read(folder: str | Path, name: str, key: str) -> GroupedMesh | str:
         return str(known["message"])
     sides, parts = known["side_names"], known["part_names"]
     names = ["points", "triangles", "quads", *(f"side_{number}" for number in range(len(sides)))]
-    names += [f"part_{number}_{count}" for number in range(len(parts)) for count in CELLS]
+    names += [f"part_{number}_{count}" for number in range(len(parts)) for count in CORNERS]
     found = store.read(path, [key], names)[key]
     return GroupedMesh(
         Mesh(found["points"], found["triangles"], found["quads"]),
         {label: found[f"side_{number}"] for number, label in enumerate(sides)},
         {label: np.array(point) for label, point in known["named_points"].items()},
         {
-            label: {count: found[f"part_{number}_{count}"] for count in CELLS if f"part_{number}_{count}" in found}
+            label: {count: found[f"part_{number}_{count}"] for count in CORNERS if f"part_{number}_{count}" in found}
             for number, label in enumerate(parts)
         },
         known["unusable"],

@@ -1,7 +1,7 @@
 """The table of shapes: each quantity of each scene beside its reference and others' numbers."""
 
 from ...output.dataset import STATUS
-from .variables import SCENE
+from .variables import SCENE_AXES
 
 
 def tables(tree):
@@ -43,7 +43,7 @@ def tables(tree):
 
 def _asked(data):
     """Labels of the scenes that were asked for."""
-    stacked = data.status.transpose(*SCENE)
-    labels = [stacked[name].values.tolist() for name in SCENE]
+    stacked = data.status.transpose(*SCENE_AXES)
+    labels = [stacked[name].values.tolist() for name in SCENE_AXES]
     for place in zip(*stacked.values.nonzero()):
-        yield {name: label[number] for name, label, number in zip(SCENE, labels, place)}
+        yield {name: label[number] for name, label, number in zip(SCENE_AXES, labels, place)}

@@ -4,24 +4,34 @@ import numpy as np
 
 from ...output.dataset import NO_NODE, Group
 
-MESH = ("shape", "mesh_type", "mesh_size")
-CASE = ("shape", "material", "load")
-SCENE = (*MESH, "material", "load", "definition", "kinematics")
+MESH_AXES = ("shape", "mesh_type", "mesh_size")
+CASE_AXES = ("shape", "material", "load")
+SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 ASKED = ("shape", "load", "quantity")
 
-MIXED = {"comment": "in SI units: quantity_units says which"}
+MIXED: dict[str, object] = {"comment": "in SI units: quantity_units says which"}
 
 SHAPES = Group(
     "/shapes",
     {
-        "value": ((*SCENE, "quantity"), "1", "quantity of interest, network", np.nan),
-        "reference_value": ((*CASE, "quantity"), "1", "quantity of interest, reference", np.nan),
-        "reference_error_estimate": ((*CASE, "quantity"), "1", "estimated relative error of the reference", np.nan),
-        "error": ((*SCENE, "quantity"), "1", "signed error, (network - reference) / |reference|", np.nan),
+        "value": ((*SCENE_AXES, "quantity"), "1", "quantity of interest, network", np.nan),
+        "reference_value": ((*CASE_AXES, "quantity"), "1", "quantity of interest, reference", np.nan),
+        "reference_error_estimate": (
+            (*CASE_AXES, "quantity"),
+            "1",
+            "estimated relative error of the reference",
+            np.nan,
+        ),
+        "error": ((*SCENE_AXES, "quantity"), "1", "signed error, (network - reference) / |reference|", np.nan),
         "expected_value": (ASKED, "1", "quantity of interest, as others give it", np.nan),
-        "expected_error": ((*SCENE, "quantity"), "1", "signed difference, (network - expected) / |expected|", np.nan),
+        "expected_error": (
+            (*SCENE_AXES, "quantity"),
+            "1",
+            "signed difference, (network - expected) / |expected|",
+            np.nan,
+        ),
         "reference_expected_error": (
-            (*CASE, "quantity"),
+            (*CASE_AXES, "quantity"),
             "1",
             "signed difference, (reference - expected) / |expected|",
             np.nan,
@@ -31,23 +41,28 @@ SHAPES = Group(
         "quantity_of": (ASKED, "1", "the group or point that it is of", ""),
         "quantity_units": (ASKED, "1", "units of its values", ""),
         "source": (ASKED, "1", "who gives the expected value", ""),
-        "status": (SCENE, "1", "what became of the scene", 0),
-        "message": (SCENE, "1", "why the scene is not solved, or what there is against its reference", ""),
-        "solve_seconds": (SCENE, "s", "time to solve the scene, networks shared", np.nan),
-        "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
-        "negative_pivots": (SCENE, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
-        "particles": (MESH, "1", "number of particles", np.nan),
-        "springs": (MESH, "1", "number of springs", np.nan),
-        "minimum_angle": (MESH, "degree", "smallest angle of all triangles", np.nan),
-        "edge_length_spread": (MESH, "1", "standard deviation of the edge lengths over their mean", np.nan),
-        "mesh_seconds": (MESH, "s", "time to make the mesh", np.nan),
-        "reference_message": (CASE, "1", "why there is no reference, or none for nonlinear kinematics", ""),
-        "reference_seconds": (CASE, "s", "time to solve the reference", np.nan),
-        "reference_unknowns": (CASE, "1", "unknowns of the finest reference", np.nan),
-        "reference_rotation": (CASE, "rad", "rotation that 95 % of the reference does not exceed", np.nan),
-        "reference_strain": (CASE, "1", "principal strain that 95 % of the reference does not exceed", np.nan),
+        "status": (SCENE_AXES, "1", "what became of the scene", 0),
+        "message": (SCENE_AXES, "1", "why the scene is not solved, or what there is against its reference", ""),
+        "solve_seconds": (SCENE_AXES, "s", "time to solve the scene, networks shared", np.nan),
+        "definition_seconds": (SCENE_AXES, "s", "time to derive the springs' parameters, shared by loads", np.nan),
+        "negative_pivots": (
+            SCENE_AXES,
+            "1",
+            "negative pivots of the tangent; 0 where the equilibrium is stable",
+            np.nan,
+        ),
+        "particles": (MESH_AXES, "1", "number of particles", np.nan),
+        "springs": (MESH_AXES, "1", "number of springs", np.nan),
+        "minimum_angle": (MESH_AXES, "degree", "smallest angle of all triangles", np.nan),
+        "edge_length_spread": (MESH_AXES, "1", "standard deviation of the edge lengths over their mean", np.nan),
+        "mesh_seconds": (MESH_AXES, "s", "time to make the mesh", np.nan),
+        "reference_message": (CASE_AXES, "1", "why there is no reference, or none for nonlinear kinematics", ""),
+        "reference_seconds": (CASE_AXES, "s", "time to solve the reference", np.nan),
+        "reference_unknowns": (CASE_AXES, "1", "unknowns of the finest reference", np.nan),
+        "reference_rotation": (CASE_AXES, "rad", "rotation that 95 % of the reference does not exceed", np.nan),
+        "reference_strain": (CASE_AXES, "1", "principal strain that 95 % of the reference does not exceed", np.nan),
         "reference_applies": (
-            (*CASE, "kinematics"),
+            (*CASE_AXES, "kinematics"),
             "1",
             "whether small strain applies to networks of these kinematics, by rotation and strain",
             -1,
