@@ -152,6 +152,16 @@ def test_points_close_to_each_other_and_to_sides_are_particles():
     assert grouped.particle("a") == grouped.particle("also") and len(grouped.mesh.points) < 500
 
 
+@pytest.mark.parametrize("distance", [1.5e-6, 2.5e-6, 1e-5])
+def test_points_at_the_limit_are_particles_or_refused(distance):
+    """What netgen takes for one point is not made one silently."""
+    square = Shape.rectangle(1, 1, points={"a": (0.5, 0.5), "b": (0.5, 0.5 + distance), "c": (0.5, 1 - distance)})
+    try:
+        check_sides(square, mesh_shape(square, 0.3))
+    except MeshError as error:
+        assert distance < 1e-5 and "too near each other" in str(error)
+
+
 def test_a_shape_far_from_the_origin_is_meshed_alike():
     far = Shape("far", 1e-3, [Segment((x + 1e4, y - 1e4), group="all") for x, y in [(0, 0), (1, 0), (1, 1), (0, 1)]])
     assert mesh_shape(far, 0.1).mesh.area == pytest.approx(1, rel=1e-9)
@@ -185,7 +195,11 @@ def test_same_shape_same_mesh_in_another_process():
         (lambda: st.mesh_shape(plate(), "5 mm", refined={"hoel": 1e-3}), "refined 'hoel': shape 'plate' has no side"),
         (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "6 mm"}), "larger than the mesh size"),
         (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "1 kN"}), "refined 'hole': '1 kN' is a force"),
-        (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "1 nm"}), "more than can be meshed"),
+        (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "1 nm"}), "less than some millionths of shape"),
+        (
+            lambda: st.mesh_shape(plate(), "5 mm", refined={"core": "2 um"}),
+            "with {'core': 2e-06} makes some 2.3e+07 part",
+        ),
         (lambda: st.mesh_shape(Shape("own", 1, file="own.msh"), "5 mm"), "that of the file own.msh; read it with"),
         (lambda: st.mesh_shape(st.Beam(1, 1), "5 mm"), "shape: Beam(length=1.0"),
     ],

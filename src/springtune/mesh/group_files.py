@@ -94,7 +94,9 @@ class _Groups:
         for name in {**lines, **points, **cells}:
             if not NAME.fullmatch(name):
                 self.unusable[name] = f"cannot be a name; {NAME_RULE}"
-            given = np.concatenate([one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]] or [[0]])
+            given = np.concatenate(
+                [one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]] or [np.zeros(1)]
+            )
             if not 0 <= given.min() <= given.max() < len(self.numbers):
                 self.unusable[name] = "has points that are not in the file; remove these"
             if name in self.unusable:

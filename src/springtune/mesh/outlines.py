@@ -175,7 +175,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
         count += part / (ROW_HEIGHT * value**2) + 4 * lengths.get(name, value) / value
     refusal = too_many(count, min([size, *refined.values()]), smaller, what)
     if refusal:
-        raise MeshError(f"mesh size: {size!r} {refusal}")
+        raise MeshError(f"mesh size: {size!r}{f' with {refined}' if refined else ''} {refusal}")
     return {"": size, **refined}
 
 
@@ -280,6 +280,7 @@ def _netgen(
     """Triangulation inside stretches, by netgen's advancing front."""
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException
+    from scipy.spatial import cKDTree
 
     # Lengths in units of the edge: netgen's own tolerances are absolute.
     unit = sizes[""]
@@ -307,31 +308,29 @@ def _netgen(
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in elements], dtype=np.int64)
     found = np.array([element.index for element in elements], dtype=np.int64)
     given = (np.array(list(numbers)) - origin) / unit
-    if (
-        len(points) < len(given)
-        or np.abs(points[: len(given)] - given).max() > 1e-9 * np.abs(given).max()
-        or not len(triangles)
-    ):
-        raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: it moves corners; give another size")
+    # Where two are near each other, netgen numbers them otherwise.
+    away, order = cKDTree(points).query(given)
+    if not len(triangles) or away.max() > 1e-9 * np.abs(given).max() or len(np.unique(order)) < len(order):
+        raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: points are too near each other; give another size")
     pieces: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for element in made.Elements1D():
         first, second = (vertex.nr - 1 for vertex in element.points)
         pieces[element.index - 1].append((first, second))
     chains, divided = [], {}
-    order = {number: i for i, number in enumerate(numbers.values())}
+    corner = dict(zip(numbers.values(), order.tolist()))
     for number in range(len(stretches)):
         following = dict(pieces[number])
-        chain = [order[joined[number][0]]]
+        chain = [corner[joined[number][0]]]
         while chain[-1] in following and len(chain) <= len(following):
             chain.append(following[chain[-1]])
-        if chain[-1] != order[joined[number][1]] or len(chain) != len(following) + 1:
+        if chain[-1] != corner[joined[number][1]] or len(chain) != len(following) + 1:
             raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: a side is not closed; give another size")
         chains.append(chain)
         if len(chain) > 2:
             start, along = points[chain[0]], points[chain[-1]] - points[chain[0]]
             divided[number] = [float((points[i] - start) @ along / (along @ along)) for i in chain[1:-1]]
     placed = points * unit + origin
-    placed[: len(given)] = list(numbers)
+    placed[order] = list(numbers)
     for number, shares in divided.items():
         stretch = stretches[number]
         for i, share in zip(chains[number][1:], shares):
