@@ -86,6 +86,25 @@ def test_lame_ring_to_a_millionth():
     np.testing.assert_allclose(found.at(r * ways), exact, rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
+def test_stress_inside():
+    """At a named point within the ring, which becomes a corner of triangles."""
+    shape, material = others.ring()
+    inside = replace(shape, points={"inside": (0.6, 0.45)}, loads={})
+    names = ("xx", "yy", "xy")
+    quantities = tuple(Quantity(component, "stress", "inside", component) for component in names)
+    load = replace(shape.loads["pressure"], quantities=quantities)
+    found = solve_shape(inside, load, material, tolerance=1e-5)
+    radial, hoop = (1e6 / 3 * (1 + sign / 0.75**2) for sign in (-1, 1))
+    across, along = 0.8, 0.6
+    exact = [
+        radial * across**2 + hoop * along**2,
+        radial * along**2 + hoop * across**2,
+        (radial - hoop) * across * along,
+    ]
+    assert [found.values[name] for name in names] == pytest.approx(exact, rel=1e-4)
+    assert found.stress_at(np.array([[0.6, 0.45]]))[0] == pytest.approx(exact, rel=1e-3)
+
+
 def test_curved_beams_of_beam_theory_and_elasticity():
     """MacNeal and Harder's curved beam beside the closed form of elasticity, which its held root disturbs little.
 

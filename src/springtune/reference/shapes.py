@@ -8,6 +8,7 @@ loads begin or end, materials meet. The error then falls exponentially (hp versi
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -17,7 +18,6 @@ from scipy.spatial import cKDTree
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.materials import Material
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
 from .limits import most_rotation_and_strain
@@ -36,11 +36,22 @@ SMALLEST_SHARE = 1e-3
 #: Force on a support at a point, over all of them, that is taken for none.
 SMALLEST_REACTION = 1e-6
 
-#: Most unknowns of a level.
-LARGEST_LEVEL = 600_000
+#: Most entries of the triangles' matrices on a level: half a gigabyte.
+LARGEST_LEVEL = 60_000_000
 
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Vectors, shape (n, 2), at points of sides and their outward normals, shape (n, 2) each."""
+
+
+class Sheet(Protocol):
+    """What a material is here: any of `springtune.problem.materials`."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def density(self) -> float | None: ...  # noqa: D102
+    @property
+    def plane_stress(self) -> np.ndarray: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +144,7 @@ class ShapeReference:
 def solve_shape(
     shape: Shape,
     load: LoadCase,
-    materials: Material | Mapping[str, Material],
+    materials: Sheet | Mapping[str, Sheet],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
 ) -> ShapeReference:
@@ -175,14 +186,14 @@ def solve_shape(
     Curves are followed by polynomials of the level's degree (isoparametric), reactions are the work of the solution on
     a unit displacement of their group, and stresses are those of the displacements, not smoothed.
     """
-    by_part = {"": materials} if isinstance(materials, Material) else dict(materials)
-    return converge(shape, load, {name: by_part[name] for name in by_part}, grouped, tolerance)
+    by_part = materials if isinstance(materials, Mapping) else {"": materials}
+    return converge(shape, load, by_part, grouped, tolerance)
 
 
 def converge(
     shape: Shape,
     load: LoadCase,
-    materials: Mapping[str, Material],
+    materials: Mapping[str, Sheet],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
     tractions: Mapping[str, Field] | None = None,
@@ -212,9 +223,8 @@ def converge(
     estimates: dict[str, float] = {}
     complaint = ""
     for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
-        unknowns = problem.size(degree)
-        if unknowns > LARGEST_LEVEL and complaint:
-            complaint += f"; the next level has {unknowns} unknowns, the most are {LARGEST_LEVEL}"
+        if complaint and problem.size(degree) > LARGEST_LEVEL:
+            complaint += "; the next level would not fit into memory: a simpler outline has fewer triangles"
             break
         level = _Level(problem, degree)
         values.append(level.values())
@@ -258,7 +268,7 @@ class _Problem:
         self,
         shape: Shape,
         load: LoadCase,
-        materials: Mapping[str, Material],
+        materials: Mapping[str, Sheet],
         grouped: GroupedMesh | None,
         tractions: Mapping[str, Field],
         displacements: Mapping[str, Field],
@@ -437,8 +447,8 @@ class _Problem:
         return self._graded.copy()
 
     def size(self, degree: int) -> int:
-        """Number of unknowns of a level, about."""
-        return int((len(self._graded.triangles)) * degree**2)
+        """Entries of the matrices of a level, about."""
+        return len(self._graded.triangles) * ((degree + 1) * (degree + 2)) ** 2
 
 
 def _unfolded(mesh: CoarseMesh) -> bool:
@@ -735,7 +745,7 @@ class _Level:
         if quantity.kind == "energy":
             return self.energy
         if quantity.kind == "area":
-            return self._area_growth()
+            return float(self._area_growth().sum())
         if quantity.kind == "stress":
             place = ("xx", "yy", "xy").index(quantity.component)
             return float(self._corner_stress(space.mesh.named[quantity.of])[place])
@@ -760,8 +770,8 @@ class _Level:
                 claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
-    def _area_growth(self) -> float:
-        """Integral of the divergence of the displacements."""
+    def _area_growth(self) -> np.ndarray:
+        """Divergence of the displacements times the areas of quadrature points [m2]."""
         space = self.space
         _, weights, _, gradients = tabulated(space.degree, 2 * space.degree)
         jacobian, determinant = space.jacobians(gradients)
@@ -769,7 +779,7 @@ class _Level:
         # The determinant cancels: cofactors of the map, with its sense.
         by_x = slopes[..., 0, 0] * jacobian[..., 1, 1] - slopes[..., 0, 1] * jacobian[..., 1, 0]
         by_y = slopes[..., 1, 1] * jacobian[..., 0, 0] - slopes[..., 1, 0] * jacobian[..., 0, 1]
-        return float(((by_x + by_y) * np.sign(determinant) * weights).sum())
+        return (by_x + by_y) * np.sign(determinant) * weights
 
     def scale(self, kind: str) -> float:
         """What is largest of a kind of quantity."""
@@ -778,7 +788,7 @@ class _Level:
         if kind == "displacement":
             return motion
         if kind == "area":
-            return motion * float(np.ptp(mesh.points, axis=0).max())
+            return float(np.abs(self._area_growth()).sum())  # what shrinks apart from what grows
         if kind == "reaction":
             points = self.residual[: len(mesh.points)]
             return float(np.abs(points[self.held[: len(mesh.points)]]).sum())
