@@ -174,6 +174,9 @@ def test_a_study_declares_all_three_forms(tmp_path):
     config = study_model(kinds()).model_validate(yaml.load(STUDY, yaml.BaseLoader))
     found = declared(config).materials
     assert found["ply"] == replace(PLY.rotated("-30 deg"), name="ply")
+    plies = yaml.load(STUDY.replace("angle: -30 deg", "angle: [0 deg, 90 deg, 90 deg, 0 deg]"), yaml.BaseLoader)
+    cross = declared(study_model(kinds()).model_validate(plies)).materials["ply"]
+    assert cross == AnisotropicMaterial.laminate([(PLY, f"{angle} deg", 1) for angle in (0, 90, 90, 0)], name="ply")
     assert found["board"] == AnisotropicMaterial(9e9, 4e9, -1.5e9, 2e9, density=600.0, name="board")
 
 

@@ -31,7 +31,7 @@ from .base import Springs, definition, membrane_stiffness, triangles_only, zero
 
 @definition("delingette", order=230, cells=(3,), anisotropic=True)
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
-    """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles, any nu, any mesh.
+    """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles of any material.
 
     Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
     """

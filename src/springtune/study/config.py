@@ -130,8 +130,8 @@ class MaterialConfig(Section):
     """A linearly elastic material, in one of three forms.
 
     Isotropic: `young_modulus` and `poisson_ratio`. Orthotropic, such as a ply of fibres: `young_modulus_x`,
-    `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, turned by `angle`. Of any anisotropy:
-    `stiffness`. Only an isotropic one can be a beam's.
+    `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, turned by `angle`, or a laminate of
+    such plies. Of any anisotropy: `stiffness`. Only an isotropic one can be a beam's.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_one_form)
@@ -146,8 +146,10 @@ class MaterialConfig(Section):
         None, description="Contraction across over extension along the fibres, pulled along them."
     )
     shear_modulus: Stress | None = Field(None, description="Shear modulus along and across the fibres.")
-    angle: Angle | None = Field(
-        None, description="By which the fibres are turned from the x axis, counter-clockwise; not at all without."
+    angle: Annotated[list[Angle], OneOrMore(repeats=True)] | None = Field(
+        None,
+        description="By which the fibres are turned from the x axis, counter-clockwise; not at all without. Several "
+        "are the plies of a laminate, of one thickness and symmetric stacking.",
     )
     stiffness: StiffnessConfig | None = Field(None, description="Its constants in plane stress.")
     density: Density | None = Field(None, description="Density rho; for dynamics, statics need none.")
@@ -178,7 +180,11 @@ class MaterialConfig(Section):
         if self.stiffness is not None:
             return AnisotropicMaterial(**self.stiffness.model_dump(), density=self.density, name=name)
         own = {key: getattr(self, key) for key in MATERIAL_FORMS[1]}
-        return AnisotropicMaterial.orthotropic(**own, angle=self.angle or 0.0, density=self.density, name=name)
+        angles = self.angle or [0.0]
+        if len(angles) == 1:
+            return AnisotropicMaterial.orthotropic(**own, angle=angles[0], density=self.density, name=name)
+        ply = AnisotropicMaterial.orthotropic(**own)
+        return AnisotropicMaterial.laminate([(ply, angle, 1.0) for angle in angles], self.density, name)
 
 
 class StatedStiffness(Section):
