@@ -13,15 +13,18 @@ An orthotropic material has, along its own axes, C16 = C26 = 0 and
           C_{12} = \nu_{xy} C_{22}, \quad C_{66} = G_{xy}, \quad \nu_{yx} = \nu_{xy} E_y / E_x.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-import numpy as np
-
 from .quantities import positive, quantity
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,8 @@ class Material:
         >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
         [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
         """
+        import numpy as np  # here: making a material needs none
+
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
@@ -184,7 +189,7 @@ class AnisotropicMaterial:
         angle: float | str = 0.0,
         density: float | str | None = None,
         name: str = "material",
-    ) -> "AnisotropicMaterial":
+    ) -> AnisotropicMaterial:
         """Material with two axes of its own, such as a ply of fibres, of its engineering constants.
 
         Parameters
@@ -240,10 +245,10 @@ class AnisotropicMaterial:
     @classmethod
     def laminate(
         cls,
-        plies: "Sequence[tuple[AnyMaterial, float | str, float | str]]",
+        plies: Sequence[tuple[AnyMaterial, float | str, float | str]],
         density: float | str | None = None,
         name: str = "laminate",
-    ) -> "AnisotropicMaterial":
+    ) -> AnisotropicMaterial:
         """Plies that are bonded to one another, as one sheet: the mean of their stiffnesses by thickness.
 
         The in-plane part A / t of classical lamination theory. It takes stackings for symmetric: others bend out of
@@ -278,6 +283,8 @@ class AnisotropicMaterial:
         >>> [f"{one.young_modulus_x / 1e9:.1f} GPa, {one.poisson_ratio_xy:.3f}" for one in constants]
         ['54.1 GPa, 0.311', '54.1 GPa, 0.311', '54.1 GPa, 0.311']
         """
+        import numpy as np  # here: making a material needs none
+
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
             if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
@@ -296,7 +303,7 @@ class AnisotropicMaterial:
     @classmethod
     def of(
         cls, stiffness: np.ndarray, density: float | str | None = None, name: str = "material"
-    ) -> "AnisotropicMaterial":
+    ) -> AnisotropicMaterial:
         """Material of a stiffness in plane stress.
 
         Parameters
@@ -322,6 +329,8 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
         500000.0
         """
+        import numpy as np  # here: making a material needs none
+
         given = np.asarray(stiffness, dtype=float)
         if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
             raise ValueError(f"stiffness: {stiffness!r} is no symmetric array of shape (3, 3); give one in Pa")
@@ -338,11 +347,13 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
         [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
         """
+        import numpy as np  # here: making a material needs none
+
         return np.array(
             [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
         )
 
-    def rotated(self, angle: float | str) -> "AnisotropicMaterial":
+    def rotated(self, angle: float | str) -> AnisotropicMaterial:
         """The material, turned counter-clockwise in the sheet.
 
         Parameters
@@ -371,7 +382,7 @@ class AnisotropicMaterial:
         turned = rotated(self.plane_stress, quantity(angle, "angle", "angle"))
         return AnisotropicMaterial.of(turned, self.density, self.name)
 
-    def constants_at(self, angle: float | str = 0.0) -> "EngineeringConstants":
+    def constants_at(self, angle: float | str = 0.0) -> EngineeringConstants:
         """Engineering constants along axes that are turned from x and y, as of a coupon cut out at that angle.
 
         Parameters
@@ -454,6 +465,8 @@ def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> Engineer
     >>> [round(one, 9) for one in found[:4]]
     [1.0, 1.0, 0.25, 0.4]
     """
+    import numpy as np  # here: making a material needs none
+
     compliance = np.linalg.inv(rotated(stiffness, -angle) if angle else stiffness)
     (along, coupled, sheared), across, shear = compliance[0].tolist(), float(compliance[1, 1]), float(compliance[2, 2])
     return EngineeringConstants(1 / along, 1 / across, -coupled / along, 1 / shear, sheared / along)
@@ -478,6 +491,8 @@ def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
     >>> rotated(along, np.pi / 4).round(6).tolist()
     [[0.25, 0.25, 0.25], [0.25, 0.25, 0.25], [0.25, 0.25, 0.25]]
     """
+    import numpy as np  # here: making a material needs none
+
     c, s = math.cos(angle), math.sin(angle)
     # Strains along the turned axes of strains along x and y; the energy is the same.
     strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
