@@ -247,6 +247,19 @@ def test_the_pressed_face_is_the_datasets(tree):
     assert {"traction", "compression", "pressure"} <= {line.get_label() for line in left.get_lines()}
 
 
+@pytest.mark.parametrize(("kinematics", "more"), [("nonlinear", 50.0), ("linear", 0.0)])
+def test_errors_of_nonlinear_networks_are_against_finite_strain(tree, kinematics, more):
+    """Where the dataset has that reference, and the title says so."""
+    data, error = tree.copy(), tree.deformation_error
+    against = (error + 0.5).expand_dims(reference=["neo-hooke-plane-stress"])
+    data["finite_strain"] = xr.DataTree(xr.Dataset({"deformation_error": against}))
+    chosen = {"mesh_type": "structured", "material": "steel", "load": "traction", "kinematics": kinematics}
+    panels, usual = plot_size(data, **chosen), plot_size(tree, **chosen)
+    label = usual[0].get_lines()[0].get_label()
+    assert drawn(panels[0], label).get_ydata() == pytest.approx(drawn(usual[0], label).get_ydata() + more)
+    assert panels[0].figure.get_suptitle().endswith("against finite strain") == (kinematics == "nonlinear")
+
+
 def test_moduli_are_of_the_finest_patch(tree):
     for panel, mesh_type in zip(plot_moduli(tree), TYPES):
         for definition in DEFINITIONS:

@@ -275,7 +275,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     >>> axes[0].get_xlabel(), axes[0].get_ylabel()
     ('Mesh size [mm]', 'Deformation error [%]')
     """
-    root = group(data, "/")
+    root = like_with_like(data)
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
@@ -292,7 +292,36 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         panel.set_xlabel("Mesh size [mm]")
         return ", ".join([labelled_beam(root, name) + part, *swept_words(_of_beam(values, name))]), *drawn
 
-    return error_panels(ax, shown, draw, ", ".join(named(selection, "mesh_type", "material", "load")), bool(values))
+    return error_panels(ax, shown, draw, compared(root, selection), bool(values))
+
+
+def like_with_like(data):
+    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+
+    Returns
+    -------
+    xarray.Dataset
+        With the attribute ``finite_strain`` where errors were exchanged.
+    """
+    root = group(data, "/")
+    finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
+    if finite is None or FINITE_STRAIN_REFERENCE not in finite.reference.values:
+        return root
+    errors = finite.deformation_error.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
+    errors = root.deformation_error.where(root.kinematics == "linear", errors).transpose(*root.deformation_error.dims)
+    return root.assign(deformation_error=errors).assign_attrs(finite_strain=True)
+
+
+def compared(root, selection):
+    """Title of a figure of errors: what it is of, and whether they are against finite strain."""
+    finite = root.attrs.get("finite_strain") and selection["kinematics"] != "linear"
+    return ", ".join(
+        [*named(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
+    )
 
 
 def error_panels(ax, shown, draw, title, swept):

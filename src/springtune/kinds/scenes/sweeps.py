@@ -4,7 +4,7 @@ from ...output import labels, style
 from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept
 from ...problem.parameters import SWEPT
 from ..base import distinct
-from .figures import USUAL, by_beam, error_line, error_panels, named, parts_of, swept_words
+from .figures import USUAL, by_beam, compared, error_line, error_panels, like_with_like, parts_of, swept_words
 from .outputs import SCENE_LABELS
 
 ALONG_X = {
@@ -92,7 +92,7 @@ def plot_sweep(
     Traceback (most recent call last):
     ValueError: parameter: 'force' is not swept; the study sweeps nothing
     """
-    root = group(data, "/")
+    root = like_with_like(data)
     swept = [name for name in SWEPT if name in root.status.dims]
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
@@ -109,7 +109,7 @@ def plot_sweep(
         panel.set_xlabel(ALONG_X[parameter][0])
         return here.attrs["words"], *drawn
 
-    return error_panels(ax, shown, draw, ", ".join(named(selection, "mesh_type", "material", "load")), True)
+    return error_panels(ax, shown, draw, compared(root, selection), True)
 
 
 def _most(present, parameter):
