@@ -29,7 +29,9 @@ isosceles triangles of base a and height h, whatever their springs are, ``C2222 
 isotropic. In rows of h = a, as free meshes of 5 mm have in 20 mm, it is 4: one of the two is off by 1/7 or more, and no
 fit of springs that repeat repairs it. Derived here.
 
-Assumptions: triangles, in one part.
+Kind of tests, lambda and steps are chosen, not derived: by what they give on the beams and shapes of
+docs/which-definition.md, which also names where they fail, in curved beams above all. Assumptions: triangles, in one
+part.
 """
 
 from collections.abc import Iterator
