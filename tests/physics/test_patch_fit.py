@@ -190,7 +190,10 @@ def test_less_than_half_of_the_error_of_lattice_on_scattered_points(load):
 
 @pytest.mark.parametrize(("name", "size", "bound"), [("cook", 1.0, 0.005), ("hole", 2.4, 0.01), ("curved", 1.4, 0.01)])
 def test_shapes_of_two_thousand_particles(name, size, bound):
-    """Measured: -.2, -.6 and -.5 %; the springs it starts from err by -.7, -1.6 and -2.3 %."""
+    """Measured: -.2, -.6 and -.5 %; the springs it starts from err by -.7, -1.6 and -2.3 %.
+
+    The ring is pushed along the normal of its end. Along its radius it errs by -3.3 %, `lattice` by -1.2 %.
+    """
     mesh = shape(name, size)
     assert 1700 < len(mesh.points) < 2200
     found, start = (error(name, mesh, DEFINITIONS[key].springs(mesh, UNIT, 1.0)) for key in ("patch-fit", "van-gelder"))
