@@ -405,6 +405,17 @@ def test_points_that_are_held():
         solve_shape(shape, sideways, even)
 
 
+def test_a_stress_that_does_not_converge():
+    """At the end of a clamp; the refusal names quantity, level and what is there."""
+    stress = Quantity("root", "stress", "corner", "xx")
+    shape, load = square((stress,), points={"corner": (0.0, 1.0)}, tractions=(Traction("right", (1.0, 0.0)),))
+    message = (
+        "'root' of 'corner': relative error estimate .* at degree 10 .*angle of 90 degrees: the stress there may be"
+    )
+    with pytest.raises(ReferenceNotConvergedError, match=message):
+        solve_shape(shape, load, Material(1.0, 0.3))
+
+
 def test_refusals():
     end = Quantity("end", "displacement", "right", "x")
     pull = (Traction("right", (1.0, 0.0)),)

@@ -270,8 +270,8 @@ class _Problem:
             raise ValueError(f"shape {shape.name!r} has no outline; give the mesh of its file")
         held = [support.group for support in load.supports]
         used = {*held, *(traction.group for traction in load.tractions)} & set(self.points)
-        # Small triangles where a stress is asked for: it is the last to converge.
-        probed = {quantity.of for quantity in load.quantities if quantity.kind == "stress"} & set(self.points)
+        # Small triangles where something is asked for: values at points are the last to converge.
+        probed = {quantity.of for quantity in load.quantities} & set(self.points)
         corners = {name: tuple(self.points[name]) for name in sorted(used | probed)}
         turn = LARGEST_TURN
         for _ in range(5):
@@ -347,7 +347,6 @@ class _Problem:
         for name in used:
             what = "a force acts on a point" if name in at_points else "a point is held"
             self.corners[self.mesh.named[name]] = Corner(what)
-        # Small triangles where a stress is asked for, too.
         self._rough = rough | {self.mesh.named[name] for name in used | probed}
         self.loaded_points = at_points
         self.infinite_energy = bool(at_points)
@@ -426,7 +425,8 @@ class _Problem:
         corner = self.corners.get(self.mesh.named.get(quantity.of, -1))
         if corner is None or quantity.kind == "reaction":
             return ""
-        return f"; {quantity.of!r} is where {corner.what}, and the {quantity.kind} there may be infinite"
+        then = "the stress there may be infinite" if quantity.kind == "stress" else "the solution is not smooth there"
+        return f"; {quantity.of!r} is where {corner.what}: {then}"
 
     def graded(self, layers: int) -> CoarseMesh:
         """The mesh with so many layers at its corners; asked for in rising order."""
