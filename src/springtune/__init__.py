@@ -48,8 +48,9 @@ _NAMES = {
     "problem.shapes": ("Hole", "LoadCase", "Pressure", "Quantity", "Segment", "Shape", "Support", "Traction"),
     "problem.status": ("Status",),
     "scene.curve": ("Curve", "sensitivity"),
-    "scene.meshes": ("make_mesh", "mesh_shape", "read_mesh"),
+    "scene.meshes": ("make_mesh", "read_mesh"),
     "scene.moduli": ("Moduli", "moduli"),
+    "scene.shape_meshes": ("mesh_shape", "read_shape"),
     "scene.single": ("Result", "Scene"),
     "springs": ("DEFINITIONS", "Definition", "DefinitionError", "Springs", "definition"),
     "study.messages": ("StudyError",),
@@ -127,6 +128,7 @@ __all__ = [
     "plot_sweep",
     "predict",
     "read_mesh",
+    "read_shape",
     "sensitivity",
 ]
 

@@ -24,7 +24,17 @@ from springtune.handover.formats import ENDINGS
 from springtune.kinds import kinds, load_study
 from springtune.kinds.scenes.summary import summary
 from springtune.mechanics.moduli import axial_moduli
-from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas
+from springtune.mesh import (
+    MESH_TYPES,
+    MeshError,
+    corner_angles,
+    mesh_shape,
+    read_beam_mesh,
+    read_shape,
+    signed_areas,
+    write_mesh,
+)
+from springtune.mesh.sheets import sheet_fault
 from springtune.output import reading
 from springtune.output.comparison import compare
 from springtune.output.dataset import write
@@ -232,6 +242,54 @@ def read_mesh(path):
     return "accepted"
 
 
+@cache
+def _shape_files():
+    """Contents of good files of a shape with groups, with their endings."""
+    found = []
+    hole = st.Hole.circle((0.05, 0.01), 0.004, part="core")
+    shape = st.Shape.rectangle(*BOX, holes=[hole], points={"tip": (0.1, 0.013), "in": (0.02, 0.013)})
+    grouped = mesh_shape(shape, 8e-3)
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+        for ending in ("vtu", "msh"):
+            write_mesh(Path(folder) / f"shape.{ending}", grouped)
+        content = meshio.read(Path(folder) / "shape.msh")
+        content.write(Path(folder) / "text.msh", file_format="gmsh22", binary=False)
+        points = {name: np.unique(edges) for name, edges in grouped.sides.items()}
+        cells = {"core": [np.flatnonzero(grouped.parts["core"][3])]}
+        blocks = [("triangle", grouped.mesh.triangles)]
+        meshio.Mesh(grouped.mesh.points, blocks, point_sets=points, cell_sets=cells).write(Path(folder) / "shape.inp")
+        for path in sorted(Path(folder).iterdir()):
+            found.append((path.suffix, path.read_bytes()))
+    return found
+
+
+def shape_files(random, folder):
+    if random.random() < 0.4:
+        return mesh_structure(random, folder)
+    ending, content = random.choice(_shape_files())
+    path = folder / f"shape{ending}"
+    words = (*NUMBERS, "core", "left", "lower", '""', "NSET", "part")
+    path.write_bytes(spoil_bytes(random, content, words))
+    return path
+
+
+def read_shape_file(path):
+    """Read a mesh file with groups; what is accepted is a sheet, whose groups are on its outline."""
+    try:
+        grouped = read_shape(path)
+    except MeshError as error:
+        raise Refused(str(error)) from None
+    outline = {tuple(edge) for edge in grouped.mesh.edges[grouped.mesh.on_outline].tolist()}
+    if sheet_fault(grouped.mesh):
+        raise Wrong("is accepted and no sheet")
+    for name, edges in grouped.sides.items():
+        if not len(edges) or not {tuple(sorted(edge)) for edge in edges.tolist()} <= outline:
+            raise Wrong(f"has a group {name!r} that is not on the outline")
+    if any(why.count(";") < 1 for why in grouped.unusable.values()):
+        raise Wrong(f"says no remedy: {grouped.unusable}")
+    return "accepted"
+
+
 # -- datasets ----------------------------------------------------------------------------------------------------------
 
 
@@ -360,8 +418,9 @@ def read_net(path):
 TARGETS = (
     Target("studies as bytes", study_bytes, read_study, 32),
     Target("studies by structure", study_trees, read_study, 17),
-    Target("mesh files as bytes", mesh_bytes, read_mesh, 18),
-    Target("mesh files by structure", mesh_structure, read_mesh, 18),
+    Target("mesh files as bytes", mesh_bytes, read_mesh, 14),
+    Target("mesh files by structure", mesh_structure, read_mesh, 14),
+    Target("files of shapes", shape_files, read_shape_file, 8),
     Target("datasets as bytes", dataset_bytes, read_dataset, 7),
     Target("datasets by structure", dataset_structure, read_dataset, 4),
     Target("nets as bytes", net_bytes, read_net, 4),

@@ -18,6 +18,7 @@ Examples
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh
 from .free import free
+from .group_files import read_shape
 from .groups import GroupedMesh
 from .outlines import mesh_shape
 from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
@@ -42,6 +43,7 @@ __all__ = [
     "quality",
     "read_beam_mesh",
     "read_mesh",
+    "read_shape",
     "right",
     "row_height",
     "signed_areas",

@@ -9,11 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from .box import DIGITS, box_fault, in_words, on_sides
+from .box import box_fault, on_sides
 from .cells import Mesh, MeshError, no_cells, signed_areas
+from .groups import GroupedMesh
+from .sheets import DIGITS, in_words
 
 CELLS = {"triangle": 3, "quad": 4}
 """Corners of the cells that can be read, by meshio's name."""
+
+CELL_DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
+"""Of cells that are read and of those that make groups, by meshio's name."""
+
+PART_NUMBERS = "part"
+"""Cell data whose whole numbers are parts of the body; 0 is the main one."""
+
+PHYSICAL = "gmsh:physical"
+"""Cell data in which meshio gives numbers of Gmsh's physical groups; 0 is none."""
 
 LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
@@ -34,35 +45,87 @@ LONGEST_SAID = 120
 """Most characters of what meshio says that are shown."""
 
 
-def write_mesh(path: str | Path, mesh: Mesh) -> None:
-    """Write a mesh; the file appears whole or not at all.
+def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
+    """Write a mesh, with its groups if it has some; the file appears whole or not at all.
+
+    Sides become lines and points vertices. In ``.vtu``, cell data of zeros and ones mark the cells of each group; in
+    ``.msh``, format 2.2 of Gmsh, groups are physical ones. `springtune.read_shape` reads both.
 
     Parameters
     ----------
     path : str or Path
-        File to write, ending in ``.vtu``.
-    mesh : Mesh
+        File to write, ending in ``.vtu``, or of a `GroupedMesh` in ``.msh``.
+    mesh : Mesh or GroupedMesh
 
     Raises
     ------
     MeshError
-        If the name has another ending, or `mesh` is none.
+        If the name has another ending, `mesh` is none, or the format cannot hold the name of a group.
     """
-    if not isinstance(mesh, Mesh):
+    if not isinstance(mesh, Mesh | GroupedMesh):
         raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
-    if Path(path).suffix != ".vtu":
-        raise MeshError(f"{path}: is not to end in '{Path(path).suffix}'; give a name that ends in .vtu")
+    kinds = {".vtu": "vtu", **({".msh": "gmsh22"} if isinstance(mesh, GroupedMesh) else {})}
+    ending = Path(path).suffix
+    if ending not in kinds:
+        raise MeshError(f"{path}: is not to end in '{ending}'; give a name that ends in {' or '.join(kinds)}")
     import meshio
 
-    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
-    cells = [(name, mesh.cells[count]) for name, count in CELLS.items() if count in mesh.cells]
+    grouped = mesh if isinstance(mesh, GroupedMesh) else GroupedMesh(mesh)
+    mesh = grouped.mesh
+    # A named point that is no particle becomes a point of its own.
+    places: list[np.ndarray] = []
+    blocks: list[tuple[str, np.ndarray, list[str]]] = []
+    for name, count in CELLS.items():
+        if count in mesh.cells:
+            inside = {part: masks[count] for part, masks in grouped.parts.items() if count in masks}
+            rest = ~np.any([*inside.values(), np.zeros(len(mesh.cells[count]), dtype=bool)], axis=0)
+            blocks += [
+                (name, mesh.cells[count][mask], [part] * bool(part))
+                for part, mask in {"": rest, **inside}.items()
+                if mask.any()
+            ]
+    blocks += [("line", edges, [side]) for side, edges in grouped.sides.items()]
+    for point, place in grouped.points.items():
+        number = grouped.particle(point)
+        if number is None:
+            number = len(mesh.points) + len(places)
+            places.append(np.asarray(place))
+        blocks.append(("vertex", np.array([[number]]), [point]))
+    points = np.concatenate([mesh.points, np.reshape(places, (-1, 2))])
+    points = np.column_stack([points, np.zeros(len(points))])
     unfinished = f"{path}.{os.getpid()}.unfinished"
+    data, fields = (_vtu_marks if ending == ".vtu" else _gmsh_tags)(path, blocks)
     try:
-        meshio.Mesh(points, cells).write(unfinished, file_format="vtu")
+        cells = [(kind, corners) for kind, corners, _ in blocks]
+        meshio.Mesh(points, cells, cell_data=data, field_data=fields).write(unfinished, file_format=kinds[ending])
         os.replace(unfinished, path)
     except BaseException:
         Path(unfinished).unlink(missing_ok=True)
         raise
+
+
+def _vtu_marks(
+    path: str | Path, blocks: list[tuple[str, np.ndarray, list[str]]]
+) -> tuple[dict[str, list[np.ndarray]], dict[str, np.ndarray]]:
+    """Cell data of zeros and ones by group, and no field data."""
+    names = dict.fromkeys(name for *_, names in blocks for name in names)
+    if PART_NUMBERS in names:
+        raise MeshError(f"{path}: a group is named '{PART_NUMBERS}', by which VTU files number parts; rename it")
+    return {name: [np.full(len(corners), name in of, dtype=np.int8) for _, corners, of in blocks] for name in names}, {}
+
+
+def _gmsh_tags(
+    path: str | Path, blocks: list[tuple[str, np.ndarray, list[str]]]
+) -> tuple[dict[str, list[np.ndarray]], dict[str, np.ndarray]]:
+    """Numbers of physical groups, and their names."""
+    fields: dict[str, np.ndarray] = {}
+    tags = []
+    for kind, corners, names in blocks:
+        for name in names:
+            if fields.setdefault(name, np.array([len(fields) + 1, CELL_DIMENSIONS[kind]]))[1] != CELL_DIMENSIONS[kind]:
+                raise MeshError(f"{path}: '{name}' names groups of two kinds, and Gmsh's are of one; write .vtu")
+        tags.append(np.full(len(corners), fields[names[0]][0] if names else 0))
+    return {PHYSICAL: tags, "gmsh:geometrical": tags}, fields
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
@@ -87,17 +150,43 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
         these, cells of points that it does not have, points that are nowhere or not in one plane, or cells without
         area.
     """
-    content = _content(path)
+    return assembled(path, file_content(path), unit)[0]
+
+
+def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
+    """Mesh of what meshio read, as of `read_mesh`.
+
+    Parameters
+    ----------
+    path : str or Path
+        For messages.
+    content : meshio.Mesh
+        See `file_content`.
+    unit : float
+        Of the coordinates [m].
+
+    Returns
+    -------
+    mesh : Mesh
+        Cells of each number of corners in the order of the file.
+    used : ndarray of int, shape (n_points,)
+        Numbers of its particles in the file.
+
+    Raises
+    ------
+    MeshError
+        As of `read_mesh`.
+    """
     cells = _read_cells(path, content)
     used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
     with np.errstate(over="ignore"):  # what is too far away is refused
-        points = _read_points(path, unit * _coordinates(path, content), used)
+        points = _read_points(path, unit * coordinates(path, content), used)
     start = 0
     for count, corners in cells.items():
         corners = numbers[start : start + corners.size].reshape(corners.shape)
         start += corners.size
         cells[count] = _counter_clockwise(path, points, corners)
-    return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4)))
+    return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
 
 
 def _is_the_machines(error: BaseException) -> bool:
@@ -111,8 +200,8 @@ def _is_the_machines(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno is not None
 
 
-def _content(path: str | Path) -> Any:
-    """What meshio reads from a file."""
+def file_content(path: str | Path) -> Any:
+    """What meshio reads from a file; a MeshError says why it does not."""
     try:
         size = Path(path).stat().st_size if Path(path).is_file() else -1
     except (OSError, ValueError):  # a name that no file can have
@@ -147,12 +236,14 @@ def _content(path: str | Path) -> Any:
             said = said or type(error).__name__
         shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
         why = f"it is damaged, or not what its name says{shown}; write it again"
+        if PHYSICAL in said:
+            why = f"some of its elements are in no physical group{shown}; give all of them one, or write format 2.2"
         if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
             why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
         raise MeshError(f"{path}: meshio cannot read it: {why}") from None
 
 
-def _coordinates(path: str | Path, content: Any) -> np.ndarray:
+def coordinates(path: str | Path, content: Any) -> np.ndarray:
     """Coordinates of all points, shape (n_points, 2 or 3)."""
     try:
         points = np.asarray(content.points, dtype=float)

@@ -22,6 +22,8 @@ class GroupedMesh:
     parts : mapping of str to dict of int to ndarray of bool, shape (n_cells,), optional
         Cells by part and number of corners, as in `Mesh.cells`; each cell is in at most one. Cells that are in none are
         the body's main part, ``""``.
+    unusable : mapping of str to str, optional
+        Groups of a file that can be none here, and why, as in ``"is not on the outline: ..."``.
 
     Examples
     --------
@@ -37,3 +39,54 @@ class GroupedMesh:
     sides: Mapping[str, np.ndarray] = field(default_factory=dict)
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
     parts: Mapping[str, Mapping[int, np.ndarray]] = field(default_factory=dict)
+    unusable: Mapping[str, str] = field(default_factory=dict)
+
+    def particle(self, name: str) -> int | None:
+        """Particle at a named point.
+
+        Parameters
+        ----------
+        name : str
+            Key of `points`.
+
+        Returns
+        -------
+        int or None
+            None where none is within rounding.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> plate = st.Shape.rectangle("100 mm", "40 mm", points={"corner": ("100 mm", "40 mm")})
+        >>> grouped = st.mesh_shape(plate, "10 mm")
+        >>> grouped.mesh.points[grouped.particle("corner")].tolist()
+        [0.1, 0.04]
+        """
+        distances = np.linalg.norm(self.mesh.points - self.points[name], axis=1)
+        nearest = int(np.argmin(distances))
+        return nearest if distances[nearest] <= 1e-9 * np.ptp(self.mesh.points, axis=0).max() else None
+
+    def particles(self, name: str) -> np.ndarray:
+        """Particles of a group.
+
+        Parameters
+        ----------
+        name : str
+            Key of `sides` or `points`.
+
+        Returns
+        -------
+        ndarray of int
+            Sorted, each once; none of a point at which there is none.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "10 mm")
+        >>> grouped.mesh.points[grouped.particles("right"), 1].round(6).tolist()
+        [0.0, 0.01, 0.02, 0.03, 0.04]
+        """
+        if name in self.sides:
+            return np.unique(self.sides[name])
+        number = self.particle(name)
+        return np.array([] if number is None else [number], dtype=np.int64)

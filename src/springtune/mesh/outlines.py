@@ -12,6 +12,7 @@ import numpy as np
 from .cells import Mesh, MeshError, signed_areas
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
+from .sheets import nearer
 from .types import too_many
 
 Point = tuple[float, float]
@@ -20,8 +21,14 @@ Point = tuple[float, float]
 LEAST_AROUND = 6
 """Fewest edges of a full turn of an arc: a small hole stays one."""
 
+FINEST = 4e-6
+"""Least mesh size over the extent of a shape: netgen takes points for one that are a millionth apart."""
+
 GRADING = 0.3
 """How much longer edges get over the distance from shorter ones, at most: netgen's."""
+
+EDGES_A_LINE = 0.6
+"""Length of a line over the mesh size that netgen takes it for, at least: 1 would divide edges next to shorter ones."""
 
 MOST_ROUNDS = 20
 """Most times that a mesh is made anew because netgen divided edges of arcs."""
@@ -36,8 +43,10 @@ class OutlineSide(Protocol):
     def arc(self) -> tuple[float, float, float, float] | None: ...  # noqa: D102
     def at(self, parameter: float) -> Point: ...  # noqa: D102
     def length_to(self, parameter: float) -> float: ...  # noqa: D102
+    def aside(self, low: float, high: float) -> float: ...  # noqa: D102
     def divided(self, count: int, low: float, high: float) -> list[float]: ...  # noqa: D102
     def nearest(self, point: Point) -> tuple[float, float]: ...  # noqa: D102
+    def parameter_near(self, point: Point, distance: float) -> float | None: ...  # noqa: D102
 
 
 class Round(Protocol):
@@ -49,6 +58,8 @@ class Round(Protocol):
     def inner(self) -> str | None: ...  # noqa: D102
     @property
     def outer(self) -> str | None: ...  # noqa: D102
+    @property
+    def around(self) -> int | None: ...  # noqa: D102
     @property
     def area(self) -> float: ...  # noqa: D102
     def winds_about(self, point: Point) -> bool: ...  # noqa: D102
@@ -116,12 +127,12 @@ def mesh_shape(
     if mesh_type != "free":
         raise MeshError(f"mesh type: {mesh_type!r} fills rectangles, and {what} has an outline of its own; give 'free'")
     sizes = _sizes(shape, size, dict(refined or {}), what)
-    stretches, inner_points = _divided(shape, sizes)
+    stretches, lines, fine = _divided(shape, sizes)
     (left, low), _ = shape.extent
     origin = np.array([left, low])
     regions = [one.inner for one in shape.rounds]
     for _ in range(MOST_ROUNDS):
-        made = _netgen(stretches, inner_points, sizes, regions, origin, what)
+        made = _netgen(stretches, lines, fine, sizes, regions, origin, what)
         arcs_divided = [n for n, found in made.divided.items() if stretches[n].side.arc]
         if not arcs_divided:
             break
@@ -151,6 +162,8 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
         if name and name not in known:
             there = ", ".join(sorted(map(str, known))) or "none"
             raise MeshError(f"{told}: {what} has no side, point or part of that name; known: {there}")
+        if name and value < FINEST * max(right - left, high - low):
+            raise MeshError(f"{told}: {value!r} is less than some millionths of {what}; give more")
         if value > size:
             raise MeshError(f"{told}: {value!r} is larger than the mesh size, {size!r}; give at most that")
     smaller = min(right - left, high - low)
@@ -162,37 +175,33 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
         count += part / (ROW_HEIGHT * value**2) + 4 * lengths.get(name, value) / value
     refusal = too_many(count, min([size, *refined.values()]), smaller, what)
     if refusal:
-        raise MeshError(f"mesh size: {size!r} {refusal}")
+        raise MeshError(f"mesh size: {size!r}{f' with {refined}' if refined else ''} {refusal}")
     return {"": size, **refined}
 
 
 def _divided(
     shape: Outlined, sizes: Mapping[str, float]
-) -> tuple[list[_Stretch], list[tuple[Point, Point, float, int]]]:
-    """Stretches of the outlines, one for each edge, and lines through points that are on none."""
+) -> tuple[list[_Stretch], list[tuple[Point, Point, int]], dict[Point, float]]:
+    """Stretches of the outlines, one for each edge; lines from points on none; and sizes at all named points."""
     (left, low), (right, high) = shape.extent
     small = 1e-9 * max(right - left, high - low)
     inside = dict(shape.points)
     stretches = []
-    areas = [one.area for one in shape.rounds]
+    fine: dict[Point, float] = {}
     for number, one in enumerate(shape.rounds):
-        # What is around a round is the smallest one that winds about it.
-        outer = 0
-        if one.outer is not None:
-            around = [
-                i for i, other in enumerate(shape.rounds) if i != number and other.winds_about(one.sides[0].at(0.0))
-            ]
-            outer = 1 + min(around, key=areas.__getitem__)
+        outer = 0 if one.around is None else 1 + one.around
         inner = 0 if one.inner is None else 1 + number
         for side in one.sides:
             cuts = {0.0, 1.0}
             size = min(sizes.get(name, sizes[""]) for name in (side.group, one.inner or "", one.outer or ""))
             for name, point in shape.points.items():
-                parameter, distance = side.nearest(point)
-                if distance <= small:
+                parameter = side.parameter_near(point, small)
+                if parameter is not None:
                     inside.pop(name, None)
-                    if min(math.dist(point, side.at(end)) for end in (0.0, 1.0)) > small:
-                        cuts.add(parameter)
+                    parameter = next((end for end in (0.0, 1.0) if math.dist(point, side.at(end)) <= small), parameter)
+                    cuts.add(parameter)
+                    place = side.at(parameter)
+                    fine[place] = min(sizes.get(name, size), fine.get(place, size))
             places = sorted(cuts)
             for begin, end in zip(places, places[1:]):
                 # A hair less: a side of exactly n edges shall not be split into n + 1 by rounding.
@@ -202,36 +211,49 @@ def _divided(
                     count = max(count, math.ceil(LEAST_AROUND * turn / (2 * math.pi) * (1 - 1e-9)))
                 ends = side.divided(max(count, 1), begin, end)
                 stretches += [_Stretch(side, *pair, inner, outer) for pair in zip(ends, ends[1:])]
-    return stretches, _lines(shape, inside, sizes, areas)
+    fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
+    return _apart(stretches, shape.name), _lines(shape, {point: fine[point] for point in inside.values()}), fine
 
 
-def _lines(
-    shape: Outlined, points: Mapping[str, Point], sizes: Mapping[str, float], areas: Sequence[float]
-) -> list[tuple[Point, Point, float, int]]:
-    """A line of one edge from each point inside the body, in its region: only lines make netgen place a particle."""
+def _apart(stretches: list[_Stretch], name: str) -> list[_Stretch]:
+    """Stretches of arcs halved until their chords are well apart from other ones: walls may be thin."""
+    for _ in range(MOST_ROUNDS):
+        numbers: dict[Point, int] = {}
+        edges = np.array([[numbers.setdefault(one.side.at(end), len(numbers)) for end in (one.low, one.high)]
+                          for one in stretches])  # fmt: skip
+        aside = np.array([one.side.aside(one.low, one.high) for one in stretches])
+        one, other, _ = nearer(np.array(list(numbers)), edges, 3 * aside)
+        halved = {*one[aside[one] > 0].tolist(), *other[aside[other] > 0].tolist()}
+        if not halved:
+            return stretches
+        found = []
+        for number, stretch in enumerate(stretches):
+            ends = stretch.side.divided(2 if number in halved else 1, stretch.low, stretch.high)
+            found += [_Stretch(stretch.side, *pair, stretch.inner, stretch.outer) for pair in zip(ends, ends[1:])]
+        stretches = found
+    raise MeshError(f"shape '{name}': arcs are too near to others to be meshed; keep them apart")
+
+
+def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, Point, int]]:
+    """Lines of one edge from points inside the body, and their regions: netgen places particles on lines only."""
     sides = [side for one in shape.rounds for side in one.sides]
     found = []
-    for name, point in points.items():
-        others = [0.5 * math.dist(point, other) for key, other in points.items() if key != name]
-        clear = min([side.nearest(point)[1] for side in sides] + others)
-        size = sizes.get(name, sizes[""])
-        length = min(size, clear)
-        # The way on which there is most room.
-        ends = [(point[0] + length * math.cos(angle), point[1] + length * math.sin(angle))
-                for angle in (math.pi / 6 * i for i in range(12))]  # fmt: skip
-        room = [
-            min(
-                [side.nearest(end)[1] for side in sides]
-                + [0.5 * math.dist(end, other) for key, other in points.items() if key != name]
-            )
-            for end in ends
-        ]
-        best = max(range(12), key=lambda i: (room[i] > 0.5 * length, -i) if max(room) > 0.5 * length else (room[i], -i))
-        end = ends[best]
-        if room[best] < 0.25 * length:
-            end = point[0] + 0.5 * (end[0] - point[0]), point[1] + 0.5 * (end[1] - point[1])
+    for point, size in points.items():
+        others = [other for other in points if other != point]
+
+        def room(place: Point, others: list[Point] = others) -> float:
+            """Distance to the next side, or half of that to the next other point, whose line is shorter [m]."""
+            return min([side.nearest(place)[1] for side in sides] + [0.5 * math.dist(place, one) for one in others])
+
+        # Halved until an end has room around it; a circle of this radius has nothing in it.
+        length, end = 2 * min(size, room(point)), point
+        while room(end) < 0.5 * length or end == point:
+            length *= 0.5
+            ways = [(length * math.cos(turn), length * math.sin(turn)) for turn in (i * math.pi / 6 for i in range(12))]
+            ends = [(point[0] + x, point[1] + y) for x, y in ways]
+            end = max(ends, key=room)
         around = [i for i, one in enumerate(shape.rounds) if one.winds_about(point)]
-        found.append((point, end, size, 1 + min(around, key=areas.__getitem__)))
+        found.append((point, end, 1 + min(around, key=lambda i: shape.rounds[i].area)))
     return found
 
 
@@ -248,7 +270,8 @@ class _Made:
 
 def _netgen(
     stretches: Sequence[_Stretch],
-    lines: Sequence[tuple[Point, Point, float, int]],
+    lines: Sequence[tuple[Point, Point, int]],
+    fine: Mapping[Point, float],
     sizes: Mapping[str, float],
     regions: Sequence[str | None],
     origin: np.ndarray,
@@ -257,29 +280,27 @@ def _netgen(
     """Triangulation inside stretches, by netgen's advancing front."""
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException
+    from scipy.spatial import cKDTree
 
     # Lengths in units of the edge: netgen's own tolerances are absolute.
     unit = sizes[""]
     outline = SplineGeometry()
-    corners = [stretch.side.at(stretch.low) for stretch in stretches]
+    pairs = [(stretch.side.at(stretch.low), stretch.side.at(stretch.high)) for stretch in stretches]
+    pairs += [(start, end) for start, end, _ in lines]
     numbers: dict[Point, int] = {}
-    ends = [stretch.side.at(stretch.high) for stretch in stretches]
-    lines_ends = [(start, end) for start, end, _, _ in lines]
-    pairs = [*zip(corners, ends), *lines_ends]
-    fine = {start: size for start, _, size, _ in lines}
     for point in (point for pair in pairs for point in pair):
         if point not in numbers:
             x, y = (np.array(point) - origin) / unit
             numbers[point] = outline.AppendPoint(x, y, maxh=fine.get(point, unit) / unit)
     joined = [(numbers[start], numbers[end]) for start, end in pairs]
-    domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for *_, region in lines]
+    domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for _, _, region in lines]
     for number, ((start, end), (inner, outer)) in enumerate(zip(joined, domains)):
         outline.Append(["line", start, end], leftdomain=inner, rightdomain=outer, bc=number + 1)
     for number, region in enumerate(regions):
         if region and region in sizes:
             outline.SetDomainMaxH(number + 1, sizes[region] / unit)
     try:
-        made = outline.GenerateMesh(maxh=1.0 + 1e-9, grading=GRADING)
+        made = outline.GenerateMesh(maxh=1.0 + 1e-9, grading=GRADING, segmentsperedge=EDGES_A_LINE)
     except NgException as error:
         raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: {error}; give another size") from None
     points = np.array([point.p for point in made.Points()])[:, :2]
@@ -287,38 +308,46 @@ def _netgen(
     triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in elements], dtype=np.int64)
     found = np.array([element.index for element in elements], dtype=np.int64)
     given = (np.array(list(numbers)) - origin) / unit
-    if (
-        len(points) < len(given)
-        or np.abs(points[: len(given)] - given).max() > 1e-9 * np.abs(given).max()
-        or not len(triangles)
-    ):
-        raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: it moves corners; give another size")
+    # Where two are near each other, netgen numbers them otherwise.
+    away, order = cKDTree(points).query(given)
+    if not len(triangles) or away.max() > 1e-9 * np.abs(given).max() or len(np.unique(order)) < len(order):
+        raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: points are too near each other; give another size")
     pieces: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for element in made.Elements1D():
         first, second = (vertex.nr - 1 for vertex in element.points)
         pieces[element.index - 1].append((first, second))
     chains, divided = [], {}
-    order = {number: i for i, number in enumerate(numbers.values())}
+    corner = dict(zip(numbers.values(), order.tolist()))
     for number in range(len(stretches)):
         following = dict(pieces[number])
-        chain = [order[joined[number][0]]]
+        chain = [corner[joined[number][0]]]
         while chain[-1] in following and len(chain) <= len(following):
             chain.append(following[chain[-1]])
-        if chain[-1] != order[joined[number][1]] or len(chain) != len(following) + 1:
+        if chain[-1] != corner[joined[number][1]] or len(chain) != len(following) + 1:
             raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: a side is not closed; give another size")
         chains.append(chain)
         if len(chain) > 2:
             start, along = points[chain[0]], points[chain[-1]] - points[chain[0]]
             divided[number] = [float((points[i] - start) @ along / (along @ along)) for i in chain[1:-1]]
     placed = points * unit + origin
-    placed[: len(given)] = list(numbers)
+    placed[order] = list(numbers)
     for number, shares in divided.items():
         stretch = stretches[number]
         for i, share in zip(chains[number][1:], shares):
             placed[i] = stretch.side.at(stretch.low + share * (stretch.high - stretch.low))
-    inverted = signed_areas(placed, triangles) < 0
-    triangles[inverted] = triangles[inverted][:, ::-1]
     return _Made(placed, triangles, found, chains, divided)
+
+
+def _upright(made: _Made, stretches: Sequence[_Stretch], what: str) -> np.ndarray:
+    """Triangles counter-clockwise, refused where they do not fill the outline."""
+    areas = signed_areas(made.points, made.triangles)
+    # About a corner: coordinates far from the origin would cost digits.
+    ends = made.points[[pair for chain in made.chains for pair in zip(chain, chain[1:])]] - made.points[0]
+    senses = [bool(one.inner) - bool(one.outer) for one, chain in zip(stretches, made.chains) for _ in chain[1:]]
+    within = 0.5 * float((ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 1, 0] * ends[:, 0, 1]) @ senses)
+    if abs(np.abs(areas).sum() - within) > 1e-9 * within:
+        raise MeshError(f"netgen does not fill {what}; give another size")
+    return np.where((areas < 0)[:, None], made.triangles[:, ::-1], made.triangles)
 
 
 def _grouped(shape: Outlined, made: _Made, stretches: Sequence[_Stretch], regions: Sequence[str | None]) -> GroupedMesh:
@@ -333,7 +362,7 @@ def _grouped(shape: Outlined, made: _Made, stretches: Sequence[_Stretch], region
         if region:
             parts[region] = parts.get(region, False) | (made.regions == number + 1)
     return GroupedMesh(
-        Mesh(made.points, made.triangles),
+        Mesh(made.points, _upright(made, stretches, f"shape '{shape.name}'")),
         {name: np.array(edges, dtype=np.int64) for name, edges in sides.items()},
         {name: np.array(point) for name, point in shape.points.items()},
         {name: {3: cells} for name, cells in parts.items()},

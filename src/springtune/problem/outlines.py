@@ -212,7 +212,7 @@ class OutlineSide:
             return 0.0
         return max(self.arc[:2]) * (1 - math.cos(0.5 * abs(self.arc[3]) * (high - low)))
 
-    @property
+    @cached_property
     def extremes(self) -> list[Point]:
         """Ends and points farthest along the axes: the box around these is that around the side [m]."""
         found = [self.start, self.end]
@@ -247,6 +247,14 @@ class OutlineSide:
         parameter = min((0.0, 1.0, 0.5 * (low + high)), key=lambda one: math.dist(self.at(one), point))
         return parameter, math.dist(self.at(parameter), point)
 
+    def parameter_near(self, point: Point, distance: float) -> float | None:
+        """Parameter at which it is nearest to a point, where that is within a distance [m]; None otherwise."""
+        low, high = extent([self])
+        if any(not low[i] - distance <= point[i] <= high[i] + distance for i in range(2)):
+            return None
+        parameter, found = self.nearest(point)
+        return parameter if found <= distance else None
+
 
 @dataclass(frozen=True)
 class Round:
@@ -257,13 +265,16 @@ class Round:
     sides : tuple of OutlineSide
     inner, outer : str or None
         Part of the body on the left and on the right; None where there is nothing.
+    around : int or None
+        Number of the round whose inside is on the right; None where there is nothing.
     """
 
     sides: tuple[OutlineSide, ...]
     inner: str | None
-    outer: str | None
+    outer: str | None = None
+    around: int | None = None
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area within [m2]."""
         return enclosed(self.sides)
@@ -292,6 +303,9 @@ def extent(sides: Sequence[OutlineSide]) -> tuple[Point, Point]:
 
 def winds_about(sides: Sequence[OutlineSide], point: Point) -> bool:
     """Whether a round winds about a point that is not on it."""
+    (left, low), (right, high) = extent(sides)
+    if not (left <= point[0] <= right and low <= point[1] <= high):
+        return False
     total = 0.0
     for side in sides:
         stretches = [(0.0, 1.0)]
@@ -307,28 +321,26 @@ def winds_about(sides: Sequence[OutlineSide], point: Point) -> bool:
     return abs(total) > math.pi
 
 
-def meeting(sides: Sequence[OutlineSide], others: Sequence[OutlineSide] | None = None) -> tuple[int, int, Point] | None:
-    """Where two sides of a round meet that are not neighbours, or neighbours away from their corner.
+def meeting(rounds: Sequence[Sequence[OutlineSide]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
+    """Where two sides meet that are not neighbours in a round, or neighbours away from their corner.
 
     Parameters
     ----------
-    sides : sequence of OutlineSide
-        A round.
-    others : sequence of OutlineSide, optional
-        Another round, whose sides are then the second ones.
+    rounds : sequence of sequences of OutlineSide
 
     Returns
     -------
     tuple or None
-        Number of both sides, and where [m].
+        Number of round and side, of both, and where [m].
     """
-    (left, low), (right, high) = extent([*sides, *(others or ())])
+    (left, low), (right, high) = extent([side for sides in rounds for side in sides])
     small = APART * max(right - left, high - low)
-    for i, j in _near(sides, others, small):
-        for one, other in _away_from_corners(i, j, len(sides) if others is None else 0):
-            where = _meet(sides[i], (sides if others is None else others)[j], one, other, small)
+    for one, other in _near(rounds, small):
+        first, second = (rounds[which][number] for which, number in (one, other))
+        for span, other_span in _away_from_corners(one[1], other[1], len(rounds[one[0]]) if one[0] == other[0] else 0):
+            where = _meet(first, second, span, other_span, small)
             if where is not None:
-                return i, j, where
+                return one, other, where
     return None
 
 
@@ -348,25 +360,18 @@ def _away_from_corners(i: int, j: int, count: int) -> list[tuple[Span, Span]]:
     return [(whole, whole)]
 
 
-def _near(
-    sides: Sequence[OutlineSide], others: Sequence[OutlineSide] | None, small: float
-) -> Iterator[tuple[int, int]]:
-    """Pairs of sides whose boxes are not apart, each once."""
-    boxes = [(*extent([side]), 0, i) for i, side in enumerate(sides)]
-    if others is not None:
-        boxes += [(*extent([side]), 1, i) for i, side in enumerate(others)]
-    boxes.sort()
-    active: list[tuple[Point, Point, int, int]] = []
-    for box in boxes:
-        low, high, which, number = box
-        active = [one for one in active if one[1][0] >= low[0] - small]
-        for other_low, other_high, other_which, other in active:
-            if (others is not None and which == other_which) or other_low[1] > high[1] + small:
-                continue
-            if other_high[1] < low[1] - small:
-                continue
-            yield (number, other) if (which, number) < (other_which, other) else (other, number)
-        active.append(box)
+def _near(rounds: Sequence[Sequence[OutlineSide]], small: float) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Pairs of sides whose boxes are not apart, each once and in order: number of round and side, of both."""
+    boxes = sorted(
+        (extent([side]), (which, number)) for which, sides in enumerate(rounds) for number, side in enumerate(sides)
+    )
+    active: list[tuple[tuple[Point, Point], tuple[int, int]]] = []
+    for (low, high), name in boxes:
+        active = [one for one in active if one[0][1][0] >= low[0] - small]
+        for (other_low, other_high), other in active:
+            if other_low[1] <= high[1] + small and other_high[1] >= low[1] - small:
+                yield min(name, other), max(name, other)
+        active.append(((low, high), name))
 
 
 def _meet(side: OutlineSide, other: OutlineSide, span: Span, other_span: Span, small: float) -> Point | None:
@@ -411,6 +416,6 @@ def _chords_apart(a: Point, b: Point, c: Point, d: Point) -> tuple[float, Point]
     return min((_to_chord(a, c, d), a), (_to_chord(b, c, d), b), (_to_chord(c, a, b), c), (_to_chord(d, a, b), d))
 
 
-def in_mm(point: Point) -> str:
+def in_mm(point: Point, digits: int = 9) -> str:
     """A point, in words."""
-    return f"({1e3 * point[0]:.9g}, {1e3 * point[1]:.9g}) mm"
+    return f"({1e3 * point[0]:.{digits}g}, {1e3 * point[1]:.{digits}g}) mm"

@@ -652,17 +652,10 @@ class Shape:
     def _check_rounds(self) -> None:
         """Refuse rounds that meet each other or themselves, or are at a wrong place; turn a clockwise outline."""
         sides = _round(self.outline, "outline")
-        if enclosed(sides) < 0:
-            back = turned(sides)
-            object.__setattr__(self, "outline", tuple(Segment(one.start, one.centre, one.group) for one in back))
-            sides = back
         (left, low), (right, high) = extent(sides)
         size = max(right - left, high - low)
         rounds = [("outline", sides)]
-        for number, hole in enumerate(self.holes, start=1):
-            rounds.append(
-                (f"{'part ' + repr(hole.part) if hole.part else 'hole'} {number}", _round(hole.outline, "hole"))
-            )
+        rounds += [(f"hole {number}", _round(hole.outline, "hole")) for number, hole in enumerate(self.holes, start=1)]
         for what, one in rounds:
             short = [number for number, side in enumerate(one, start=1) if side.length < ON_SIDE * size]
             if short:
@@ -671,21 +664,24 @@ class Shape:
                 (x, y), (u, v) = before.tangent(1.0), side.tangent(0.0)
                 if x * u + y * v < 0 and abs(x * v - y * u) < 1e-6:
                     raise ValueError(f"{what}: turns back on itself at {in_mm(side.start)}; move a corner")
-            met = meeting(one)
-            if met:
-                raise ValueError(f"{what}: sides {met[0] + 1} and {met[1] + 1} meet at {in_mm(met[2])}; move a corner")
-        for number, (what, one) in enumerate(rounds):
-            for other_what, other in rounds[:number]:
-                met = meeting(one, other)
-                if met:
-                    raise ValueError(f"{what} meets {other_what} at {in_mm(met[2])}; keep them apart")
-            if number and not winds_about(sides, one[0].start):
+        met = meeting([one for _, one in rounds])
+        if met:
+            (first, i), (second, j), where = met
+            if first == second:
+                raise ValueError(
+                    f"{rounds[first][0]}: sides {i + 1} and {j + 1} meet at {in_mm(where, 4)}; move a corner"
+                )
+            raise ValueError(f"{rounds[second][0]} meets {rounds[first][0]} at {in_mm(where, 4)}; keep them apart")
+        for what, one in rounds[1:]:
+            if not winds_about(sides, one[0].start):
                 raise ValueError(f"{what}: is outside the outline, at {in_mm(one[0].start)}; move it")
-        for number, (what, one) in enumerate(rounds[1:], start=1):
-            for other_number, (other_what, other) in enumerate(rounds[1:], start=1):
-                empty = not self.holes[other_number - 1].part
-                if number != other_number and empty and winds_about(other, one[0].start):
-                    raise ValueError(f"{what}: is inside {other_what}, where nothing is; remove one of them")
+        for (other_what, other), hole in zip(rounds[1:], self.holes):
+            inside = [what for what, one in rounds[1:] if one is not other and winds_about(other, one[0].start)]
+            if inside and not hole.part:
+                raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
+        if enclosed(sides) < 0:
+            back = tuple(Segment(one.start, one.centre, one.group) for one in turned(sides))
+            object.__setattr__(self, "outline", back)
         names = set(self.groups) & set(self.points)
         if names:
             raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")
@@ -693,17 +689,18 @@ class Shape:
     def _placed(self, name: str, point: Point) -> Point:
         """A named point, on the side that it is next to."""
         _named(name, "point")
-        (left, low), (right, high) = self.extent
-        size = max(right - left, high - low)
+        near = ON_SIDE * max(high - low for low, high in zip(*self.extent))
         for one in self.rounds:
             for side in one.sides:
-                parameter, distance = side.nearest(point)
-                if distance <= ON_SIDE * size:
-                    ends = {0.0: side.start, 1.0: side.end}
-                    close = [end for end in ends.values() if math.dist(end, point) <= ON_SIDE * size]
-                    return close[0] if close else side.at(parameter)
+                parameter = side.parameter_near(point, near)
+                if parameter is not None:
+                    corners = [corner for corner in (side.start, side.end) if math.dist(corner, point) <= near]
+                    return corners[0] if corners else side.at(parameter)
         if self.part_at(point) is None:
             raise ValueError(f"point {name!r}: {in_mm(point)} is not in the body; move it")
+        for other, place in self.points.items():
+            if 0 < math.dist(point, place) <= near:
+                raise ValueError(f"points {name!r} and {other!r}: are as good as one at {in_mm(point)}; make them one")
         return point
 
     @cached_property
@@ -723,14 +720,12 @@ class Shape:
         for hole in self.holes:
             sides = _round(hole.outline, "hole")
             holes.append(turned(sides) if enclosed(sides) < 0 else sides)
-        found = [Round(_round(self.outline, "outline"), "", None)]
-        for hole, sides in zip(self.holes, holes):
-            around = [
-                (enclosed(other_sides), other.part)
-                for other, other_sides in zip(self.holes, holes)
-                if other is not hole and other.part and winds_about(other_sides, sides[0].start)
-            ]
-            found.append(Round(sides, hole.part or None, min(around)[1] if around else ""))
+        found = [Round(_round(self.outline, "outline"), "")]
+        filled = sorted((enclosed(sides), number) for number, sides in enumerate(holes) if self.holes[number].part)
+        for number, (hole, sides) in enumerate(zip(self.holes, holes)):
+            around = [other for _, other in filled if other != number and winds_about(holes[other], sides[0].start)]
+            outer, which = (self.holes[around[0]].part, around[0] + 1) if around else ("", 0)
+            found.append(Round(sides, hole.part or None, outer, which))
         return tuple(found)
 
     def part_at(self, point: Point) -> str | None:
@@ -753,7 +748,7 @@ class Shape:
         >>> plate.part_at((0.01, 0.01)), plate.part_at((0.05, 0.02))
         ('', None)
         """
-        around = [one for one in self.rounds if winds_about(one.sides, point)]
+        around = [one for one in self.rounds if one.winds_about(point)]
         return min(around, key=lambda one: one.area).inner if around else None
 
     @cached_property

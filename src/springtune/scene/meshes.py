@@ -1,16 +1,13 @@
-"""Meshes of a beam and of a shape: made, or from a file."""
+"""Meshes of a beam: of a type, or from a file."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from ..mesh import MESH_TYPES, GroupedMesh, Mesh, read_beam_mesh
-from ..mesh import mesh_shape as mesh_outlined
+from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
 from ..mesh.box import box_fault
 from ..problem.geometry import Beam
 from ..problem.quantities import positive
-from ..problem.shapes import Shape
 from .sheet import chosen
 
 FILLED = 1e-6
@@ -140,44 +137,3 @@ def read_mesh(path: str | Path, beam: Beam, unit: float | str = "1 m") -> Mesh:
     """
     is_a(beam, Beam, "beam", A_BEAM)
     return read_beam_mesh(path, beam.length, beam.height, positive(unit, "length", "unit"))
-
-
-def mesh_shape(
-    shape: Shape, size: float | str, mesh_type: str = "free", refined: Mapping[str, float | str] | None = None
-) -> GroupedMesh:
-    """Mesh a shape, with the groups of its sides, its points and parts.
-
-    Each side is divided into equal edges no longer than the size, an arc into at least six edges a full turn with its
-    particles on the arc; near much shorter ones, edges are divided further. All named points are particles.
-
-    Parameters
-    ----------
-    shape : Shape
-    size : float or str
-        Length of an edge [m], or a text with its unit.
-    mesh_type : str, optional
-        ``"free"``: no other one meshes an outline.
-    refined : mapping of str to float or str, optional
-        Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
-
-    Returns
-    -------
-    GroupedMesh
-
-    Raises
-    ------
-    ValueError
-        If the shape is that of a file, the mesh type another one, or a size not above zero, larger than the shape or
-        absurdly small.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
-    >>> grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "1 mm"})
-    >>> len(grouped.sides["hole"]), len(grouped.sides["right"])
-    (52, 10)
-    """
-    is_a(shape, Shape, "shape", A_SHAPE)
-    sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
-    return mesh_outlined(shape, positive(size, "length", "mesh size"), mesh_type, sizes)

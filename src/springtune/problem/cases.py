@@ -1,0 +1,141 @@
+"""Whether a load case fits a mesh with groups: its names, and whether supports hold each part of the body."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .shapes import LoadCase
+
+if TYPE_CHECKING:
+    from ..mesh import GroupedMesh, Mesh
+
+
+def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
+    """Refuse a load case that a mesh does not have the groups for, or that leaves cells free to move.
+
+    Parameters
+    ----------
+    grouped : GroupedMesh
+    case : LoadCase
+
+    Raises
+    ------
+    ValueError
+        If a name is not that of a group of the kind that it is used for; a point that is supported or loaded is no
+        particle, or any other is not in the body; two supports give one particle different displacements; or cells that
+        hang together are not held against all rigid motions.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm", points={"corner": (0, 0)}), "10 mm")
+    >>> pull = st.LoadCase("pull", (st.Support("left", x=0),), (st.Traction("right", ("1 kN", 0)),))
+    >>> try:
+    ...     check_case(grouped, pull)
+    ... except ValueError as error:
+    ...     print(error)
+    load 'pull': its supports leave the body free to move along y; hold it
+    >>> check_case(grouped, st.LoadCase("pull", (*pull.supports, st.Support("corner", y=0)), pull.tractions))
+    """
+    case.check_names(grouped.sides, grouped.points, grouped.unusable)
+    where = f"load {case.name!r}"
+    for what, name in [("support", one.group) for one in case.supports] + [
+        ("traction", one.group) for one in case.tractions
+    ]:
+        if name in grouped.points and grouped.particle(name) is None:
+            raise ValueError(f"{where}, {what}: point {name!r} is no particle of the mesh; move it to one")
+    for quantity in case.quantities:
+        if quantity.of in grouped.points and not _in_body(grouped.mesh, grouped.points[quantity.of]):
+            raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
+    held = _held(grouped, case)
+    components = connected(grouped.mesh)
+    count = components.max() + 1
+    for number in range(count):
+        free = _free_motion(grouped.mesh.points[components == number], held[components == number])
+        if free:
+            x, y = 1e3 * grouped.mesh.points[components == number].mean(axis=0)
+            body = (
+                "the body"
+                if count == 1
+                else f"one of the {count} bodies that are not joined, at ({x:.6g}, {y:.6g}) mm,"
+            )
+            raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
+
+
+def connected(mesh: "Mesh") -> np.ndarray:
+    """Number of the body that each particle belongs to; cells that share particles belong to one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    ndarray of int, shape (n_points,)
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> connected(st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")).max().item()
+    0
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.points)
+    joined = coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count))
+    return np.asarray(connected_components(joined, directed=False)[1])
+
+
+def _held(grouped: "GroupedMesh", case: LoadCase) -> np.ndarray:
+    """Whether supports hold each particle along x and y, shape (n_points, 2); refused where two differ."""
+    values = np.full((len(grouped.mesh.points), 2), np.nan)
+    groups: dict[tuple[int, int], str] = {}
+    for support in case.supports:
+        particles = grouped.particles(support.group)
+        for axis, value in enumerate((support.x, support.y)):
+            if value is None:
+                continue
+            differ = particles[~np.isnan(values[particles, axis]) & (values[particles, axis] != value)]
+            if len(differ):
+                x, y = 1e3 * grouped.mesh.points[differ[0]]
+                other = groups[int(differ[0]), axis]
+                raise ValueError(
+                    f"load {case.name!r}: supports on {other!r} and {support.group!r} move the particle at "
+                    f"({x:.6g}, {y:.6g}) mm by different amounts along {'xy'[axis]}; make them agree there"
+                )
+            values[particles, axis] = value
+            groups.update(dict.fromkeys(((int(one), axis) for one in particles), support.group))
+    return ~np.isnan(values)
+
+
+def _free_motion(points: np.ndarray, held: np.ndarray) -> str:
+    """Rigid motion that is free where particles are held along x and y, in words; empty where none is."""
+    middle = points.mean(axis=0)
+    x, y = ((points - middle) / np.ptp(points, axis=0).max()).T
+    one, none = np.ones_like(x), np.zeros_like(x)
+    rows = np.concatenate([np.stack([one, none, -y], axis=1)[held[:, 0]], np.stack([none, one, x], axis=1)[held[:, 1]]])
+    sizes, motions = np.linalg.eigh(rows.T @ rows)
+    if sizes[0] > 1e-12 * max(sizes[-1], 1.0):
+        return ""
+    if sizes[1] <= 1e-12 * max(sizes[-1], 1.0):
+        return "move and turn"
+    u, v, turn = motions[:, 0]
+    if abs(turn) > 1e-6:
+        size = np.ptp(points, axis=0).max()
+        about = middle + np.array([-v, u]) / turn * size
+        x0, y0 = 1e3 * np.where(np.abs(about) > 1e-9 * size, about, 0.0)
+        return f"turn about ({x0:.6g}, {y0:.6g}) mm"
+    return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")
+
+
+def _in_body(mesh: "Mesh", point: np.ndarray) -> bool:
+    """Whether a point is in a cell, or within rounding of one."""
+    small = 1e-9 * np.ptp(mesh.points, axis=0).max()
+    for corners in mesh.cells.values():
+        here = mesh.points[corners] - point
+        after = np.roll(here, -1, axis=1)
+        lengths = np.linalg.norm(after - here, axis=2)
+        if ((here[..., 0] * after[..., 1] - here[..., 1] * after[..., 0]) >= -small * lengths).all(axis=1).any():
+            return True
+    return False

@@ -1,0 +1,85 @@
+"""Meshes of a shape: made, or from a file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..mesh import GroupedMesh
+from ..mesh import mesh_shape as mesh_outlined
+from ..mesh import read_shape as read_grouped
+from ..problem.quantities import positive
+from ..problem.shapes import Shape
+from .meshes import A_SHAPE, is_a
+
+
+def mesh_shape(
+    shape: Shape, size: float | str, mesh_type: str = "free", refined: Mapping[str, float | str] | None = None
+) -> GroupedMesh:
+    """Mesh a shape, with the groups of its sides, its points and parts.
+
+    Each side is divided into equal edges no longer than the size, an arc into at least six edges a full turn with its
+    particles on the arc; near much shorter ones, edges are divided further. All named points are particles.
+
+    Parameters
+    ----------
+    shape : Shape
+    size : float or str
+        Length of an edge [m], or a text with its unit.
+    mesh_type : str, optional
+        ``"free"``: no other one meshes an outline.
+    refined : mapping of str to float or str, optional
+        Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
+
+    Returns
+    -------
+    GroupedMesh
+
+    Raises
+    ------
+    ValueError
+        If the shape is that of a file, the mesh type another one, or a size not above zero, larger than the shape or
+        absurdly small.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+    >>> grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "1 mm"})
+    >>> len(grouped.sides["hole"]), len(grouped.sides["right"])
+    (52, 10)
+    """
+    is_a(shape, Shape, "shape", A_SHAPE)
+    sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
+    return mesh_outlined(shape, positive(size, "length", "mesh size"), mesh_type, sizes)
+
+
+def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
+    """Read the mesh of a shape with its groups, of any format that meshio knows.
+
+    Groups are Gmsh's physical groups, sets of cells and of points in Abaqus and other files, and arrays of zeros and
+    ones in VTU; how each becomes sides, a point or a part is told in the guide on mesh files.
+
+    Parameters
+    ----------
+    path : str or Path
+    unit : float or str, optional
+        Unit of the coordinates in the file [m], or a text such as ``"1 mm"``.
+
+    Returns
+    -------
+    GroupedMesh
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read, or its cells are no conforming plane sheet.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> from springtune.mesh import write_mesh
+    >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
+    >>> write_mesh("plate.msh", st.mesh_shape(plate, "4 mm"))
+    >>> sorted(st.read_shape("plate.msh").sides)
+    ['hole', 'left', 'lower', 'right', 'upper']
+    """
+    return read_grouped(path, positive(unit, "length", "unit"))

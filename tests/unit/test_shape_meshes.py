@@ -1,0 +1,567 @@
+"""Meshes of shapes: made of outlines, read from files, and held against load cases."""
+
+import math
+import subprocess
+import sys
+from itertools import pairwise
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+import springtune as st
+from springtune.mesh import GroupedMesh, Mesh, MeshError, mesh_shape, quality, read_shape, signed_areas, write_mesh
+from springtune.mesh.sheets import outline_of, sheet_fault
+from springtune.problem.cases import check_case
+from springtune.problem.shapes import Hole, LoadCase, Segment, Shape, Support, Traction
+
+
+def plate(**more):
+    holes = [Hole.circle((0.05, 0.02), 0.008), Hole.circle((0.02, 0.02), 0.005, part="core")]
+    points = {"inside": (0.07, 0.012), "tip": (0.1, 0.021), "corner": (0.0, 0.0)}
+    return Shape.rectangle(0.1, 0.04, name="plate", **{"holes": holes, "points": points, **more})
+
+
+LE1 = Shape(
+    "le1",
+    0.1,
+    [
+        Segment((2, 0), group="lower"),
+        Segment((3.25, 0), (0, 0), "outer"),
+        Segment((0, 2.75), group="left"),
+        Segment((0, 1), (0, 0), "inner"),
+    ],
+    points={"D": (2, 0)},
+)
+
+
+def polygon_area(corners):
+    x, y = np.transpose(corners)
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def check_sides(shape, grouped):
+    """Each outline edge is in one group, with the body on its left, and on its side."""
+    outline, fault = outline_of(grouped.mesh)
+    assert not fault and not sheet_fault(grouped.mesh)
+    edges = np.concatenate(list(grouped.sides.values()))
+    assert sorted(map(tuple, edges.tolist())) == sorted(map(tuple, outline.tolist()))
+    extent = np.ptp(grouped.mesh.points, axis=0).max()
+    for name, found in grouped.sides.items():
+        sides = [side for one in shape.rounds for side in one.sides if side.group == name]
+        for place in grouped.mesh.points[np.unique(found)]:
+            assert min(side.nearest(tuple(place))[1] for side in sides) <= 1e-12 * extent
+    for name, place in grouped.points.items():
+        assert grouped.mesh.points[grouped.particle(name)] == pytest.approx(shape.points[name], abs=1e-12 * extent)
+        assert tuple(place) == shape.points[name]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    some.lists(some.floats(0.5, 1.0), min_size=3, max_size=9),
+    some.floats(0.05, 0.2),
+    some.floats(0.06, 0.5),
+    some.floats(-3, 3),
+)
+def test_any_star_with_a_hole_is_filled(radii, hole, size, power):
+    """Lengths from a micrometre to a kilometre."""
+    scale = 10.0**power
+    angles = [2 * math.pi * (i + 0.3) / len(radii) for i in range(len(radii))]
+    corners = [(scale * r * math.cos(angle), scale * r * math.sin(angle)) for r, angle in zip(radii, angles)]
+    star = Shape(
+        "star",
+        1e-3,
+        [Segment(corner, group=f"side{i}") for i, corner in enumerate(corners)],
+        [Hole.circle((0, 0), scale * hole)],
+    )
+    grouped = mesh_shape(star, scale * size)
+    check_sides(star, grouped)
+    around = grouped.sides["hole"]
+    assert len(around) >= 6
+    following = dict(around.tolist())
+    chain = [int(around[0, 0])]
+    while len(chain) < len(around):
+        chain.append(following[chain[-1]])
+    area = polygon_area(corners) + polygon_area(grouped.mesh.points[chain])
+    assert grouped.mesh.area == pytest.approx(area, rel=1e-12)
+    lengths = [np.linalg.norm(np.diff(grouped.mesh.points[edges], axis=1), axis=2) for edges in grouped.sides.values()]
+    assert max(one.max() for one in lengths) <= scale * size * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("shape", [plate(), LE1], ids=lambda shape: shape.name)
+@pytest.mark.parametrize("share", [0.3, 0.05])
+def test_shapes_have_their_groups_and_points(shape, share):
+    (_, low), (_, high) = shape.extent
+    grouped = mesh_shape(shape, share * (high - low))
+    check_sides(shape, grouped)
+    if shape.parts:
+        cells = grouped.mesh.triangles[grouped.parts["core"][3]]
+        centres = grouped.mesh.points[cells].mean(axis=1)
+        assert (np.linalg.norm(centres - [0.02, 0.02], axis=1) < 0.005).all()
+        edges = np.unique(np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+        # By Euler: one disc, whose rim is on the circle.
+        assert len(np.unique(cells)) - len(edges) + len(cells) == 1
+        assert grouped.mesh.area - signed_areas(grouped.mesh.points, cells).sum() > 0
+
+
+def test_the_area_of_a_mesh_comes_to_that_of_the_shape_by_squares():
+    disc = Shape("disc", 1e-3, Hole.circle((0, 0), 1).outline)
+    errors = [1 - mesh_shape(disc, math.pi / 2 / n).mesh.area / disc.area for n in (4, 8, 16)]
+    assert [math.log2(one / other) for one, other in pairwise(errors)] == pytest.approx([2, 2], abs=0.02)
+
+
+def test_sides_are_divided_evenly():
+    grouped = mesh_shape(LE1, 0.2)
+    for name in ("lower", "left"):
+        lengths = np.linalg.norm(np.diff(grouped.mesh.points[grouped.sides[name]], axis=1), axis=2)
+        assert lengths.max() / lengths.min() == pytest.approx(1, rel=1e-9) and 0.15 < lengths.max() <= 0.2
+    assert len(grouped.sides["left"]) == math.ceil(1.75 / 0.2)
+
+
+def test_refinement_is_where_it_is_asked_for():
+    coarse = mesh_shape(plate(), 5e-3)
+    fine = mesh_shape(plate(), 5e-3, refined={"hole": 5e-4, "tip": 2e-4, "core": 1e-3})
+    check_sides(plate(), fine)
+    lengths = fine.mesh.edge_lengths
+    middles = fine.mesh.points[fine.mesh.edges].mean(axis=1)
+    at_hole = np.abs(np.linalg.norm(middles - [0.05, 0.02], axis=1) - 0.008) < 2e-4
+    assert lengths[at_hole].max() < 7e-4
+    assert lengths[np.linalg.norm(middles - [0.1, 0.021], axis=1) < 4e-4].max() < 6e-4
+    assert lengths[np.linalg.norm(middles - [0.02, 0.02], axis=1) < 4e-3].max() < 2e-3
+    assert lengths.max() > 4e-3 and len(fine.mesh.points) < 8 * len(coarse.mesh.points)
+    assert quality(fine.mesh)["minimum_angle"] > 20
+
+
+def test_a_thin_wall_does_not_close():
+    """Chords of both arcs keep apart, whatever the size."""
+    outer = Hole.circle((0, 0), 1.0, group="outer").outline
+    for shift in (0.4, 0.499, 0.49999):
+        ring = Shape("ring", 1e-3, outer, [Hole.circle((shift, 0), 0.5, group="inner")])
+        grouped = mesh_shape(ring, 0.6)
+        check_sides(ring, grouped)
+        assert grouped.mesh.area == pytest.approx(ring.area, rel=0.08)
+
+
+def test_points_close_to_each_other_and_to_sides_are_particles():
+    points = {"a": (0.5, 0.5), "b": (0.5, 0.501), "low": (0.3, 0.002), "also": (0.5, 0.5), "c": (0.501, 0.5)}
+    square = Shape.rectangle(1, 1, points=points)
+    grouped = mesh_shape(square, 0.2)
+    check_sides(square, grouped)
+    assert grouped.particle("a") == grouped.particle("also") and len(grouped.mesh.points) < 500
+
+
+@pytest.mark.parametrize("distance", [1.5e-6, 2.5e-6, 1e-5])
+def test_points_at_the_limit_are_particles_or_refused(distance):
+    """What netgen takes for one point is not made one silently."""
+    square = Shape.rectangle(1, 1, points={"a": (0.5, 0.5), "b": (0.5, 0.5 + distance), "c": (0.5, 1 - distance)})
+    try:
+        check_sides(square, mesh_shape(square, 0.3))
+    except MeshError as error:
+        assert distance < 1e-5 and "too near each other" in str(error)
+
+
+def test_a_shape_far_from_the_origin_is_meshed_alike():
+    far = Shape("far", 1e-3, [Segment((x + 1e4, y - 1e4), group="all") for x, y in [(0, 0), (1, 0), (1, 1), (0, 1)]])
+    assert mesh_shape(far, 0.1).mesh.area == pytest.approx(1, rel=1e-9)
+
+
+def test_same_shape_same_mesh_in_another_process():
+    code = (
+        "import hashlib, springtune as st; h = [st.Hole.circle(('50 mm', '20 mm'), '8 mm')]; "
+        "g = st.mesh_shape(st.Shape.rectangle('100 mm', '40 mm', holes=h, points={'p': ('9 mm', '9 mm')}), '3 mm'); "
+        "print(hashlib.sha256(g.mesh.points.tobytes() + g.mesh.triangles.tobytes() + str(sorted(g.sides)).encode() "
+        "+ b''.join(e.tobytes() for e in g.sides.values())).hexdigest())"
+    )
+    outs = {
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    }
+    assert len(outs) == 1
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: st.mesh_shape(plate(), "50 mm"), "mesh size: 0.05 is larger than shape 'plate'; give at most"),
+        (
+            lambda: st.mesh_shape(plate(), "1 um"),
+            "makes some 4.4e+09 particles of shape 'plate', more than can be meshed",
+        ),
+        (lambda: st.mesh_shape(plate(), 0), "mesh size: 0 is not above zero"),
+        (lambda: mesh_shape(plate(), math.nan), "mesh size: nan is not a number above zero"),
+        (lambda: st.mesh_shape(plate(), "5 mm", "structured"), "'structured' fills rectangles"),
+        (lambda: st.mesh_shape(plate(), "5 mm", refined={"hoel": 1e-3}), "refined 'hoel': shape 'plate' has no side"),
+        (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "6 mm"}), "larger than the mesh size"),
+        (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "1 kN"}), "refined 'hole': '1 kN' is a force"),
+        (lambda: st.mesh_shape(plate(), "5 mm", refined={"hole": "1 nm"}), "less than some millionths of shape"),
+        (
+            lambda: st.mesh_shape(plate(), "5 mm", refined={"core": "2 um"}),
+            "with {'core': 2e-06} makes some 2.3e+07 part",
+        ),
+        (lambda: st.mesh_shape(Shape("own", 1, file="own.msh"), "5 mm"), "that of the file own.msh; read it with"),
+        (lambda: st.mesh_shape(st.Beam(1, 1), "5 mm"), "shape: Beam(length=1.0"),
+    ],
+)
+def test_what_cannot_be_meshed_is_refused(call, says):
+    with pytest.raises(ValueError) as caught:
+        call()
+    assert says in str(caught.value)
+
+
+def same(grouped, other):
+    """Whether two meshes have the same groups, by places."""
+
+    def places(one):
+        edges = {name: np.round(one.mesh.points[found], 12).reshape(-1, 4) for name, found in one.sides.items()}
+        cells = {
+            name: sum(float(signed_areas(one.mesh.points, one.mesh.cells[n])[mask].sum()) for n, mask in masks.items())
+            for name, masks in one.parts.items()
+        }
+        return (
+            {name: sorted(map(tuple, found.tolist())) for name, found in edges.items()},
+            {name: tuple(np.round(place, 12)) for name, place in one.points.items()},
+            {name: round(area, 15) for name, area in cells.items()},
+        )
+
+    return places(grouped) == places(other) and other.mesh.area == pytest.approx(grouped.mesh.area)
+
+
+def squares():
+    """A mesh of squares and triangles."""
+    mesh = st.make_mesh(st.Beam(0.1, 0.04), "braced", 0.01)
+    x, y = mesh.points[mesh.quads].mean(axis=1).T
+    halved = mesh.quads[x > 0.07]
+    mixed = Mesh(mesh.points, np.concatenate([halved[:, [0, 1, 2]], halved[:, [0, 2, 3]]]), mesh.quads[x < 0.07])
+    parts = {n: mixed.points[corners].mean(axis=1)[:, 1] < 0.02 for n, corners in mixed.cells.items()}
+    outline, _ = outline_of(mixed)
+    left = outline[(mixed.points[outline, 0] == 0).all(axis=1)]
+    return GroupedMesh(mixed, {"left": left}, {"between": np.array([0.033, 0.021])}, {"below": parts})
+
+
+def msh4(grouped, others=99):
+    """Text of Gmsh's format 4.1, which meshio reads and does not write with groups; cells of no part in a group."""
+    kinds = (grouped.points, grouped.sides, grouped.parts)
+    names = {name: (kind, tag) for kind, found in enumerate(kinds) for tag, name in enumerate(found, start=1)}
+    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
+    lines += [f'{kind} {tag} "{name}"' for name, (kind, tag) in names.items()]
+    lines += ["$EndPhysicalNames", "$Entities", f"{len(kinds[0])} {len(kinds[1])} {len(kinds[2]) + 1} 0"]
+    for kind, tag in [*names.values(), (2, 99)]:
+        physical = f"1 {others if tag == 99 else tag}" if tag != 99 or others else "0"
+        lines.append(f"{tag} {'0 ' * (6 if kind else 3)}{physical}{' 0' if kind else ''}")
+    count, points = len(grouped.mesh.points), grouped.mesh.points
+    lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 99 0 {count}"]
+    lines += [*map(str, range(1, count + 1)), *(f"{x!r} {y!r} 0" for x, y in points.tolist()), "$EndNodes", "$Elements"]
+    triangles = grouped.mesh.triangles
+    rest = ~np.any([np.zeros(len(triangles), dtype=bool), *(masks[3] for masks in grouped.parts.values())], axis=0)
+    blocks = [(*names[name], 15, np.array([[grouped.particle(name)]])) for name in grouped.points]
+    blocks += [(*names[name], 1, edges) for name, edges in grouped.sides.items()]
+    blocks += [(*names[name], 2, triangles[masks[3]]) for name, masks in grouped.parts.items()]
+    blocks.append((2, 99, 2, triangles[rest]))
+    total = sum(len(cells) for *_, cells in blocks)
+    lines.append(f"{len(blocks)} {total} 1 {total}")
+    for kind, tag, code, cells in blocks:
+        lines.append(f"{kind} {tag} {code} {len(cells)}")
+        lines += [" ".join(map(str, [1, *(row + 1)])) for row in cells]
+    return "\n".join([*lines, "$EndElements", ""])
+
+
+def by_meshio(grouped, **sets):
+    mesh = grouped.mesh
+    return meshio.Mesh(mesh.points, [("triangle", mesh.triangles)], **sets)
+
+
+def write_vtu(path, grouped):
+    """Arrays on points and cells, as users make them; no lines."""
+    marks = {name: np.isin(np.arange(len(grouped.mesh.points)), edges) for name, edges in grouped.sides.items()}
+    for name in grouped.points:
+        marks[name] = np.arange(len(grouped.mesh.points)) == grouped.particle(name)
+    parts = {name: [masks[3].astype(np.int32)] for name, masks in grouped.parts.items()}
+    data = {name: mark.astype(np.uint8) for name, mark in marks.items()} | {"u": grouped.mesh.points}
+    by_meshio(grouped, point_data=data, cell_data=parts | {"density": [np.ones(len(grouped.mesh.triangles))]}).write(
+        path
+    )
+
+
+def write_abaqus(path, grouped):
+    sets = {name: np.unique(edges) for name, edges in grouped.sides.items()}
+    sets |= {name: np.array([grouped.particle(name)]) for name in grouped.points}
+    cells = {name: [np.flatnonzero(masks[3])] for name, masks in grouped.parts.items()}
+    by_meshio(grouped, point_sets=sets, cell_sets=cells | {"Eall": [np.arange(len(grouped.mesh.triangles))]}).write(
+        path
+    )
+
+
+FILES = {
+    "own.vtu": write_mesh,
+    "own.msh": write_mesh,
+    "marks.vtu": write_vtu,
+    "sets.inp": write_abaqus,
+    "gmsh4.msh": lambda path, grouped: path.write_text(msh4(grouped)),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("shape", [plate(), LE1], ids=lambda shape: shape.name)
+def test_groups_come_back_from_files(tmp_path, name, shape):
+    grouped = mesh_shape(shape, 0.1 * shape.extent[1][1])
+    FILES[name](tmp_path / name, grouped)
+    found = read_shape(tmp_path / name)
+    if name == "gmsh4.msh" and shape.parts:
+        assert found.parts.keys() == {*shape.parts, "99"}
+        found = GroupedMesh(found.mesh, found.sides, found.points, {part: found.parts[part] for part in shape.parts})
+    assert same(grouped, found) and not found.unusable
+
+
+@pytest.mark.parametrize("ending", ["vtu", "msh"])
+def test_squares_and_points_between_particles_come_back(tmp_path, ending):
+    grouped = squares()
+    write_mesh(tmp_path / f"own.{ending}", grouped)
+    found = read_shape(tmp_path / f"own.{ending}")
+    assert same(grouped, found) and found.particle("between") is None and len(found.particles("between")) == 0
+
+
+def test_a_unit_is_that_of_all_coordinates(tmp_path):
+    grouped = mesh_shape(plate(), 5e-3)
+    places = {name: 1e3 * place for name, place in grouped.points.items()}
+    large = GroupedMesh(Mesh(1e3 * grouped.mesh.points, grouped.mesh.triangles), grouped.sides, places, grouped.parts)
+    write_mesh(tmp_path / "mm.msh", large)
+    assert same(grouped, st.read_shape(tmp_path / "mm.msh", "1 mm"))
+
+
+def test_numbers_name_what_has_no_name(tmp_path):
+    grouped = mesh_shape(plate(), 5e-3)
+    write_mesh(tmp_path / "own.msh", grouped)
+    # VTU by meshio keeps the numbers of physical groups and loses their names.
+    meshio.read(tmp_path / "own.msh").write(tmp_path / "own.vtu")
+    found = read_shape(tmp_path / "own.vtu")
+    assert len(found.sides) == len(grouped.sides) and len(found.points) == 3 and len(found.parts) == 1
+    assert all(name.isdigit() for name in [*found.sides, *found.points, *found.parts])
+    part = {"part": [np.where(grouped.parts["core"][3], 7, 0)]}
+    by_meshio(grouped, cell_data=part).write(tmp_path / "part.vtu")
+    assert list(read_shape(tmp_path / "part.vtu").parts) == ["7"]
+
+
+def lines(grouped, **more):
+    """A file's content with lines of its own."""
+    cells = [("triangle", grouped.mesh.triangles), *(("line", np.array(edges)) for edges in more.values())]
+    data = {
+        name: [np.full(len(found), i == number + 1, dtype=np.int8) for i, (_, found) in enumerate(cells)]
+        for number, name in enumerate(more)
+    }
+    return meshio.Mesh(grouped.mesh.points, cells, cell_data=data)
+
+
+def inner_edges(grouped):
+    return grouped.mesh.edges[~grouped.mesh.on_outline]
+
+
+UNUSABLE = {
+    "lines inside": (
+        lambda g: lines(g, cut=[*g.sides["left"], *inner_edges(g)[:2]]),
+        "is not on the outline: of its 10 lines, 2 are inside the body, the first one at",
+    ),
+    "lines across": (lambda g: lines(g, cut=[[0, 30]]), "of its 1 lines, 1 are no edges of cells"),
+    "points inside": (
+        lambda g: by_meshio(g, point_sets={"cut": np.arange(len(g.mesh.points))}),
+        "are inside the body; take these out",
+    ),
+    "single points": (
+        lambda g: by_meshio(g, point_sets={"cut": np.array([*np.unique(g.sides["left"]), g.particle("tip")])}),
+        "of its 10 points, 1 have no neighbour on the outline that is one",
+    ),
+    "other values": (
+        lambda g: by_meshio(g, point_data={"cut": np.arange(len(g.mesh.points))}),
+        "has other values than 0 and 1",
+    ),
+    "nothing": (lambda g: by_meshio(g, point_data={"cut": np.zeros(len(g.mesh.points), dtype=int)}), "is 0 all over"),
+    "empty set": (lambda g: by_meshio(g, point_sets={"cut": np.array([], dtype=int)}), "has nothing in the file"),
+    "two materials": (
+        lambda g: by_meshio(g, cell_sets={name: [np.arange(n)] for name, n in {"cut": 9, "other": 5}.items()}),
+        "has cells that part 'other' has, too",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", UNUSABLE)
+def test_what_cannot_be_a_group_is_said_when_it_is_used(tmp_path, name):
+    grouped = mesh_shape(plate(), 5e-3)
+    make, says = UNUSABLE[name]
+    path = tmp_path / ("file.inp" if "set" in name or "points" in name or "materials" in name else "file.vtu")
+    make(grouped).write(path)
+    found = read_shape(path)
+    assert says in found.unusable["cut"]
+    case = LoadCase("pull", [Support("cut", 0, 0)], gravity=(0, -9.81))
+    with pytest.raises(ValueError, match=r"load 'pull', support: 'cut' .*; (take|mark|put|a cell)") as caught:
+        check_case(found, case)
+    assert says in str(caught.value)
+
+
+def test_names_that_cannot_be_used_are_told(tmp_path):
+    grouped = mesh_shape(plate(), 5e-3)
+    lines(grouped, **{"left side": grouped.sides["left"]}).write(tmp_path / "file.vtu")
+    found = read_shape(tmp_path / "file.vtu")
+    assert not found.sides and "cannot be a name; use letters" in found.unusable["left side"]
+
+
+def test_elements_without_group_in_gmsh_4_are_told(tmp_path):
+    """What Gmsh writes where elements are in no group and all are saved, meshio does not read."""
+    (tmp_path / "all.msh").write_text(msh4(mesh_shape(plate(), 5e-3), others=0))
+    with pytest.raises(MeshError, match=r"some of its elements are in no physical group .*, or write format 2\.2"):
+        read_shape(tmp_path / "all.msh")
+
+
+@pytest.mark.parametrize(
+    ("write", "says"),
+    [
+        (lambda g: write_mesh("a.vtk", g), "give a name that ends in .vtu or .msh"),
+        (lambda g: write_mesh("a.msh", g.mesh), "give a name that ends in .vtu"),
+        (lambda g: write_mesh("a.vtu", GroupedMesh(g.mesh, {"part": g.sides["left"]})), "is named 'part', by which"),
+        (
+            lambda g: write_mesh("a.msh", GroupedMesh(g.mesh, {"core": g.sides["left"]}, {}, g.parts)),
+            "'core' names groups of two kinds",
+        ),
+    ],
+)
+def test_files_that_cannot_hold_a_group_are_not_written(tmp_path, monkeypatch, write, says):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MeshError) as caught:
+        write(mesh_shape(plate(), 5e-3))
+    assert says in str(caught.value) and not [*tmp_path.iterdir()]
+
+
+UNIT = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def two_squares(shift, joined=0):
+    """Two squares of two triangles, some corners of the second being those of the first."""
+    halves = np.array([[0, 1, 2], [0, 2, 3]])
+    points = np.concatenate([UNIT, UNIT + shift])
+    numbers = np.arange(8)
+    for i in range(4, 8):
+        same = np.flatnonzero((points[:4] == points[i]).all(axis=1))
+        if len(same) and joined:
+            numbers[i] = same[0]
+            joined -= 1
+    cells = numbers[np.concatenate([halves, halves + 4])]
+    used, cells = np.unique(cells, return_inverse=True)
+    return Mesh(points[used], cells.reshape(-1, 3))
+
+
+FAULTS = {
+    "apart": (two_squares([2, 0]), ""),
+    "joined": (two_squares([1, 0], joined=2), ""),
+    "slit": (two_squares([1, 0]), "do not join their cells"),
+    "slit of one point": (two_squares([1, 0], joined=1), "do not join their cells"),
+    "point": (two_squares([1, 1], joined=1), "cells hang together in a point alone, at (1000, 1000) mm"),
+    "touching points": (two_squares([1, 1]), "two points at (1000, 1000) mm, do not join"),
+    "hanging": (two_squares([1, 0.5]), "hangs on the edge"),
+    "overlap": (two_squares([0.5, 0.3]), "cells overlap"),
+    "inside": (
+        Mesh(np.concatenate([UNIT, 0.3 + 0.2 * UNIT]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]),
+        "cells lie over",
+    ),
+    "twice": (Mesh(UNIT, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]), "edges with two cells on the same side"),
+    "in a hole": (
+        Mesh(
+            np.concatenate([UNIT, 0.2 + 0.6 * UNIT, 0.4 + 0.2 * UNIT]),
+            [*([i, (i + 1) % 4, 4 + i] for i in range(4)), *([(i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)),
+             [8, 9, 10], [8, 10, 11]],
+        ),
+        "",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_mesh_is_a_sheet_or_says_why_not(tmp_path, name):
+    mesh, says = FAULTS[name]
+    fault = sheet_fault(mesh)
+    assert says in fault and bool(says) == bool(fault)
+    write_mesh(tmp_path / "own.vtu", mesh)
+    if says:
+        with pytest.raises(MeshError, match=r"own\.vtu: ") as caught:
+            read_shape(tmp_path / "own.vtu")
+        assert says in str(caught.value)
+    else:
+        assert read_shape(tmp_path / "own.vtu").mesh.area == mesh.area
+
+
+@given(some.integers(2, 12), some.integers(1, 8), some.data())
+def test_a_sheet_without_any_of_its_cells_is_a_sheet_unless_cells_meet_in_a_point(cells, rows, data):
+    """What is left has holes, or comes apart; all else that it may be is told."""
+    mesh = st.make_mesh(st.Beam(0.01 * cells, 0.01 * rows), "right", 0.01)
+    kept = np.array(data.draw(some.lists(some.booleans(), min_size=len(mesh.triangles), max_size=len(mesh.triangles))))
+    if kept.any():
+        used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
+        left = Mesh(mesh.points[used], triangles.reshape(-1, 3))
+        outline, _ = outline_of(left)
+        pinched = (np.bincount(outline[:, 0]) > 1).any()
+        assert ("point alone" in sheet_fault(left)) == pinched and (pinched or not sheet_fault(left))
+
+
+def pull(*supports, at="right", **more):
+    return LoadCase("pull", supports, [Traction(at, (1, 0))], **more)
+
+
+CASES = {
+    "held": (pull(Support("left", 0, 0)), ""),
+    "three": (pull(Support("left", x=0), Support("corner", y=0)), ""),
+    "slides": (pull(Support("left", x=0)), "leave the body free to move along y; hold it"),
+    "slides along x": (pull(Support("lower", y=0)), "free to move along x"),
+    "turns": (pull(Support("corner", 0, 0)), "free to turn about (0, 0) mm"),
+    "turns about another": (pull(Support("tip", x=0), Support("corner", y=0)), "free to turn about (0, 21) mm"),
+    "two free": (pull(Support("corner", x=0)), "free to move and turn"),
+    "in line": (pull(Support("tip", 0, 0), Support("also", y=0)), "free to turn about (100, 21) mm"),
+    "moved": (LoadCase("pull", [Support("left", 0, 0), Support("right", "1 mm")]), ""),
+    "torn": (
+        LoadCase("pull", [Support("left", 0, 0), Support("lower", y="1 mm")]),
+        "supports on 'left' and 'lower' move the particle at (0, 0) mm by different amounts along y",
+    ),
+    "misspelt": (pull(Support("left", 0, 0), at="rihgt"), "traction: no group is named 'rihgt'; did you mean 'right'?"),
+    "pressure on a point": (
+        LoadCase("pull", [Support("left", 0, 0)], pressures=[st.Pressure("tip", 1)]),
+        "pressure: 'tip' is a point, and needs sides; known: lower, right",
+    ),
+    "stress of sides": (
+        pull(Support("left", 0, 0), quantities=[st.Quantity("s", "stress", "left", "xx")]),
+        "quantity 's': 'left' is sides, and needs a point",
+    ),
+    "reaction": (
+        pull(Support("left", x=0), Support("corner", y=0), quantities=[st.Quantity("r", "reaction", "left", "y")]),
+        "quantity 'r': no support holds 'left' along y; held: corner",
+    ),
+    "loaded between": (pull(Support("left", 0, 0), at="between"), "point 'between' is no particle of the mesh"),
+    "asked between": (pull(Support("left", 0, 0), quantities=[st.Quantity("u", "displacement", "between", "x")]), ""),
+    "asked outside": (
+        pull(Support("left", 0, 0), quantities=[st.Quantity("u", "displacement", "away", "x")]),
+        "quantity 'u': point 'away' is not in the body",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_load_cases_are_held_against_the_mesh(name):
+    case, says = CASES[name]
+    made = mesh_shape(plate(points={"tip": (0.1, 0.021), "also": (0.1, 0.03), "corner": (0, 0)}), 5e-3)
+    points = {**made.points, "between": np.array([0.0321, 0.0123]), "away": np.array([0.05, 0.02])}
+    grouped = GroupedMesh(made.mesh, made.sides, points, made.parts)
+    if says:
+        with pytest.raises(ValueError) as caught:
+            check_case(grouped, case)
+        assert str(caught.value).startswith("load 'pull'") and says in str(caught.value)
+    else:
+        check_case(grouped, case)
+
+
+def test_each_body_is_to_be_held():
+    mesh = two_squares([3, 0])
+    outline, _ = outline_of(mesh)
+    sides = {
+        name: outline[(mesh.points[outline, 0] == x).all(axis=1)] for name, x in {"left": 0.0, "right": 4.0}.items()
+    }
+    grouped = GroupedMesh(mesh, sides)
+    with pytest.raises(ValueError, match=r"one of the 2 bodies that are not joined, at \(3500, 500\) mm, free to move"):
+        check_case(grouped, pull(Support("left", 0, 0)))
+    check_case(grouped, pull(Support("left", 0, 0), Support("right", 0, 0)))

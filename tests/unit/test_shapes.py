@@ -1,0 +1,252 @@
+"""Shapes: geometry of their sides in closed form, and what is refused."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+import springtune as st
+from springtune.problem.outlines import OutlineSide
+from springtune.problem.shapes import Hole, LoadCase, Segment, Shape, Support, Traction
+
+ORIGIN = (0.0, 0.0)
+
+
+def outline(*corners, centres=(), group=""):
+    """Segments of corners, some of them arcs about centres."""
+    centres = dict(enumerate(centres))
+    return [Segment(corner, centres.get(i), group) for i, corner in enumerate(corners)]
+
+
+SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+
+
+@pytest.mark.parametrize("axes", [(1.0, 1.0), (2.0, 1.0), (0.3, 1.0)])
+def test_arcs_are_on_their_ellipse_and_evenly_divided(axes):
+    a, b = axes
+    begin, turn = 0.3, 1.4
+    start, end = ((a * math.cos(angle) + 5, b * math.sin(angle) - 3) for angle in (begin, begin + turn))
+    side = OutlineSide(start, end, centre=(5.0, -3.0))
+    assert side.arc == pytest.approx((a, b, begin, turn), rel=1e-9)
+    points = [side.at(one) for one in side.divided(7)]
+    assert points[0] == start and points[-1] == end
+    assert [((x - 5) / a) ** 2 + ((y + 3) / b) ** 2 for x, y in points] == pytest.approx([1] * 8, rel=1e-12)
+    lengths = [side.length_to(one) for one in side.divided(7)]
+    assert lengths == pytest.approx([side.length * i / 7 for i in range(8)], abs=1e-12)
+    # The length by many chords, whose error falls with their number's square.
+    chords = [sum(math.dist(side.at(i / n), side.at((i + 1) / n)) for i in range(n)) for n in (500, 1000)]
+    assert side.length == pytest.approx(chords[1] + (chords[1] - chords[0]) / 3, rel=1e-10)
+
+
+def test_tangents_and_normals_of_an_arc_are_its_own():
+    side = OutlineSide((2.0, 0.0), (0.0, 1.0), centre=ORIGIN)
+    assert side.tangent(0.0) == pytest.approx((0, 1), abs=1e-15) and side.normal(0.0) == pytest.approx(
+        (1, 0), abs=1e-15
+    )
+    small = 1e-6
+    for where in (0.2, 0.7):
+        (x, y), (u, v) = side.at(where - small), side.at(where + small)
+        assert side.slope(where) == pytest.approx(((u - x) / 2 / small, (v - y) / 2 / small), rel=1e-8)
+        assert math.hypot(*side.tangent(where)) == pytest.approx(1)
+
+
+def test_the_nearest_point_of_a_circle_is_on_its_radius():
+    side = OutlineSide((1.0, 0.0), (0.0, 1.0), centre=ORIGIN)
+    parameter, distance = side.nearest((1.5 * math.cos(0.4), 1.5 * math.sin(0.4)))
+    assert (parameter, distance) == pytest.approx((0.4 / (math.pi / 2), 0.5), rel=1e-12)
+    assert side.nearest((2.0, -1.0)) == pytest.approx((0.0, math.sqrt(2)))
+
+
+def test_areas_are_those_of_closed_forms():
+    le1 = outline((2, 0), (3.25, 0), (0, 2.75), (0, 1), centres=[None, ORIGIN, None, ORIGIN])
+    assert Shape("le1", 0.1, le1).area == pytest.approx(math.pi / 4 * (3.25 * 2.75 - 2), rel=1e-14)
+    # A half disc far away, of two arcs; and what is left where another is taken out.
+    far = 1e3
+    half = outline((far + 1, 0), (far, 1), (far - 1, 0), centres=[(far, 0), (far, 0)])
+    assert Shape("half", 1e-3, half).area == pytest.approx(math.pi / 2, rel=1e-9)
+    holes = [Hole.circle((0.5, 0.5), 0.1), Hole.ellipse((0.2, 0.2), 0.1, 0.05, part="core")]
+    assert Shape.rectangle(1, 1, holes=holes).area == pytest.approx(1 - math.pi * 0.01, rel=1e-14)
+    lens = outline((0, 0), (1, 0), centres=[(0.5, 1.0), (0.5, -1.0)])
+    r2, half_angle = 1.25, math.atan2(0.5, 1.0)
+    assert Shape("lens", 1e-3, lens).area == pytest.approx(r2 * (2 * half_angle - math.sin(2 * half_angle)), rel=1e-12)
+
+
+@given(some.integers(3, 9), some.integers(0, 5), some.floats(0.3, 0.95))
+def test_a_clockwise_outline_is_turned(count, first, inner):
+    """Sides keep their groups."""
+    corners = [
+        (radius * math.cos(angle), radius * math.sin(angle))
+        for i in range(count)
+        for radius, angle in [(1 if i % 2 else inner, 2 * math.pi * (i + first / 7) / count)]
+    ]
+    names = [f"side{i}" for i in range(count)]
+    forth = Shape("a", 1e-3, [Segment(corner, group=name) for corner, name in zip(corners, names)])
+    # The round from its first corner the other way: a side there ends where it began.
+    corners = [corners[0], *corners[:0:-1]]
+    back = Shape("b", 1e-3, [Segment(corner, group=name) for corner, name in zip(corners, names[::-1])])
+    assert back.area == pytest.approx(forth.area, rel=1e-12) and forth.area > 0
+    ends = [{side.group: (side.start, side.end) for side in shape.rounds[0].sides} for shape in (forth, back)]
+    assert ends[0] == ends[1]
+
+
+def test_what_is_around_a_round_is_the_smallest_part():
+    rings = [Hole.circle((0.5, 0.5), radius, part=f"r{radius}") for radius in (0.2, 0.4, 0.3)]
+    nested = Shape.rectangle(1, 1, holes=[*rings, Hole.circle((0.5, 0.5), 0.1)])
+    assert [(one.inner, one.outer, one.around) for one in nested.rounds] == [
+        ("", None, None),
+        ("r0.2", "r0.3", 3),
+        ("r0.4", "", 0),
+        ("r0.3", "r0.4", 2),
+        (None, "r0.2", 1),
+    ]
+    assert [nested.part_at((x, 0.5)) for x in (0.05, 0.15, 0.25, 0.35, 0.5, 2.0)] == [
+        "", "r0.4", "r0.3", "r0.2", None, None
+    ]  # fmt: skip
+
+
+def test_points_by_a_side_are_put_on_it():
+    """Coordinates of a point on an arc have few digits."""
+    quarter = outline(ORIGIN, (0.1, 0), (0, 0.1), centres=[None, ORIGIN])
+    shape = Shape(
+        "quarter", 1e-3, quarter, points={"on": ("70.7107 mm", "70.7107 mm"), "in": (0.05, 0.02), "o": (1e-9, 0)}
+    )
+    assert math.hypot(*shape.points["on"]) == pytest.approx(0.1, rel=1e-15)
+    assert shape.points["in"] == (0.05, 0.02) and shape.points["o"] == ORIGIN
+
+
+def test_what_a_shape_measures_is_its_label():
+    le1 = outline((2, 0), (3.25, 0), (0, 2.75), (0, 1), centres=[None, ORIGIN, None, ORIGIN])
+    assert Shape("le1", 0.1, le1).label == "le1 (3250 x 2750 mm)"
+    bulge = Shape("bulge", 1e-3, outline(*SQUARE, centres=[None, (0.5, 0.5)]))
+    assert bulge.extent == ((0, 0), pytest.approx((0.5 + math.sqrt(0.5), 1)))
+    own = Shape("own", "1 mm", file="own.msh", unit="1 mm")
+    assert own.label == "own" and own.rounds == () and math.isnan(own.area) and own.unit == 1e-3
+
+
+def circle(*place):
+    return Hole.circle(place[:2], place[2])
+
+
+REFUSED = {
+    "two sides": (
+        lambda: Shape("a", 1, outline((0, 0), (1, 0))),
+        "has 2 sides, and a round has 3 or more, with arcs 2",
+    ),
+    "one arc": (lambda: Shape("a", 1, outline((0, 0), centres=[(1, 0)])), "has 1 sides, and"),
+    "bow": (lambda: Shape("a", 1, outline((0, 0), (1, 1), (1, 0), (0, 1))), "sides 1 and 3 meet at (500, 500) mm"),
+    "touching itself": (
+        lambda: Shape("a", 1, outline((0, 0), (2, 0), (2, 1), (1, 0), (0, 1))),
+        "sides 1 and 4 meet at (1000, 0) mm",
+    ),
+    "back": (lambda: Shape("a", 1, outline((0, 0), (1, 0), (0.5, 0))), "turns back on itself at (0, 0) mm"),
+    "cusp": (
+        lambda: Shape("a", 1, outline((1, 0), (0, 1), (2, 1), centres=[None, None, (2, 0)][::-1])),
+        "no ellipse with axes along x and y",
+    ),
+    "no length": (lambda: Shape("a", 1, outline((0, 0), (0, 0), (1, 1))), "side 1: from (0, 0) mm to itself"),
+    "short": (lambda: Shape("a", 1, outline((0, 0), (1, 0), (1, 1), (1 - 1e-8, 1))), "side 3: is shorter than"),
+    "half a turn": (
+        lambda: Shape("a", 1, outline(*SQUARE, centres=[(0.5, 0)])),
+        "outline, side 1: arc from (0, 0) mm to (1000, 0) mm about (500, 0) mm: is half a turn",
+    ),
+    "no turn": (lambda: Shape("a", 1, outline(*SQUARE, centres=[(-1, 0)])), "no ellipse"),
+    "no ellipse": (
+        lambda: Shape("a", 1, outline(*SQUARE, centres=[(0.3, 0.1)])),
+        "the ends are 316.227766 and 707.106781 mm from it, and no ellipse",
+    ),
+    "centre at an end": (lambda: Shape("a", 1, outline(*SQUARE, centres=[(0, 0)])), "an end is at the centre"),
+    "arc through a side": (
+        lambda: Shape("a", 1, outline((0, 0), (1, 0), (1, 0.3), (0, 0.3), centres=[(0.5, -0.05)])),
+        "sides 1 and 3 meet at",
+    ),
+    "hole through the outline": (lambda: Shape.rectangle(1, 1, holes=[circle(1, 1, 0.3)]), "hole 1 meets outline at"),
+    "hole at the outline": (lambda: Shape.rectangle(1, 1, holes=[circle(0.5, 0.5, 0.5)]), "hole 1 meets outline at"),
+    "holes in holes": (
+        lambda: Shape.rectangle(1, 1, holes=[circle(0.5, 0.5, 0.3), circle(0.5, 0.5, 0.1)]),
+        "hole 2: is inside hole 1, where nothing is",
+    ),
+    "holes that meet": (
+        lambda: Shape.rectangle(1, 1, holes=[circle(0.4, 0.5, 0.1), circle(0.6, 0.5, 0.1)]),
+        "hole 2 meets hole 1 at (500, 500) mm",
+    ),
+    "hole outside": (lambda: Shape.rectangle(1, 1, holes=[circle(5, 0, 1)]), "hole 1: is outside the outline"),
+    "hole around": (lambda: Shape.rectangle(1, 1, holes=[circle(0.5, 0.5, 9)]), "hole 1: is outside the outline"),
+    "group within": (
+        lambda: Hole.circle((0, 0), 1, group="rim", part="core"),
+        "part 'core': a side has the group 'rim', but is inside the body",
+    ),
+    "point outside": (
+        lambda: Shape.rectangle(1, 1, points={"p": (2, 0)}),
+        "point 'p': (2000, 0) mm is not in the body",
+    ),
+    "point in a hole": (
+        lambda: Shape.rectangle(1, 1, points={"p": (0.5, 0.5)}, holes=[circle(0.5, 0.5, 0.1)]),
+        "point 'p': (500, 500) mm is not in the body",
+    ),
+    "points as one": (
+        lambda: Shape.rectangle(1, 1, points={"p": (0.5, 0.5), "q": (0.5, 0.5 + 1e-8)}),
+        "points 'p' and 'q': are as good as one",
+    ),
+    "point and sides": (lambda: Shape.rectangle(1, 1, points={"left": (0, 0)}), "'left' names a point and sides"),
+    "file and outline": (lambda: Shape("a", 1, outline(*SQUARE), file="b.msh"), "has both an outline and a file"),
+    "nothing": (lambda: Shape("a", 1), "has neither an outline nor a file"),
+    "file with points": (lambda: Shape("a", 1, file="b.msh", points={"p": (0, 0)}), "holes and points are those of"),
+    "name": (lambda: Shape("a b", 1, outline(*SQUARE)), "'a b' cannot be a name; use letters"),
+    "group's name": (lambda: Segment((0, 0), group="upper side"), "'upper side' cannot be a name"),
+    "thickness": (lambda: Shape("a", "1 kg", outline(*SQUARE)), "shape 'a', thickness: '1 kg'"),
+    "no point": (lambda: Segment("0 mm"), "start of a segment: '0 mm' is not x and y; give two such as"),
+    "three coordinates": (lambda: Segment((0, 0, 0)), "(0, 0, 0) is not x and y"),
+    "no segment": (lambda: Shape("a", 1, SQUARE), "is not a Segment; give springtune.Segment(...)"),
+    "radius": (lambda: Hole.circle((0, 0), 0), "radius: 0 is not above zero"),
+    "name of a load": (
+        lambda: Shape.rectangle(
+            1, 1, loads={"push": LoadCase("pull", [Support("left", 0)], [Traction("right", (1, 0))])}
+        ),
+        "'push' has a load that is named 'pull'",
+    ),
+    "misspelt": (
+        lambda: Shape.rectangle(
+            1, 1, loads={"pull": LoadCase("pull", [Support("lfet", 0)], [Traction("right", (1, 0))])}
+        ),
+        "load 'pull', support: no group is named 'lfet'; did you mean 'left'? known: lower, right, upper, left",
+    ),
+    "no support": (lambda: LoadCase("a", ()), "load 'a': has no supports"),
+    "nothing done": (lambda: LoadCase("a", st.Support("left", 0, 0)), "load 'a': does nothing; give tractions"),
+    "held twice": (lambda: LoadCase("a", [Support("left", 0), Support("left", 1e-3)]), "hold 'left' along x twice"),
+    "holds nothing": (lambda: Support("left"), "support on 'left': holds neither x nor y"),
+    "no force": (lambda: Traction("left", ("1 mm", 0)), "traction on 'left', force, x: '1 mm' is a length"),
+    "scalar force": (lambda: Traction("left", 5), "traction on 'left', force: 5 is not x and y"),
+    "no pressure": (lambda: st.Pressure("left", "1 kN"), "pressure on 'left': '1 kN' is a force"),
+    "follower": (lambda: st.Pressure("left", 1, follower="yes"), "follower: 'yes'; give True or False"),
+    "gravity": (lambda: LoadCase("a", [Support("left", 0)], gravity=9.81), "gravity: 9.81; give x and y"),
+    "kind": (lambda: st.Quantity("u", "displcement"), "unknown kind 'displcement'; did you mean 'displacement'?"),
+    "component": (lambda: st.Quantity("u", "displacement", "left", "z"), "component 'z'; give one of x, y"),
+    "of all": (lambda: st.Quantity("u", "area", "left"), "area is of the entire body"),
+    "expected": (lambda: st.Quantity("u", "stress", "p", "xx", expected="1 mm"), "expected: '1 mm' is a length"),
+    "two of one name": (
+        lambda: LoadCase("a", [Support("left", 1)], quantities=[st.Quantity("u", "area"), st.Quantity("u", "energy")]),
+        "two quantities are named 'u'",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_shape_is_refused(name):
+    make, says = REFUSED[name]
+    with pytest.raises(ValueError) as caught:
+        make()
+    assert says in str(caught.value)
+
+
+def test_shapes_cost_no_heavy_import():
+    """A study's shapes are checked each time that it is read."""
+    import subprocess
+    import sys
+
+    code = (
+        "import sys; from springtune.problem.shapes import Hole, Shape; "
+        "Shape.rectangle(1, 1, holes=[Hole.ellipse((.5, .5), .1, .2)]); "
+        "print({'numpy', 'scipy', 'netgen'} & set(sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
