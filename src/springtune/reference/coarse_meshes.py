@@ -32,7 +32,7 @@ LARGEST_TURN = np.pi / 6
 LARGEST_SAGITTA = 0.15
 """Of a side of a triangle along an arc, over the distance to what else there is."""
 
-SAMPLES = 7
+PIECE_SAMPLES = 7
 """Points on a piece of an outline at which distances are taken."""
 
 SMALLEST = 1e-9
@@ -299,7 +299,7 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
     done = False
     while not done:
         done = True
-        samples = np.array([piece.at(np.linspace(0, 1, SAMPLES)) for piece in pieces])
+        samples = np.array([piece.at(np.linspace(0, 1, PIECE_SAMPLES)) for piece in pieces])
         chords = samples[:, -1] - samples[:, 0]
         lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
         normal = chords[:, ::-1] * [1, -1] / np.linalg.norm(chords, axis=1)[:, None]
@@ -308,7 +308,7 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
         refined: list[_Piece] = []
         for piece, at, length, sagitta in zip(pieces, samples, lengths, sagittas):
             # What is farther than its length does not matter.
-            near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // SAMPLES)
+            near = np.unique(np.concatenate(tree.query_ball_point(at, length)).astype(int) // PIECE_SAMPLES)
             apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
             clear = apart > SMALLEST * extent
             nearest = apart[clear].min(initial=np.inf)
