@@ -109,10 +109,11 @@ class TestPage:
         from springtune.kinds.samples.names import PARAMETERS
         from springtune.kinds.samples.variables import EFFECTS, SAMPLES, SOBOL
         from springtune.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
+        from springtune.kinds.shapes.variables import SHAPE_FIELDS, SHAPES
         from springtune.kinds.stability.variables import STABILITY
 
         groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK)
-        groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT)
+        groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT, SHAPES, SHAPE_FIELDS)
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
         known = {group.name: group for group in groups}
         for view in views().values():

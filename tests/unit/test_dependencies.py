@@ -332,7 +332,8 @@ def _keys():
 SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
 SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")}
 SOLVING |= {"patch", "annealed"}
-REFERENCE = {"kinds.scenes.reference", "kinds.samples.interpolate", "unit"}
+SOLVING |= {"kinds.shapes.solve"}
+REFERENCE = {"kinds.scenes.reference", "kinds.samples.interpolate", "kinds.shapes.reference", "unit"}
 
 VERSIONS = {
     "matplotlib": set(),
@@ -341,13 +342,13 @@ VERSIONS = {
     "pint": set(),
     "pydantic": set(),
     "snakemake": set(),
-    "netgen-mesher": {"free"},
+    "netgen-mesher": {"free", "kinds.shapes.mesh", "kinds.shapes.reference", "kinds.shapes.solve"},
     "meshio": {"from a file"},
-    "numba": {"kinds.stability.stage", "kinds.benchmark.stage"},
+    "numba": {"kinds.stability.stage", "kinds.benchmark.stage", "kinds.shapes.solve"},
     "scikit-fem": {"kinds.scenes.reference", "kinds.benchmark.stage"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "from a file"},
+    "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "kinds.shapes.mesh", "from a file"},
 }
 
 

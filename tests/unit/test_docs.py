@@ -123,7 +123,7 @@ FOLLOWED = [page for page in PAGES if page not in ELSEWHERE and any(blocks_of(pa
 def _of_the_paper(data):
     """A group with the labels of the paper's study, whose fields are those of the coarsest mesh and of each spring."""
     data = data.assign_coords(beam=["200x40", "200x30"]) if "beam" in data else data
-    if "displacement_x" not in data:
+    if "displacement_x" not in data or "case" in data.dims:
         return data
     return data.assign(
         x=data.x.where(data.mesh_size == data.mesh_size.max()), spring_force=data.spring_nodes.isel(spring_end=0)

@@ -329,7 +329,8 @@ def test_quick_is_small_but_has_everything():
     for dimension in ("mesh_type", "material", "load", "definition", "kinematics"):
         assert set(study.axes[dimension]) >= set(whole[dimension])
     assert study.axes["load"] == tuple(LOADS)
-    assert set(study.outputs) == set(outputs()) - {"sweep"}  # which would give its dataset further dimensions
+    # Which would give its dataset further dimensions, and further labels.
+    assert set(study.outputs) == set(outputs()) - {"sweep", "shapes"}
 
 
 class TestMeshFiles:
@@ -408,7 +409,7 @@ class TestDefinitions:
     def test_no_moduli_without_asking(self, load):
         study = load(SMALL)
         assert study.parts["moduli"] is None
-        assert study.outputs == ("sensitivity", "size", "deformed", "sweep", "tables")
+        assert study.outputs == ("sensitivity", "size", "deformed", "sweep", "tables", "shapes")
 
     @pytest.mark.parametrize(
         ("change", "expected"),

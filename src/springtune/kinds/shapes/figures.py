@@ -97,6 +97,8 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     rows = max(1, len(names))
     figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + 2.25 * rows), sharey=False)
     title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
+    if not all(_points(cut, name, one)[3].all() for name in names for one in _definitions(cut)):
+        title += "; hollow: unstable, or beyond the linear reference"
     place = {"left": 0.6, "right": 0.08, "bottom": 0.42, "top": 0.52, "across": 0.2, "down": 0.72, "title": title}
     style.arrange(figure, axes, **place)
     looks = {name: style.line(i) for i, name in enumerate(_definitions(cut))}

@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...jobs.hashing import hash_of
-from ...jobs.keys import definition_key, material_key, stage_key
+from ...jobs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ..base import Stage
 from .described import geometry, load
 from .names import OWN_FILE
@@ -65,7 +65,12 @@ def mesh_source(part, one):
 
 def mesh_key(part, one):
     """Key of a scene's mesh."""
-    return hash_of(_parameters(mesh_source(part, one)), stage_key("kinds.shapes.mesh"))
+    return hash_of(_parameters(mesh_source(part, one)), stage_key("kinds.shapes.mesh"), _reader(part.shape[one.shape]))
+
+
+def _reader(shape):
+    """What reads the mesh file of a shape, the library behind it included; nothing where it has none."""
+    return mesh_type_key(OWN_FILE) if shape.file else ""
 
 
 def _case(part, shape, material, name):
@@ -79,7 +84,8 @@ def _case(part, shape, material, name):
 def reference_task(part, shape, material, name):
     """Task of a reference."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
-    key = hash_of(task | {"shape": _parameters(task["shape"])}, stage_key("kinds.shapes.reference"))
+    code = stage_key("kinds.shapes.reference"), _reader(part.shape[shape])
+    key = hash_of(task | {"shape": _parameters(task["shape"])}, code)
     return {"key": key} | task
 
 
