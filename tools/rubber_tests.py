@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from springtune.output import style
-from springtune.springs.rubber import TESTS, SpringLaw, UniaxialTest, Yeoh
+from springtune.springs.rubber import RUBBER_TESTS, SpringLaw, UniaxialTest, Yeoh
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -16,7 +16,9 @@ REPOSITORY = Path(__file__).parents[1]
 @style.styled
 def draw(path: Path) -> None:
     """Write the figure."""
-    data = {test: UniaxialTest.read(REPOSITORY / f"config/treloar/{test.replace(' ', '-')}.csv") for test in TESTS}
+    data = {
+        test: UniaxialTest.read(REPOSITORY / f"config/treloar/{test.replace(' ', '-')}.csv") for test in RUBBER_TESTS
+    }
     fitted = data["uniaxial"]
     laws = {
         "Yeoh's law": Yeoh.fitted(fitted),

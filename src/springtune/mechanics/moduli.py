@@ -78,10 +78,10 @@ def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return np.unique(edges[left]), np.unique(edges[~left])
 
 
-STRESSES = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (1.0, 0.0)))
+UNIT_STRESSES = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (1.0, 0.0)))
 """Unit stresses xx, yy and xy [1]."""
 
-STRAINS = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 0.5), (0.5, 0.0)))
+UNIT_STRAINS = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 0.5), (0.5, 0.0)))
 """Unit strains xx, yy and shear angle xy [1]."""
 
 
@@ -256,7 +256,7 @@ class PatchTest:
     @cached_property
     def _free_body(self) -> tuple[np.ndarray, np.ndarray]:
         """Directions held, none but the rigid motions', and forces of three even stresses, shape (3, n_points, 2)."""
-        return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in STRESSES])
+        return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in UNIT_STRESSES])
 
     def compliance(self, springs: Elastic) -> np.ndarray:
         """Compliance under even tractions, see `outline_compliance`."""
@@ -270,7 +270,7 @@ class PatchTest:
         """Stiffness under affine displacements of the outline, see `outline_stiffness`."""
         held = self._frame[0]
         network = self._network("frame", held, springs)
-        fields = [(self.mesh.points - self.mesh.points[0]) @ np.array(strain) for strain in STRAINS]
+        fields = [(self.mesh.points - self.mesh.points[0]) @ np.array(strain) for strain in UNIT_STRAINS]
         moved = fields
         if network.unknowns:
             inside = [network.rest_factor.solve(network.linear_resistance(field)) for field in fields]

@@ -27,7 +27,7 @@ from ..problem.materials import Material
 from ..problem.quantities import positive
 from .base import DefinitionError, Springs, triangles_only, zero
 
-TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
+RUBBER_TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
 """Tests, and the power p of the nominal stress 2 (q - q^-p) W'(I_1) of an incompressible sheet."""
 
 LEAST_SHARE = 0.05
@@ -241,7 +241,7 @@ class Yeoh:
         """Refuse a law whose true stress falls somewhere in the range of I_1 of the data, in one of the tests."""
         if not self.coefficients[0] > 0:
             raise TestDataError(f"{name}: fits a modulus that is not above zero; give points of small stretches, too")
-        for test in TESTS:
+        for test in RUBBER_TESTS:
             most = 1.0
             while self.excess(test, 1.1 * most) <= self.largest:
                 most *= 1.1
@@ -255,18 +255,18 @@ class Yeoh:
 
     @staticmethod
     def excess(test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """I_1 - 3 of a stretch [1] in one of `TESTS`."""
+        """I_1 - 3 of a stretch [1] in one of `RUBBER_TESTS`."""
         q = np.asarray(stretch, float)
         other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[test]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """Nominal stress [Pa] at stretches [1] in one of `TESTS`."""
+        """Nominal stress [Pa] at stretches [1] in one of `RUBBER_TESTS`."""
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
         slope = np.zeros(q.shape)
         for n, c in enumerate(self.coefficients, 1):
             slope = slope + n * c * excess ** (n - 1)
-        return np.asarray(2 * (q - q ** -float(TESTS[test])) * slope)
+        return np.asarray(2 * (q - q ** -float(RUBBER_TESTS[test])) * slope)
 
     @property
     def material(self) -> Material:
@@ -372,7 +372,7 @@ class SpringLaw:
         return np.asarray(sum(a * (s - s ** -float(power)) for a, power in zip(self.coefficients, LAW_POWERS)))
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """Nominal stress [Pa] along a row, at stretches [1] in one of `TESTS`; NaN where the lattice lies flat."""
+        """Nominal stress [Pa] along a row, at stretches [1] in one of `RUBBER_TESTS`; NaN where the lattice lies flat."""
         q = np.asarray(stretch, float)
         row, oblique = self.pull(q), np.sqrt((q**2 + 3) / 4)
         if test == "uniaxial":  # the oblique springs carry nothing
