@@ -372,7 +372,7 @@ class SpringLaw:
         return np.asarray(sum(a * (s - s ** -float(power)) for a, power in zip(self.coefficients, LAW_POWERS)))
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """Nominal stress [Pa] along a row, at stretches [1] in one of `RUBBER_TESTS`; NaN where the lattice lies flat."""
+        """Nominal stress [Pa] along a row, at stretches [1] of a test; NaN where the lattice lies flat."""
         q = np.asarray(stretch, float)
         row, oblique = self.pull(q), np.sqrt((q**2 + 3) / 4)
         if test == "uniaxial":  # the oblique springs carry nothing
