@@ -33,6 +33,7 @@ from mechanics import (
     area_of,
     element_forces,
     follower_forces,
+    rubber_forces,
     spring_forces,
     squares_forces,
 )
@@ -220,6 +221,13 @@ def body_of(scene, mesh, springs):
             inverse = (turned / (2 * area)).transpose(2, 0, 1)
             moduli = [np.full(len(corners), young * t * m) for m in (nu / (1 - nu**2), 1 / (2 * (1 + nu)))]
             parts.append(Part(corners, element_forces, inverse, area, *moduli))
+        elif scene.definition == "neo-hooke":
+            sides = np.stack([rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]], axis=2)
+            turned = np.stack([[sides[:, 1, 1], -sides[:, 0, 1]], [-sides[:, 1, 0], sides[:, 0, 0]]])
+            inverse = (turned / (2 * area)).transpose(2, 0, 1)
+            bulk = 0.0 if nu >= 0.5 else young * t / (3 * (1 - 2 * nu))
+            moduli = [np.full(len(corners), one) for one in (young * t / (2 * (1 + nu)), bulk)]
+            parts.append(Part(corners, rubber_forces, inverse, area, *moduli))
         elif scene.definition == "delingette-tensile":
             first, second = young * t * nu / (1 - nu**2), young * t / (1 + nu)
             angles, a, b = angles_of(rest)

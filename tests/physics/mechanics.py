@@ -123,6 +123,36 @@ def element_energy(x, inverse, area, first, second):
     return 0.5 * area * (green * _second(green, first, second)).sum(axis=(1, 2))
 
 
+def rubber_forces(x, inverse, area, shear, bulk):
+    """Derivative of the neo-Hookean energy of linear triangles, by the thickness that leaves no stress across them.
+
+    ``mu/2 (J^(-2/3) I_1 - 3) + K/2 (J - 1)^2`` per volume; no bulk modulus stands for an incompressible sheet.
+    """
+    gradient = _gradient(x, inverse)
+    (a, b), (c, d) = gradient[:, 0].T, gradient[:, 1].T
+    ratio, squares = a * d - b * c, a * a + b * b + c * c + d * d
+    cofactor = np.stack([np.stack([d, -c], axis=1), np.stack([-b, a], axis=1)], axis=1)
+    if not np.any(bulk):
+        nominal = shear[:, None, None] * (gradient - cofactor / (ratio**3)[:, None, None])
+    else:
+        thickness = 1 / np.sqrt(ratio)
+        for _ in range(40):  # Newton's method, its slope by the same formula
+            volume = ratio * thickness
+            power, sum_ = volume ** (-2 / 3), squares + thickness**2
+            pull = shear * power * (thickness - sum_ / (3 * thickness)) + bulk * (volume - 1) * ratio
+            of_power = -2 * power / (3 * thickness)
+            slope = shear * (
+                of_power * (thickness - sum_ / (3 * thickness)) + power * (1 / 3 + sum_ / (3 * thickness**2))
+            )
+            thickness = thickness - pull / (slope + bulk * ratio**2)
+        volume = ratio * thickness
+        power = volume ** (-2 / 3)
+        by_ratio = bulk * (volume - 1) * thickness - shear * power * (squares + thickness**2) / (3 * ratio)
+        nominal = (shear * power)[:, None, None] * gradient + by_ratio[:, None, None] * cofactor
+    columns = area[:, None, None] * nominal @ inverse.swapaxes(1, 2)
+    return np.stack([-columns.sum(axis=2), columns[..., 0], columns[..., 1]], axis=1)
+
+
 def follower_forces(x, share):
     """Forces of a unit total on the two ends of edges that carry a pressure: minus, to be a derivative."""
     e = x[:, 1] - x[:, 0]

@@ -87,7 +87,7 @@ EVERY_PLOT = {
     plot_laying: ({}, (4, 3)),
     plot_refinement: ({}, 2),
     plot_shapes: ({}, None),
-    plot_shape_errors: ({"shape": "cook"}, (2, 2)),
+    plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
     plot_shape: ({"shape": "hole"}, 2),
     plot_benchmark: ({"scene": "bending"}, None),
     plot_benchmark_rates: ({}, (2, 2)),

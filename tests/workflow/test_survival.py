@@ -115,7 +115,7 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     assert not list(run.folder.rglob("*.unfinished"))
 
 
-LINE = "        problem, load = self.problem(kind, springs, follower), force / springs.reference\n"
+LINE = "        problem = self.problem(kind, springs, follower)\n"
 """Of the package, in `springtune.scene.sheet.Sheet.solve`."""
 
 

@@ -487,6 +487,7 @@ def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
 
     Examples
     --------
+    >>> import numpy as np
     >>> along = np.diag([1.0, 0.0, 0.0])  # fibres along x
     >>> rotated(along, np.pi / 4).round(6).tolist()
     [[0.25, 0.25, 0.25], [0.25, 0.25, 0.25], [0.25, 0.25, 0.25]]
