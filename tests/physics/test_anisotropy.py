@@ -288,7 +288,9 @@ NOT_ADDITIVE = {"density", "oriented", "adjoint", *(name for name in DEFINITIONS
 """Definitions that count or test the springs of each part alone."""
 
 
-@pytest.mark.parametrize("name", ADDITIVE)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "adjoint" else name for name in ADDITIVE]
+)
 def test_parts_of_equal_materials_are_one_body(name):
     cells = DEFINITIONS[name].cells
     mesh = MESH_TYPES["structured" if 3 in cells else "braced"](0.04, 0.0104, 2e-3)  # six rows

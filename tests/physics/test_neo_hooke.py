@@ -160,7 +160,7 @@ def test_closed_forms_of_three_tests(test, stretch):
 
 
 @pytest.mark.parametrize("nu", [0.5, 0.3])
-@pytest.mark.parametrize("force", ["2 N", "40 N"])
+@pytest.mark.parametrize("force", ["2 N", pytest.param("40 N", marks=pytest.mark.slow)])
 def test_a_beam_converges_to_the_reference_at_finite_strain(nu, force):
     """200 x 40 mm, by 5 % and by some 200 %, clamped: below its mesh error, and falling with the mesh."""
     beam, material = springtune.Beam("200 mm", "40 mm"), springtune.Material("1 MPa", nu)

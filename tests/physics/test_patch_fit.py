@@ -183,6 +183,7 @@ def test_less_than_half_of_the_error_of_lattice_on_free_meshes(load):
     assert worst("patch-fit", load) < 0.015 < 0.2 * worst("lattice", load)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", ["traction", "bending", "shear"])
 def test_less_than_half_of_the_error_of_lattice_on_scattered_points(load):
     assert worst("patch-fit", load, (0, 1)) < 0.5 * worst("lattice", load, (0, 1))
