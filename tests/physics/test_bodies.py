@@ -1,0 +1,76 @@
+"""Bodies in combination: parts with energies of their own, other programs, caches, meshes that are not the shape's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.mesh.groups import GroupedMesh
+
+STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
+RUBBER = st.Material("1 GPa", 0.5, density="1000 kg/m^3", name="rubber")
+HARD = st.Material("3 GPa", 0.5, density="1000 kg/m^3", name="hard")
+
+PULL = st.LoadCase(
+    "pull",
+    (st.Support("left", x=0.0, y=0.0),),
+    (st.Traction("right", ("100 N", 0.0)),),
+    quantities=(
+        st.Quantity("end", "displacement", "right", "x"),
+        st.Quantity("held", "reaction", "left", "x"),
+        st.Quantity("in_core", "stress", "core", "xx"),
+        st.Quantity("beside", "stress", "beside", "xx"),
+    ),
+)
+PLATE = st.Shape.rectangle(
+    0.1,
+    0.04,
+    holes=[st.Hole.circle((0.05, 0.02), 0.008), st.Hole.circle((0.08, 0.025), 0.006, part="core")],
+    points={"core": (0.08, 0.025), "beside": (0.02, 0.01)},
+    loads={"pull": PULL},
+)
+
+
+@pytest.fixture(scope="module")
+def grouped():
+    return st.mesh_shape(PLATE, "6 mm")
+
+
+@pytest.mark.parametrize(
+    ("main", "core"), [(RUBBER, HARD), (RUBBER, STEEL), (STEEL, RUBBER), (STEEL, replace(STEEL, name="same"))]
+)
+def test_rubber_beside_other_rubber_is_linear_triangles_of_both(grouped, main, core):
+    """Energies of several laws, each of its own cells; stresses too, to rounding at small strain."""
+    values = [
+        st.Scene(PLATE, grouped, {"": main, "core": core}, "pull", definition=name, kinematics="linear").solve().values
+        for name in ("neo-hooke", "delingette")
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-7)
+    bent = st.Scene(PLATE, grouped, {"": main, "core": core}, "pull", definition="neo-hooke", scale=1e-4).solve()
+    assert bent.message == ""
+    assert bent.values == pytest.approx({name: 1e-4 * value for name, value in values[1].items()}, rel=1e-4)
+
+
+@pytest.mark.parametrize(("definition", "materials"), [("area", (STEEL, THIRD)), ("neo-hooke", (RUBBER, STEEL))])
+@pytest.mark.parametrize("ending", ["json", "h5", "csv", "vtu"])
+def test_springs_of_parts_with_energies_of_their_own_are_files_of_all_cells(
+    grouped, tmp_path, ending, definition, materials
+):
+    scene = st.Scene(PLATE, grouped, dict(zip(("", "core"), materials)), "pull", definition=definition)
+    net = scene.springs.write(tmp_path / f"net.{ending}")
+    read = st.SpringNet.read(net[0])
+    written = st.SpringNet.from_scene(scene, errors=False)
+    assert [one.kind for one in read.energies] == [one.kind for one in written.energies]
+    for one, other in zip(read.energies, written.energies):
+        assert np.array_equal(one.cells, grouped.mesh.triangles)
+        for name, values in other.values.items():
+            assert values.shape[0] == len(grouped.mesh.triangles)
+            assert np.isfinite(values).all()
+            assert one.values[name] == pytest.approx(values, rel=1e-12)
+    modulus = {"area": "modulus", "incompressible": "c1"}[written.energies[0].kind]
+    of_core = grouped.parts["core"][3]
+    none = written.energies[0].values[modulus] == 0
+    # The part that has none of an energy has zeros.
+    assert np.array_equal(none, of_core)
