@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.mesh.groups import GroupedMesh
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
