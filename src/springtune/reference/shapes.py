@@ -33,6 +33,9 @@ STRESS_SHARE = 10.0
 #: Quantities below this share of the largest one of their kind are judged by that share.
 SMALLEST_SHARE = 1e-3
 
+#: A value of less than so many times the bound on its error is zero as far as can be told.
+TOLD_FROM_ZERO = 10.0
+
 #: Force on a support at a point, over all of them, that is taken for none.
 SMALLEST_REACTION = 1e-6
 
@@ -50,7 +53,8 @@ class ShapeReference:
     Attributes
     ----------
     values : dict of str to float
-        Quantities of interest, in SI units.
+        Quantities of interest, in SI units; exactly zero where the solution does not tell one from zero: where it is
+        less than ten times the bound on its error, as it is by symmetry.
     error_estimates : dict of str to float
         Bounds on their errors, relative [1]: to the value itself, or to a thousandth of what is largest of its kind in
         the body where the value is less.
@@ -213,6 +217,7 @@ def converge(
     names = [quantity.name for quantity in load.quantities]
     values: list[dict[str, float]] = []
     estimates: dict[str, float] = {}
+    bounds: dict[str, float] = {}
     complaint = ""
     for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
         if complaint and problem.size(degree) > LARGEST_LEVEL:
@@ -229,6 +234,7 @@ def converge(
             scale = max(abs(values[-1][name]), SMALLEST_SHARE * level.scale(kind)) or 1.0
             before, last = (abs(values[i][name] - values[i - 1][name]) / scale for i in (-2, -1))
             estimates[name] = max(last, before / 4) + level.round_off
+            bounds[name] = estimates[name] * scale
             accepted = tolerance * (STRESS_SHARE if kind == "stress" else 1.0)
             falls = last <= before / 2 or before <= accepted / 10
             if not (estimates[name] <= accepted and falls) and not complaint:
@@ -240,7 +246,10 @@ def converge(
         if not complaint:
             rotation, strain = level.rotation_and_strain()
             return ShapeReference(
-                {name: values[-1][name] for name in names},
+                {
+                    name: values[-1][name] if abs(values[-1][name]) > TOLD_FROM_ZERO * bounds[name] else 0.0
+                    for name in names
+                },
                 {name: estimates[name] for name in names},
                 energy=values[-1][""],
                 rotation=rotation,
@@ -752,14 +761,15 @@ class _Level:
 
     def _reaction(self, group: str, axis: int) -> float:
         space, problem = self.space, self.problem
-        if group in space.mesh.named:
-            return float(self.residual[space.mesh.named[group], axis])
-        corners = np.unique([ends for ends, _ in self._group_sides(group)])
         # A corner where two supports meet has a share in both; layers make its force vanish.
         claims = np.zeros(len(space.mesh.points))
         for support in problem.load.supports:
             if (support.x, support.y)[axis] is not None and support.group not in space.mesh.named:
                 claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
+        if group in space.mesh.named:
+            point = space.mesh.named[group]
+            return 0.0 if claims[point] else float(self.residual[point, axis])
+        corners = np.unique([ends for ends, _ in self._group_sides(group)])
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
     def _area_growth(self) -> np.ndarray:
