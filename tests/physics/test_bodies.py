@@ -100,3 +100,94 @@ def test_what_is_zero_by_symmetry_has_no_relative_error():
     assert result.values["held"] == pytest.approx(-4000.0, rel=1e-9) == known["held"]
     assert result.values["pinned_x"] == 0.0
     assert max(choice.worst for choice in st.predict(shape, grouped, STEEL)) < 0.2
+
+
+def holed(radius, *, outline=True, part=""):
+    case = st.LoadCase(
+        "push",
+        (st.Support("left", x=0.0, y=0.0),),
+        pressures=(st.Pressure("upper", "1 MPa", follower=True),),
+        quantities=(st.Quantity("end", "displacement", "right", "y"),),
+    )
+    loads = {"push": case}
+    if not outline:
+        return st.Shape("plate", 1e-3, file="plate.msh", loads=loads)
+    holes = [st.Hole.circle((0.05, 0.02), radius, part=part)]
+    return st.Shape.rectangle(0.1, 0.04, holes=holes, points={"tip": (0.1, 0.02)}, loads=loads, name="plate")
+
+
+class TestMeshOfAnotherShape:
+    """The reference is on the outline of the shape: a mesh of another one would be compared with it."""
+
+    @pytest.mark.parametrize("part", ["", "core"])
+    def test_other_radius(self, part):
+        grouped = st.mesh_shape(holed(0.015, part=part), "4 mm")
+        materials = {"": STEEL} | ({part: THIRD} if part else {})
+        with pytest.raises(ValueError, match="particle at .* on no side of shape 'plate'; mesh it with"):
+            st.Scene(holed(0.008, part=part), grouped, materials, "push", definition="delingette")
+
+    def test_no_hole(self):
+        full = st.Shape.rectangle(0.1, 0.04, loads=holed(0.01).loads, name="full")
+        with pytest.raises(ValueError, match="has no edge on the side of shape 'plate' from"):
+            st.Scene(holed(0.008), st.mesh_shape(full, "4 mm"), STEEL, "push", definition="delingette")
+
+    def test_group_or_point_elsewhere(self):
+        shape = holed(0.008)
+        grouped = st.mesh_shape(shape, "4 mm")
+        for wrong in (grouped.sides["left"], grouped.sides["right"][:3]):
+            other = replace(grouped, sides={**grouped.sides, "right": wrong})
+            with pytest.raises(ValueError, match="its group 'right' is not the sides 'right' of shape 'plate'"):
+                st.Scene(shape, other, STEEL, "push", definition="delingette")
+        moved = replace(grouped, points={"tip": np.array([0.1, 0.03])})
+        with pytest.raises(ValueError, match=r"its point 'tip' is at \(100, 30\) mm, that of shape 'plate' at"):
+            st.Scene(shape, moved, STEEL, "push", definition="delingette")
+
+    @pytest.mark.parametrize(("size", "refined"), [(0.02, {}), (2e-3, {"hole": 5e-4})])
+    def test_its_own_mesh_however_coarse_is_taken(self, size, refined):
+        outline = (
+            st.Segment((0.02, 0.0), group="lower"),
+            st.Segment((0.06, 0.0), group="right"),
+            st.Segment((0.05, 0.04), centre=(0.0, 0.0), group="arc"),
+            st.Segment((0.0, 0.05), group="left"),
+            st.Segment((0.0, 0.03), centre=(0.0, 0.0), group="inner"),
+        )
+        nested = [st.Hole.circle((0.03, 0.03), 0.01, part="ring"), st.Hole.ellipse((0.03, 0.03), 0.006, 0.003)]
+        case = st.LoadCase(
+            "pull", (st.Support("left", x=0.0, y=0.0),), (st.Traction("right", (1.0, 0.0)),),
+            quantities=(st.Quantity("end", "displacement", "right", "x"),),
+        )  # fmt: skip
+        shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": case})
+        assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), STEEL, "pull", definition="lattice")
+
+
+def test_sides_of_one_s_own_are_sides():
+    """A pressure on edges the wrong way round would pull; on edges inside it would act on nothing that there is."""
+    shape = holed(0.008, outline=False)
+    grouped = st.mesh_shape(holed(0.008), "4 mm")
+    turned = replace(grouped, sides={name: edges[:, ::-1] for name, edges in grouped.sides.items()})
+    with pytest.raises(ValueError, match="load 'push': 'upper' has edges with the body on their right"):
+        st.Scene(shape, turned, STEEL, "push", definition="delingette")
+    inner = replace(grouped, sides={**grouped.sides, "right": grouped.mesh.edges[~grouped.mesh.on_outline][:2]})
+    with pytest.raises(ValueError, match="load 'push': 'right' has edges that are not on the outline"):
+        st.Scene(shape, inner, STEEL, "push", definition="delingette")
+
+
+def test_scenes_that_share_a_sheet_have_groups_of_their_own():
+    shape = holed(0.008, outline=False)
+    grouped = st.mesh_shape(holed(0.008), "4 mm")
+    other = replace(grouped, sides={**grouped.sides, "upper": grouped.sides["upper"][:5]})
+    first = st.Scene(shape, grouped, STEEL, "push", definition="delingette", kinematics="linear")
+    values = first.solve().values
+    alone = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear").solve().values
+    shared = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear", sheet=first.sheet)
+    assert shared.solve().values == alone != values
+
+
+def test_a_reference_is_solved_once_for_all_scales():
+    shape = holed(0.008)
+    first = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="lattice")
+    twice = st.Scene(shape, first.grouped, STEEL, "push", definition="lattice", scale=-2.0, sheet=first.sheet)
+    known = first.reference_values()["end"]
+    assert twice.reference_values()["end"] == pytest.approx(-2 * known, rel=1e-12)
+    solves = {id(one._level) for _, one in first.sheet.references.values()}
+    assert len(solves) == 1
