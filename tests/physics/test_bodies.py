@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import springtune as st
+from springtune.reference.shapes import solve_shape
+from springtune.reference.small_strain import ReferenceNotConvergedError
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
@@ -191,3 +193,19 @@ def test_a_reference_is_solved_once_for_all_scales():
     assert twice.reference_values()["end"] == pytest.approx(-2 * known, rel=1e-12)
     solves = {id(one._level) for _, one in first.sheet.references.values()}
     assert len(solves) == 1
+
+
+def test_a_reference_that_is_refused_within_its_tolerance_says_why(monkeypatch):
+    """Steps that do not halve make no bound; and a point in the middle of a side is no corner of 180 degrees."""
+    monkeypatch.setattr("springtune.reference.shapes.HIGHEST_DEGREE", 4)
+    case = st.LoadCase(
+        "push", (st.Support("left", x=0.0, y=0.0),), (st.Traction("right", (0.0, 1.0)),),
+        quantities=(st.Quantity("mid", "displacement", "mid", "x"),),
+    )  # fmt: skip
+    shape = st.Shape.rectangle(1.0, 1.0, thickness=1.0, points={"mid": (0.5, 1.0)}, loads={"push": case})
+    with pytest.raises(ReferenceNotConvergedError) as caught:
+        solve_shape(shape, case, st.Material(1.0, 0.3), tolerance=3e-3)
+    said = str(caught.value)
+    assert "5.9e-04 at degree 4" in said
+    assert "within the tolerance of 3.0e-03 but steps do not halve yet, 1.1e-03 and then 5.9e-04" in said
+    assert "180" not in said

@@ -239,9 +239,12 @@ def converge(
             falls = last <= before / 2 or before <= accepted / 10
             if not (estimates[name] <= accepted and falls) and not complaint:
                 shown = repr(name) if name else "the energy"
+                met = "the tolerance is" if estimates[name] > accepted else "which is within the tolerance of"
+                steps = f" but steps do not halve yet, {before:.1e} and then {last:.1e}, so that it is no bound"
                 complaint = (
                     f"{shown}{problem.place(name)}: relative error estimate {estimates[name]:.1e} at degree {degree} "
-                    f"({level.unknowns} unknowns), the tolerance is {accepted:.1e}{problem.reason(name)}"
+                    f"({level.unknowns} unknowns), {met} {accepted:.1e}{'' if estimates[name] > accepted else steps}"
+                    f"{problem.reason(name)}"
                 )
         if not complaint:
             rotation, strain = level.rotation_and_strain()
@@ -435,7 +438,7 @@ class _Problem:
         if quantity is None or quantity.of not in self.points:
             return ""
         corner = self.corners.get(self.mesh.named.get(quantity.of, -1))
-        if corner is None or quantity.kind == "reaction":
+        if corner is None or not corner.rough or quantity.kind == "reaction":
             return ""
         then = "the stress there may be infinite" if quantity.kind == "stress" else "the solution is not smooth there"
         return f"; {quantity.of!r} is where {corner.what}: {then}"
