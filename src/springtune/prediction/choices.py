@@ -83,7 +83,7 @@ class Choice:
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
         (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
         compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or
-        for the reason in `failures`.
+        for the reason in `failures`, and of a quantity that is next to nothing beside others of its kind.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
@@ -322,7 +322,9 @@ def _on_shape(
         (load,) = shape.loads
     statement = ShapeStatement(shape, mesh, material, load, 1.0, "linear")
     sheet, names = Sheet(statement.mesh, shape.thickness, networks=1), [one.name for one in statement.case.quantities]
-    known = statement.reference_values(sheet)
+    reference = statement.reference(sheet)
+    small = set(reference.negligible) if set(names) - set(reference.negligible) else set()
+    known = {name: value for name, value in reference.values.items() if name not in small}
     single = statement.materials[0] if len(statement.materials) == 1 else None
     choices, first = [], set()
     for name in ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES:

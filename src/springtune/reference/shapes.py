@@ -66,6 +66,9 @@ class ShapeReference:
         Number of unknowns of the finest level.
     degree : int
         Of its polynomials.
+    negligible : tuple of str
+        Quantities that are less than a thousandth of what is largest of their kind: an error relative to such a one is
+        large where the solution is good.
     """
 
     values: dict[str, float]
@@ -77,6 +80,7 @@ class ShapeReference:
     degree: int
     _level: "_Level" = field(repr=False)
     _kinds: dict[str, str] = field(repr=False)
+    negligible: tuple[str, ...] = ()
     _factor: float = 1.0
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -236,15 +240,12 @@ def converge(
             estimates[name] = max(last, before / 4) + level.round_off
             bounds[name] = estimates[name] * scale
             accepted = tolerance * (STRESS_SHARE if kind == "stress" else 1.0)
-            falls = last <= before / 2 or before <= accepted / 10
-            if not (estimates[name] <= accepted and falls) and not complaint:
+            why = unmet(estimates[name], accepted, before, last)
+            if why and not complaint:
                 shown = repr(name) if name else "the energy"
-                met = "the tolerance is" if estimates[name] > accepted else "which is within the tolerance of"
-                steps = f" but steps do not halve yet, {before:.1e} and then {last:.1e}, so that it is no bound"
                 complaint = (
                     f"{shown}{problem.place(name)}: relative error estimate {estimates[name]:.1e} at degree {degree} "
-                    f"({level.unknowns} unknowns), {met} {accepted:.1e}{'' if estimates[name] > accepted else steps}"
-                    f"{problem.reason(name)}"
+                    f"({level.unknowns} unknowns), {why}{problem.reason(name)}"
                 )
         if not complaint:
             rotation, strain = level.rotation_and_strain()
@@ -259,10 +260,44 @@ def converge(
                 strain=strain,
                 unknowns=level.unknowns,
                 degree=degree,
+                negligible=tuple(
+                    name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
+                ),
                 _level=level,
                 _kinds=problem.kinds,
             )
     raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
+
+
+def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
+    """Why an error estimate is not taken, in words; empty where it is.
+
+    Parameters
+    ----------
+    estimate, accepted : float
+        Relative [1].
+    before, last : float
+        Sizes of the last two steps from level to level, over the same [1].
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> unmet(1e-4, 1e-5, 3e-4, 1e-4)
+    'the tolerance is 1.0e-05'
+    >>> unmet(1e-5, 1e-4, 1.5e-5, 1e-5)
+    'within the tolerance of 1.0e-04, but it is no bound: steps do not halve yet, 1.5e-05 and then 1.0e-05'
+    >>> unmet(1e-5, 1e-4, 4e-5, 1e-5)
+    ''
+    """
+    if not estimate <= accepted:
+        return f"the tolerance is {accepted:.1e}"
+    if last <= before / 2 or before <= accepted / 10:
+        return ""
+    steps = f"steps do not halve yet, {before:.1e} and then {last:.1e}"
+    return f"within the tolerance of {accepted:.1e}, but it is no bound: {steps}"
 
 
 class _Problem:

@@ -18,7 +18,7 @@ from .meshes import A_SHAPE, is_a
 OFF_SIDE = 1e-5
 """What particles may be off the side of a shape that they are on, over its extent: formats in text have few digits."""
 
-LEAST_SHARE = 0.9
+LEAST_COVERED = 0.9
 """Length of a group's edges over that of its sides, at least: chords are shorter than arcs, of six a turn by 5 %."""
 
 
@@ -157,7 +157,7 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
         ends = mesh.points[grouped.sides[name]]
         away = np.min([_distances(side, ends.reshape(-1, 2)) for side in own], axis=0)
         share = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / sum(side.length for side in own)
-        if away.max(initial=0.0) > small or not LEAST_SHARE <= share <= 1 + OFF_SIDE:
+        if away.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + OFF_SIDE:
             raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of shape {shape.name!r}; {remedy}")
     for name, point in shape.points.items():
         if name in grouped.points and np.linalg.norm(np.subtract(grouped.points[name], point)) > small:

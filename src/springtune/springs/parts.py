@@ -33,7 +33,7 @@ MAIN_PART = ""
 """Name of the part that has no other."""
 
 
-PLACES = "points", "corners"
+CELL_FIELDS = "points", "corners"
 """Fields of an energy that say where its cells are."""
 
 
@@ -239,7 +239,7 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
 
 def _law(energy: "Energy") -> tuple[object, ...]:
     """What energies of one kind have to share to be one: numbers of all cells, and how many each cell has."""
-    values = [getattr(energy, part.name) for part in fields(energy) if part.name not in PLACES]  # type: ignore[arg-type]
+    values = [getattr(energy, part.name) for part in fields(energy) if part.name not in CELL_FIELDS]  # type: ignore[arg-type]
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 
 
@@ -254,7 +254,7 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     for part in fields(first):  # type: ignore[arg-type]
         own = [getattr(energy, part.name) for energy, _, _ in parts]
         given = [one for one in own if one is not None]
-        if part.name in PLACES or not given or not isinstance(given[0], np.ndarray):
+        if part.name in CELL_FIELDS or not given or not isinstance(given[0], np.ndarray):
             continue
         # What an energy has besides its cells is in proportion to its stiffness; a part may lack it.
         full = [np.zeros((len(where), *given[0].shape[1:])) for _, where, _ in parts]
