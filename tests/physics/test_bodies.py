@@ -224,7 +224,7 @@ def test_what_is_next_to_nothing_does_not_count_in_a_choice():
 
 @pytest.mark.parametrize("material", [STEEL, st.AnisotropicMaterial(140e9, 10e9, 3e9, 5e9, C16=2e9)])
 def test_even_tests_of_a_body_without_a_lower_side_do_not_contradict_their_supports(material):
-    """What linear triangles do under their forces, held as they are, is what they say: a rhombus, and a quarter turn."""
+    """What linear triangles do under their forces, held as they are, is what they say."""
     corners = [(0.0, -0.03), (0.05, 0.005), (0.0, 0.04), (-0.05, 0.0)]
     rhombus = st.Shape("rhombus", 1e-3, [st.Segment(corner) for corner in corners])
     for shape in (rhombus, st.Shape.rectangle(0.03, 0.05, holes=[st.Hole.circle((0.015, 0.02), 0.005)])):
