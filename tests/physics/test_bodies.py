@@ -16,6 +16,7 @@ STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
 RUBBER = st.Material("1 GPa", 0.5, density="1000 kg/m^3", name="rubber")
 HARD = st.Material("3 GPa", 0.5, density="1000 kg/m^3", name="hard")
+BOARD = st.AnisotropicMaterial("14 GPa", "9 GPa", "3 GPa", "4 GPa", density="600 kg/m^3", name="board")
 
 PULL = st.LoadCase(
     "pull",
@@ -235,3 +236,30 @@ def test_even_tests_of_a_body_without_a_lower_side_do_not_contradict_their_suppo
             network = Network(mesh, case.held, springs.relative, springs.energies)
             moved = network.expand(network.rest_factor.solve(network.reduce(case.forces / springs.reference)))
             np.testing.assert_allclose(moved, case.displacements, rtol=0, atol=1e-9 * np.abs(moved).max())
+
+
+def test_bodies_in_pieces_are_refused_by_tests_of_one_body():
+    """Two inclusions of one material, which the search would hold at two particles of one of them."""
+    holes = [st.Hole.circle((x, 0.02), 0.006, part=part) for x, part in ((0.03, "a"), (0.07, "b"))]
+    shape = replace(PLATE, holes=tuple(holes), points={}, loads={"pull": replace(PULL, quantities=PULL.quantities[:2])})
+    materials = {"": STEEL, "a": THIRD, "b": THIRD}
+    scene = st.Scene(shape, st.mesh_shape(shape, "8 mm"), materials, "pull", definition="adjoint")
+    with pytest.raises(st.DefinitionError, match="'adjoint': on 'a' and 'b': the mesh has 2 parts that no edge joins"):
+        scene.solve()
+
+
+@pytest.mark.parametrize("materials", [{"": BOARD, "core": STEEL}, {"": BOARD, "core": BOARD}])
+def test_choices_for_anisotropic_bodies(grouped, materials):
+    """Springs alone among them, which have C12 = C66."""
+    pull = {"pull": replace(PULL, quantities=PULL.quantities[:2])}
+    choices = st.predict(replace(PLATE, loads=pull), grouped, materials)
+    assert {choice.definition for choice in choices} == {"energy-fit", "element-fit", "delingette"}
+    assert all(choice.worst < 0.5 and not choice.failures for choice in choices)
+    assert [choice.energies for choice in choices if choice.definition == "energy-fit"] == [False]
+
+
+def test_a_motion_does_not_follow():
+    shape = holed(0.008)
+    scene = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="delingette")
+    with pytest.raises(ValueError, match="load: 'push' turns with the side that it acts on, and forces of a motion"):
+        scene.motion()

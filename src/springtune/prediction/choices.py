@@ -46,7 +46,10 @@ by their worst load on many beams; without any of them the choice is worse by po
 ON_QUADS = ("patch", "baudet", "element-fit", "area")
 """As `ON_TRIANGLES`, on meshes that have quadrilaterals. On rectangles a patch test changes nothing."""
 
-NEED_ENERGIES = ("delingette", "area", "patch-area")
+ANISOTROPIC = {3: ("energy-fit", "element-fit", "delingette"), 4: ("energy-fit", "element-fit", "orthotropic")}
+"""As `ON_TRIANGLES` and `ON_QUADS`, of materials that are not isotropic, by corners of the cells."""
+
+NEED_ENERGIES = ("delingette", "area", "patch-area", "orthotropic")
 """Those of them that need more than springs."""
 
 ALIKE = 1e-5
@@ -238,8 +241,8 @@ def predict(
     Returns
     -------
     list of Choice
-        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last. On a shape their errors are
-        by quantity of interest, and moduli are none, since a patch test between rollers is one of strips.
+        Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. On a shape
+        their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of strips.
 
     Raises
     ------
@@ -327,7 +330,10 @@ def _on_shape(
     known = {name: value for name, value in reference.values.items() if name not in small}
     single = statement.materials[0] if len(statement.materials) == 1 else None
     choices, first = [], set()
-    for name in ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES:
+    tried: tuple[str, ...] = ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES
+    if not all(one.isotropic for one in statement.materials):
+        tried = ANISOTROPIC[4 if len(statement.mesh.quads) else 3]
+    for name in tried:
         failures: dict[str, str] = {}
         errors: dict[str, Number] = dict.fromkeys(names, nan)
         parts: tuple[float, float, str] = (nan, nan, "")
