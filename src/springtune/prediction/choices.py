@@ -242,7 +242,8 @@ def predict(
     -------
     list of Choice
         Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. On a shape
-        their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of strips.
+        their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of
+        strips.
 
     Raises
     ------
