@@ -15,7 +15,7 @@ the quadratic form of its second derivative at rest.
 import inspect
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from ..mechanics.dynamics import masses
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
-from ..mesh.cells import no_cells
+from ..mesh.cells import no_cells, rows_of
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import AnyMaterial, Material
@@ -399,7 +399,7 @@ def _parts(
         "springs": mesh.edges,
         "rest_lengths": mesh.edge_lengths,
         "stiffness": springs.reference * springs.relative,
-        "energies": _merged([terms(energy, springs.reference) for energy in springs.energies]),
+        "energies": _merged([terms(_everywhere(energy, mesh), springs.reference) for energy in springs.energies]),
         "masses": inertia,
         "thickness": sheet.thickness,
         "held": held,
@@ -407,6 +407,20 @@ def _parts(
         "triangles": mesh.triangles,
         "quads": mesh.quads,
     }
+
+
+def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
+    """An energy of some cells as one of all with as many corners, the others' moduli zero: files have all cells."""
+    cells = mesh.cells[energy.corners.shape[1]]
+    if len(energy.corners) == len(cells):
+        return energy
+    rows, moduli = rows_of(cells, energy.corners), {}
+    for part in fields(energy):  # type: ignore[arg-type]
+        own = getattr(energy, part.name)
+        if isinstance(own, np.ndarray) and part.name not in ("points", "corners"):
+            moduli[part.name] = np.zeros((len(cells), *own.shape[1:]))
+            moduli[part.name][rows] = own
+    return replace(energy, corners=cells, **moduli)  # type: ignore[type-var]
 
 
 def _merged(given: list[Terms]) -> tuple[Terms, ...]:

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..mesh.cells import Mesh, signed_areas
+from ..mesh.cells import Mesh, rows_of, signed_areas
 from .network import Network
 
 
@@ -59,7 +59,10 @@ def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> 
         # About a corner of its own: coordinates far from the origin would cost digits.
         x, y = (place[corners] - place[corners[:, :1]]).transpose(2, 0, 1)
         fx, fy = forces.transpose(2, 0, 1)
-        total[count] += np.stack([(x * fx).sum(1), (y * fy).sum(1), 0.5 * (x * fy + y * fx).sum(1)], axis=1)
+        # Parts of a body may have energies of their own.
+        total[count][rows_of(mesh.cells[count], corners)] += np.stack(
+            [(x * fx).sum(1), (y * fy).sum(1), 0.5 * (x * fy + y * fx).sum(1)], axis=1
+        )
     return {count: total[count] / signed_areas(place, corners)[:, None] for count, corners in mesh.cells.items()}
 
 

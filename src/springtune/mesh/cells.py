@@ -335,6 +335,32 @@ def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
     return given.astype(kind, copy=False)
 
 
+def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Rows of some cells among all with as many corners.
+
+    Parameters
+    ----------
+    cells, chosen : ndarray of int, shape (n_cells, m) and (n_chosen, m)
+        Corners of all, and of some of them; the same numbers in the same order.
+
+    Returns
+    -------
+    ndarray of int, shape (n_chosen,)
+
+    Examples
+    --------
+    >>> rows_of(np.array([[0, 1, 2], [2, 1, 3], [3, 4, 2]]), np.array([[3, 4, 2], [0, 1, 2]])).tolist()
+    [2, 0]
+    """
+    if len(chosen) == len(cells) and np.array_equal(chosen, cells):
+        return np.arange(len(cells))
+    _, numbers = np.unique(np.concatenate([cells, chosen]), axis=0, return_inverse=True)
+    places = np.empty(len(cells), dtype=np.int64)
+    numbers = numbers.ravel()
+    places[numbers[: len(cells)]] = np.arange(len(cells))
+    return places[numbers[len(cells) :]]
+
+
 def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Signed area of each cell [m2], shape (n_cells,); negative where it is inverted."""
     # About the first corner: coordinates far from the origin would cost digits.

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from .cells import Mesh
+from .sheets import edge_in_words, outline_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,3 +92,41 @@ class GroupedMesh:
             return np.unique(self.sides[name])
         number = self.particle(name)
         return np.array([] if number is None else [number], dtype=np.int64)
+
+    @cached_property
+    def _outline_codes(self) -> np.ndarray:
+        """One number for each edge of the outline, the body on its left."""
+        return outline_of(self.mesh)[0] @ [len(self.mesh.points), 1]
+
+    def side_fault(self, name: str, *, directed: bool = False) -> str:
+        """Why a group of sides is none, with the remedy; empty where it is.
+
+        Parameters
+        ----------
+        name : str
+            Key of `sides`.
+        directed : bool, optional
+            Whether the body has to be on the left of its edges, as a pressure needs it.
+
+        Returns
+        -------
+        str
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "20 mm")
+        >>> turned = st.GroupedMesh(grouped.mesh, {"left": grouped.sides["left"][:, ::-1]})
+        >>> turned.side_fault("left"), turned.side_fault("left", directed=True)
+        ('', 'has edges with the body on their right, the first one from (0, 20) mm to (0, 40) mm; turn them')
+        """
+        count, edges = len(self.mesh.points), np.reshape(self.sides[name], (-1, 2))
+        wrong = edges[~np.isin(edges @ [count, 1], self._outline_codes)]
+        inside = wrong[~np.isin(wrong @ [1, count], self._outline_codes)]
+        if len(inside):
+            first = edge_in_words(self.mesh.points, inside[0])
+            return f"has edges that are not on the outline, the first one {first}; take these out"
+        if directed and len(wrong):
+            first = edge_in_words(self.mesh.points, wrong[0])
+            return f"has edges with the body on their right, the first one {first}; turn them"
+        return ""

@@ -46,7 +46,10 @@ by their worst load on many beams; without any of them the choice is worse by po
 ON_QUADS = ("patch", "baudet", "element-fit", "area")
 """As `ON_TRIANGLES`, on meshes that have quadrilaterals. On rectangles a patch test changes nothing."""
 
-NEED_ENERGIES = ("delingette", "area", "patch-area")
+ANISOTROPIC = {3: ("energy-fit", "element-fit", "delingette"), 4: ("energy-fit", "element-fit", "orthotropic")}
+"""As `ON_TRIANGLES` and `ON_QUADS`, of materials that are not isotropic, by corners of the cells."""
+
+NEED_ENERGIES = ("delingette", "area", "patch-area", "orthotropic")
 """Those of them that need more than springs."""
 
 ALIKE = 1e-5
@@ -83,7 +86,7 @@ class Choice:
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
         (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
         compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or
-        for the reason in `failures`.
+        for the reason in `failures`, and of a quantity that is next to nothing beside others of its kind.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
@@ -238,8 +241,9 @@ def predict(
     Returns
     -------
     list of Choice
-        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last. On a shape their errors are
-        by quantity of interest, and moduli are none, since a patch test between rollers is one of strips.
+        Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. On a shape
+        their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of
+        strips.
 
     Raises
     ------
@@ -322,10 +326,15 @@ def _on_shape(
         (load,) = shape.loads
     statement = ShapeStatement(shape, mesh, material, load, 1.0, "linear")
     sheet, names = Sheet(statement.mesh, shape.thickness, networks=1), [one.name for one in statement.case.quantities]
-    known = statement.reference_values(sheet)
+    reference = statement.reference(sheet)
+    small = set(reference.negligible) if set(names) - set(reference.negligible) else set()
+    known = {name: value for name, value in reference.values.items() if name not in small}
     single = statement.materials[0] if len(statement.materials) == 1 else None
     choices, first = [], set()
-    for name in ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES:
+    tried: tuple[str, ...] = ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES
+    if not all(one.isotropic for one in statement.materials):
+        tried = ANISOTROPIC[4 if len(statement.mesh.quads) else 3]
+    for name in tried:
         failures: dict[str, str] = {}
         errors: dict[str, Number] = dict.fromkeys(names, nan)
         parts: tuple[float, float, str] = (nan, nan, "")

@@ -362,7 +362,8 @@ def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray
 def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -> np.ndarray:
     """Weights of the support's forces on the particles that make a reaction.
 
-    Where two groups hold a particle in the same direction, its force belongs to each by its share in their lengths.
+    Where sides of two groups hold a particle in the same direction, its force belongs to each by its share in their
+    lengths; a point on sides that are held so has none of it, as in a continuum.
 
     Parameters
     ----------
@@ -389,6 +390,10 @@ def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -
             f"{quantity.component}, and no support holds it so; held along {quantity.component}: {known}"
         )
     shares = {group: _lengths(grouped, group) for group in dict.fromkeys(one.group for one in holding)}
+    by_sides = sum((share for group, share in shares.items() if group in grouped.sides), np.zeros(1))
+    for group, share in shares.items():
+        if group not in grouped.sides:
+            share[np.broadcast_to(by_sides > 0, share.shape)] = 0.0
     total, field = sum(shares.values()), np.zeros(grouped.mesh.points.shape)
     own = shares[quantity.of]
     np.divide(own, total, out=field[:, axis], where=own > 0)
@@ -396,10 +401,10 @@ def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -
 
 
 def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
-    """Length of a group at each particle [m]; of a point more than any, since what holds it there is the point's."""
+    """Length of a group at each particle [m]; 1 of a point."""
     field = np.zeros(len(grouped.mesh.points))
     if group not in grouped.sides:
-        field[particles_of(grouped, group)] = np.ptp(grouped.mesh.points, axis=0).max() / ON_POINT
+        field[particles_of(grouped, group)] = 1.0
         return field
     edges = grouped.sides[group]
     apart = grouped.mesh.points[edges[:, 1]] - grouped.mesh.points[edges[:, 0]]

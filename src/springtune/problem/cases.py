@@ -41,6 +41,12 @@ def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
 
     case.check_names(grouped.sides, grouped.points, grouped.unusable)
     where = f"load {case.name!r}"
+    pressed = {one.group for one in case.pressures}
+    used = [one.group for one in case.supports] + [one.group for one in case.tractions]
+    for name in dict.fromkeys([*pressed, *used, *(one.of for one in case.quantities)]):
+        fault = grouped.side_fault(name, directed=name in pressed) if name in grouped.sides else ""
+        if fault:
+            raise ValueError(f"{where}: {name!r} {fault}")
     for what, name in [("support", one.group) for one in case.supports] + [
         ("traction", one.group) for one in case.tractions
     ]:

@@ -33,6 +33,9 @@ STRESS_SHARE = 10.0
 #: Quantities below this share of the largest one of their kind are judged by that share.
 SMALLEST_SHARE = 1e-3
 
+#: A value of less than so many times the bound on its error is zero as far as can be told.
+TOLD_FROM_ZERO = 10.0
+
 #: Force on a support at a point, over all of them, that is taken for none.
 SMALLEST_REACTION = 1e-6
 
@@ -50,7 +53,8 @@ class ShapeReference:
     Attributes
     ----------
     values : dict of str to float
-        Quantities of interest, in SI units.
+        Quantities of interest, in SI units; exactly zero where the solution does not tell one from zero: where it is
+        less than ten times the bound on its error, as it is by symmetry.
     error_estimates : dict of str to float
         Bounds on their errors, relative [1]: to the value itself, or to a thousandth of what is largest of its kind in
         the body where the value is less.
@@ -62,6 +66,9 @@ class ShapeReference:
         Number of unknowns of the finest level.
     degree : int
         Of its polynomials.
+    negligible : tuple of str
+        Quantities that are less than a thousandth of what is largest of their kind: an error relative to such a one is
+        large where the solution is good.
     """
 
     values: dict[str, float]
@@ -73,6 +80,7 @@ class ShapeReference:
     degree: int
     _level: "_Level" = field(repr=False)
     _kinds: dict[str, str] = field(repr=False)
+    negligible: tuple[str, ...] = ()
     _factor: float = 1.0
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -213,6 +221,7 @@ def converge(
     names = [quantity.name for quantity in load.quantities]
     values: list[dict[str, float]] = []
     estimates: dict[str, float] = {}
+    bounds: dict[str, float] = {}
     complaint = ""
     for degree in range(LOWEST_DEGREE, HIGHEST_DEGREE + 1):
         if complaint and problem.size(degree) > LARGEST_LEVEL:
@@ -229,28 +238,66 @@ def converge(
             scale = max(abs(values[-1][name]), SMALLEST_SHARE * level.scale(kind)) or 1.0
             before, last = (abs(values[i][name] - values[i - 1][name]) / scale for i in (-2, -1))
             estimates[name] = max(last, before / 4) + level.round_off
+            bounds[name] = estimates[name] * scale
             accepted = tolerance * (STRESS_SHARE if kind == "stress" else 1.0)
-            falls = last <= before / 2 or before <= accepted / 10
-            if not (estimates[name] <= accepted and falls) and not complaint:
+            why = unmet(estimates[name], accepted, before, last)
+            if why and not complaint:
                 shown = repr(name) if name else "the energy"
                 complaint = (
                     f"{shown}{problem.place(name)}: relative error estimate {estimates[name]:.1e} at degree {degree} "
-                    f"({level.unknowns} unknowns), the tolerance is {accepted:.1e}{problem.reason(name)}"
+                    f"({level.unknowns} unknowns), {why}{problem.reason(name)}"
                 )
         if not complaint:
             rotation, strain = level.rotation_and_strain()
             return ShapeReference(
-                {name: values[-1][name] for name in names},
+                {
+                    name: values[-1][name] if abs(values[-1][name]) > TOLD_FROM_ZERO * bounds[name] else 0.0
+                    for name in names
+                },
                 {name: estimates[name] for name in names},
                 energy=values[-1][""],
                 rotation=rotation,
                 strain=strain,
                 unknowns=level.unknowns,
                 degree=degree,
+                negligible=tuple(
+                    name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
+                ),
                 _level=level,
                 _kinds=problem.kinds,
             )
     raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
+
+
+def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
+    """Why an error estimate is not taken, in words; empty where it is.
+
+    Parameters
+    ----------
+    estimate, accepted : float
+        Relative [1].
+    before, last : float
+        Sizes of the last two steps from level to level, over the same [1].
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> unmet(1e-4, 1e-5, 3e-4, 1e-4)
+    'the tolerance is 1.0e-05'
+    >>> unmet(1e-5, 1e-4, 1.5e-5, 1e-5)
+    'within the tolerance of 1.0e-04, but it is no bound: steps do not halve yet, 1.5e-05 and then 1.0e-05'
+    >>> unmet(1e-5, 1e-4, 4e-5, 1e-5)
+    ''
+    """
+    if not estimate <= accepted:
+        return f"the tolerance is {accepted:.1e}"
+    if last <= before / 2 or before <= accepted / 10:
+        return ""
+    steps = f"steps do not halve yet, {before:.1e} and then {last:.1e}"
+    return f"within the tolerance of {accepted:.1e}, but it is no bound: {steps}"
 
 
 class _Problem:
@@ -426,7 +473,7 @@ class _Problem:
         if quantity is None or quantity.of not in self.points:
             return ""
         corner = self.corners.get(self.mesh.named.get(quantity.of, -1))
-        if corner is None or quantity.kind == "reaction":
+        if corner is None or not corner.rough or quantity.kind == "reaction":
             return ""
         then = "the stress there may be infinite" if quantity.kind == "stress" else "the solution is not smooth there"
         return f"; {quantity.of!r} is where {corner.what}: {then}"
@@ -752,14 +799,15 @@ class _Level:
 
     def _reaction(self, group: str, axis: int) -> float:
         space, problem = self.space, self.problem
-        if group in space.mesh.named:
-            return float(self.residual[space.mesh.named[group], axis])
-        corners = np.unique([ends for ends, _ in self._group_sides(group)])
         # A corner where two supports meet has a share in both; layers make its force vanish.
         claims = np.zeros(len(space.mesh.points))
         for support in problem.load.supports:
             if (support.x, support.y)[axis] is not None and support.group not in space.mesh.named:
                 claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
+        if group in space.mesh.named:
+            point = space.mesh.named[group]
+            return 0.0 if claims[point] else float(self.residual[point, axis])
+        corners = np.unique([ends for ends, _ in self._group_sides(group)])
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
     def _area_growth(self) -> np.ndarray:

@@ -370,7 +370,7 @@ class Sheet:
             If the definition cannot live on the mesh or with a material, or is not told what it needs.
         """
         given = cases if definition.needs == "cases" else stiffness
-        key = definition, tuple(materials.items()), stiffness, case_key if definition.needs == "cases" else ()
+        key = definition, grouped, tuple(materials.items()), stiffness, case_key if definition.needs == "cases" else ()
         if len(materials) == 1:
             (material,) = materials.values()
             return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))

@@ -401,7 +401,7 @@ class Scene:
         Raises
         ------
         ValueError
-            If the material has no density, or the load prescribes displacements.
+            If the material has no density, or the load prescribes displacements or turns with the sides it acts on.
 
         Notes
         -----
@@ -423,6 +423,11 @@ class Scene:
         if self.problem.given is not None:
             raise ValueError(
                 f"load: {self.load!r} prescribes displacements, and a motion is under forces; take another load"
+            )
+        if self.problem.follower is not None:
+            raise ValueError(
+                f"load: {self.load!r} turns with the side that it acts on, and forces of a motion do not; take one "
+                "that does not follow"
             )
         from ..mechanics.dynamics import Motion
 

@@ -34,6 +34,7 @@ from ..problem.shapes import LoadCase, Quantity, Shape
 from ..springs import Definition, DefinitionError, Springs
 from ..springs.identification import Case
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
+from .shape_meshes import check_meshed
 from .sheet import Loading, OwnDefinition, Sheet, Solution, chosen, solved
 
 if TYPE_CHECKING:
@@ -220,6 +221,7 @@ class ShapeStatement:
         is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
         self.shape, self.grouped, self.mesh, self.thickness = shape, grouped, grouped.mesh, shape.thickness
         self.by_part = _materials(material, grouped)
+        check_meshed(shape, grouped, self.by_part)
         self.materials = list(dict.fromkeys(self.by_part.values()))
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
@@ -251,7 +253,7 @@ class ShapeStatement:
         edges, pressure = followed(self.grouped, self.case, self.thickness)
         turning = self.kinematics == "nonlinear" and len(edges) > 0
         return Loading(
-            (self.case, self.thickness, tuple(densities.items()), turning),
+            (self.grouped, self.case, self.thickness, tuple(densities.items()), turning),
             held,
             pattern,
             given if given.any() else None,
@@ -384,13 +386,18 @@ class ShapeStatement:
 
     def reference(self, sheet: Sheet) -> "ShapeReference":
         """Converged finite-element solution, once for all scenes of a sheet."""
-        key = self.case, tuple(self.by_part.items())
-        if key not in sheet.references:
+        case = self.shape.loads[self.load]
+        # The shape is kept with it: what is no longer there leaves its number to others.
+        key = id(self.shape), self.grouped, case, tuple(self.by_part.items())
+        if (key, 1.0) not in sheet.references:
             from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
 
             as_read = self.grouped if self.shape.file else None
-            sheet.references[key] = solve_shape(self.shape, self.case, self.by_part, as_read)
-        return sheet.references[key]
+            sheet.references[key, 1.0] = self.shape, solve_shape(self.shape, case, self.by_part, as_read)
+        if (key, self.scale) not in sheet.references:
+            sheet.references[key, self.scale] = self.shape, sheet.references[key, 1.0][1].scaled(self.scale)
+        found: ShapeReference = sheet.references[key, self.scale][1]
+        return found
 
     def reference_values(self, sheet: Sheet) -> dict[str, float]:
         """Quantities of interest of the reference."""

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh import Mesh, MeshError
 from ..problem.materials import AnyMaterial, Material
 from . import energy_fit, lattice
-from .base import membrane_stiffness
+from .base import DefinitionError, membrane_stiffness
 
 SPAN = 10.0
 """Largest factor between a spring and where its search starts [1]."""
@@ -55,20 +55,37 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
     Returns
     -------
     list of Case
-    """
-    from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
 
+    Raises
+    ------
+    DefinitionError
+        If the mesh has parts that no edge joins.
+    """
+    from ..mechanics.moduli import free_body, outline_forces  # here: see `springtune.springs`
+
+    try:
+        free_body(mesh)
+    except MeshError as error:
+        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
     x, y = mesh.points.T
     corner = np.argmin(x + y)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[corner] = True
-    held[np.argmax(x - y), 1] = True  # the other end of the lower side
+    other = np.argmax(x - y)  # the other end of the lower side
+    if x[other] - x[corner] < abs(y[other] - y[corner]):  # of a body that has none
+        other = np.argmax(np.abs(x - x[corner]))
+    held[other, 1] = True
     points = mesh.points - mesh.points[corner]
     modulus, gradients = _gradients(material)
     cases = []
-    for stress, gradient in zip(([[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 1], [1, 0]]), gradients):
+    for stress, given in zip(([[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 1], [1, 0]]), gradients):
         forces = modulus * thickness * outline_forces(mesh, np.array(stress, dtype=float))
-        cases.append(Case(held, forces, points @ np.array(gradient, dtype=float).T))
+        gradient = np.array(given, dtype=float)
+        lifted = gradient[1] @ points[other]
+        if lifted:  # turned back, since it is held there
+            turn = lifted / points[other, 0]
+            gradient = gradient - turn * np.array([[0.0, -1.0], [1.0, 0.0]])
+        cases.append(Case(held, forces, points @ gradient.T))
     return cases
 
 

@@ -33,6 +33,10 @@ MAIN_PART = ""
 """Name of the part that has no other."""
 
 
+CELL_FIELDS = "points", "corners"
+"""Fields of an energy that say where its cells are."""
+
+
 class Derives(Protocol):
     """What a definition has to have: one of `springtune.springs.DEFINITIONS`, or of one's own."""
 
@@ -209,17 +213,17 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
     """Springs of all parts over the first one's reference stiffness."""
     reference, count = found[0][0].reference, len(mesh.edges)
     relative, linear, owners = np.zeros(count), np.zeros(count), np.zeros(count)
-    energies: dict[tuple[type, int, int], list[tuple[Energy, np.ndarray, float]]] = {}
+    energies: dict[tuple[object, ...], list[tuple[Energy, np.ndarray, float]]] = {}
     for springs, edges, cells in found:
         scale = springs.reference / reference
         relative[edges] += scale * springs.relative
         linear[edges] += scale * (springs.relative if springs.linear_springs is None else springs.linear_springs)
         owners[edges] += 1
-        kinds: list[tuple[type, int]] = []
+        kinds: list[tuple[object, ...]] = []
         for energy in springs.energies:
-            kind = type(energy), energy.corners.shape[1]
-            where = np.flatnonzero(cells[kind[1]])
-            energies.setdefault((*kind, kinds.count(kind)), []).append((energy, where, scale))
+            corners = energy.corners.shape[1]
+            kind = type(energy), corners, *_law(energy)
+            energies.setdefault((*kind, kinds.count(kind)), []).append((energy, np.flatnonzero(cells[corners]), scale))
             kinds.append(kind)
     if uniform:
         relative, linear = relative / owners, linear / owners
@@ -233,6 +237,12 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
     )
 
 
+def _law(energy: "Energy") -> tuple[object, ...]:
+    """What energies of one kind have to share to be one: numbers of all cells, and how many each cell has."""
+    values = [getattr(energy, part.name) for part in fields(energy) if part.name not in CELL_FIELDS]  # type: ignore[arg-type]
+    return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
+
+
 def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Energy":
     """One energy of those of several parts: each with its cells in the whole mesh, and the factor on its moduli."""
     first = parts[0][0]
@@ -244,7 +254,7 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     for part in fields(first):  # type: ignore[arg-type]
         own = [getattr(energy, part.name) for energy, _, _ in parts]
         given = [one for one in own if one is not None]
-        if part.name in ("points", "corners") or not given:
+        if part.name in CELL_FIELDS or not given or not isinstance(given[0], np.ndarray):
             continue
         # What an energy has besides its cells is in proportion to its stiffness; a part may lack it.
         full = [np.zeros((len(where), *given[0].shape[1:])) for _, where, _ in parts]

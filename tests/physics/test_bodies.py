@@ -1,0 +1,265 @@
+"""Bodies in combination: parts with energies of their own, other programs, caches, meshes that are not the shape's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.mechanics.network import Network
+from springtune.reference.shapes import solve_shape
+from springtune.reference.small_strain import ReferenceNotConvergedError
+from springtune.springs import DEFINITIONS
+from springtune.springs.identification import patch_cases
+
+STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
+RUBBER = st.Material("1 GPa", 0.5, density="1000 kg/m^3", name="rubber")
+HARD = st.Material("3 GPa", 0.5, density="1000 kg/m^3", name="hard")
+BOARD = st.AnisotropicMaterial("14 GPa", "9 GPa", "3 GPa", "4 GPa", density="600 kg/m^3", name="board")
+
+PULL = st.LoadCase(
+    "pull",
+    (st.Support("left", x=0.0, y=0.0),),
+    (st.Traction("right", ("100 N", 0.0)),),
+    quantities=(
+        st.Quantity("end", "displacement", "right", "x"),
+        st.Quantity("held", "reaction", "left", "x"),
+        st.Quantity("in_core", "stress", "core", "xx"),
+        st.Quantity("beside", "stress", "beside", "xx"),
+    ),
+)
+PLATE = st.Shape.rectangle(
+    0.1,
+    0.04,
+    holes=[st.Hole.circle((0.05, 0.02), 0.008), st.Hole.circle((0.08, 0.025), 0.006, part="core")],
+    points={"core": (0.08, 0.025), "beside": (0.02, 0.01)},
+    loads={"pull": PULL},
+)
+
+
+@pytest.fixture(scope="module")
+def grouped():
+    return st.mesh_shape(PLATE, "6 mm")
+
+
+@pytest.mark.parametrize(
+    ("main", "core"), [(RUBBER, HARD), (RUBBER, STEEL), (STEEL, RUBBER), (STEEL, replace(STEEL, name="same"))]
+)
+def test_rubber_beside_other_rubber_is_linear_triangles_of_both(grouped, main, core):
+    """Energies of several laws, each of its own cells; stresses too, to rounding at small strain."""
+    values = [
+        st.Scene(PLATE, grouped, {"": main, "core": core}, "pull", definition=name, kinematics="linear").solve().values
+        for name in ("neo-hooke", "delingette")
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-7)
+    bent = st.Scene(PLATE, grouped, {"": main, "core": core}, "pull", definition="neo-hooke", scale=1e-4).solve()
+    assert bent.message == ""
+    assert bent.values == pytest.approx({name: 1e-4 * value for name, value in values[1].items()}, rel=1e-4)
+
+
+@pytest.mark.parametrize(("definition", "materials"), [("area", (STEEL, THIRD)), ("neo-hooke", (RUBBER, STEEL))])
+@pytest.mark.parametrize("ending", ["json", "h5", "csv", "vtu"])
+def test_springs_of_parts_with_energies_of_their_own_are_files_of_all_cells(
+    grouped, tmp_path, ending, definition, materials
+):
+    scene = st.Scene(PLATE, grouped, dict(zip(("", "core"), materials)), "pull", definition=definition)
+    net = scene.springs.write(tmp_path / f"net.{ending}")
+    read = st.SpringNet.read(net[0])
+    written = st.SpringNet.from_scene(scene, errors=False)
+    assert [one.kind for one in read.energies] == [one.kind for one in written.energies]
+    for one, other in zip(read.energies, written.energies):
+        assert np.array_equal(one.cells, grouped.mesh.triangles)
+        for name, values in other.values.items():
+            assert values.shape[0] == len(grouped.mesh.triangles)
+            assert np.isfinite(values).all()
+            assert one.values[name] == pytest.approx(values, rel=1e-12)
+    modulus = {"area": "modulus", "incompressible": "c1"}[written.energies[0].kind]
+    of_core = grouped.parts["core"][3]
+    none = written.energies[0].values[modulus] == 0
+    # The part that has none of an energy has zeros.
+    assert np.array_equal(none, of_core)
+
+
+def test_what_is_zero_by_symmetry_has_no_relative_error():
+    """It would be all that counts, by seven orders of magnitude; and a point on held sides takes nothing from them."""
+    case = st.LoadCase(
+        "pull",
+        (st.Support("left", x=0.0), st.Support("pin", x=0.0, y=0.0)),
+        (st.Traction("right", ("4 kN", 0.0)),),
+        quantities=(
+            st.Quantity("end", "displacement", "right", "x"),
+            st.Quantity("aside", "displacement", "right", "y"),
+            st.Quantity("pinned", "reaction", "pin", "y"),
+            st.Quantity("pinned_x", "reaction", "pin", "x"),
+            st.Quantity("held", "reaction", "left", "x"),
+        ),
+    )
+    hole = st.Hole.circle((0.05, 0.02), 0.008)
+    shape = st.Shape.rectangle(0.1, 0.04, holes=[hole], points={"pin": (0.0, 0.02)}, loads={"pull": case})
+    grouped = st.mesh_shape(shape, "5 mm")
+    scene = st.Scene(shape, grouped, STEEL, "pull", definition="lattice", kinematics="linear")
+    known = scene.reference_values()
+    assert [known[name] for name in ("aside", "pinned", "pinned_x")] == [0.0, 0.0, 0.0]
+    result = scene.solve()
+    assert np.isnan([result.errors[name] for name in ("aside", "pinned", "pinned_x")]).all()
+    assert result.values["held"] == pytest.approx(-4000.0, rel=1e-9) == known["held"]
+    assert result.values["pinned_x"] == 0.0
+    assert max(choice.worst for choice in st.predict(shape, grouped, STEEL)) < 0.2
+
+
+def holed(radius, *, outline=True, part=""):
+    case = st.LoadCase(
+        "push",
+        (st.Support("left", x=0.0, y=0.0),),
+        pressures=(st.Pressure("upper", "1 MPa", follower=True),),
+        quantities=(st.Quantity("end", "displacement", "right", "y"),),
+    )
+    loads = {"push": case}
+    if not outline:
+        return st.Shape("plate", 1e-3, file="plate.msh", loads=loads)
+    holes = [st.Hole.circle((0.05, 0.02), radius, part=part)]
+    return st.Shape.rectangle(0.1, 0.04, holes=holes, points={"tip": (0.1, 0.02)}, loads=loads, name="plate")
+
+
+class TestMeshOfAnotherShape:
+    """The reference is on the outline of the shape: a mesh of another one would be compared with it."""
+
+    @pytest.mark.parametrize("part", ["", "core"])
+    def test_other_radius(self, part):
+        grouped = st.mesh_shape(holed(0.015, part=part), "4 mm")
+        materials = {"": STEEL} | ({part: THIRD} if part else {})
+        with pytest.raises(ValueError, match="particle at .* on no side of shape 'plate'; mesh it with"):
+            st.Scene(holed(0.008, part=part), grouped, materials, "push", definition="delingette")
+
+    def test_no_hole(self):
+        full = st.Shape.rectangle(0.1, 0.04, loads=holed(0.01).loads, name="full")
+        with pytest.raises(ValueError, match="has no edge on the side of shape 'plate' from"):
+            st.Scene(holed(0.008), st.mesh_shape(full, "4 mm"), STEEL, "push", definition="delingette")
+
+    def test_group_or_point_elsewhere(self):
+        shape = holed(0.008)
+        grouped = st.mesh_shape(shape, "4 mm")
+        for wrong in (grouped.sides["left"], grouped.sides["right"][:3]):
+            other = replace(grouped, sides={**grouped.sides, "right": wrong})
+            with pytest.raises(ValueError, match="its group 'right' is not the sides 'right' of shape 'plate'"):
+                st.Scene(shape, other, STEEL, "push", definition="delingette")
+        moved = replace(grouped, points={"tip": np.array([0.1, 0.03])})
+        with pytest.raises(ValueError, match=r"its point 'tip' is at \(100, 30\) mm, that of shape 'plate' at"):
+            st.Scene(shape, moved, STEEL, "push", definition="delingette")
+
+    @pytest.mark.parametrize(("size", "refined"), [(0.02, {}), (2e-3, {"hole": 5e-4})])
+    def test_its_own_mesh_however_coarse_is_taken(self, size, refined):
+        outline = (
+            st.Segment((0.02, 0.0), group="lower"),
+            st.Segment((0.06, 0.0), group="right"),
+            st.Segment((0.05, 0.04), centre=(0.0, 0.0), group="arc"),
+            st.Segment((0.0, 0.05), group="left"),
+            st.Segment((0.0, 0.03), centre=(0.0, 0.0), group="inner"),
+        )
+        nested = [st.Hole.circle((0.03, 0.03), 0.01, part="ring"), st.Hole.ellipse((0.03, 0.03), 0.006, 0.003)]
+        case = st.LoadCase(
+            "pull", (st.Support("left", x=0.0, y=0.0),), (st.Traction("right", (1.0, 0.0)),),
+            quantities=(st.Quantity("end", "displacement", "right", "x"),),
+        )  # fmt: skip
+        shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": case})
+        assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), STEEL, "pull", definition="lattice")
+
+
+def test_sides_of_one_s_own_are_sides():
+    """A pressure on edges the wrong way round would pull; on edges inside it would act on nothing that there is."""
+    shape = holed(0.008, outline=False)
+    grouped = st.mesh_shape(holed(0.008), "4 mm")
+    turned = replace(grouped, sides={name: edges[:, ::-1] for name, edges in grouped.sides.items()})
+    with pytest.raises(ValueError, match="load 'push': 'upper' has edges with the body on their right"):
+        st.Scene(shape, turned, STEEL, "push", definition="delingette")
+    inner = replace(grouped, sides={**grouped.sides, "right": grouped.mesh.edges[~grouped.mesh.on_outline][:2]})
+    with pytest.raises(ValueError, match="load 'push': 'right' has edges that are not on the outline"):
+        st.Scene(shape, inner, STEEL, "push", definition="delingette")
+
+
+def test_scenes_that_share_a_sheet_have_groups_of_their_own():
+    shape = holed(0.008, outline=False)
+    grouped = st.mesh_shape(holed(0.008), "4 mm")
+    other = replace(grouped, sides={**grouped.sides, "upper": grouped.sides["upper"][:5]})
+    first = st.Scene(shape, grouped, STEEL, "push", definition="delingette", kinematics="linear")
+    values = first.solve().values
+    alone = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear").solve().values
+    shared = st.Scene(shape, other, STEEL, "push", definition="delingette", kinematics="linear", sheet=first.sheet)
+    assert shared.solve().values == alone != values
+
+
+def test_a_reference_is_solved_once_for_all_scales():
+    shape = holed(0.008)
+    first = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="lattice")
+    twice = st.Scene(shape, first.grouped, STEEL, "push", definition="lattice", scale=-2.0, sheet=first.sheet)
+    known = first.reference_values()["end"]
+    assert twice.reference_values()["end"] == pytest.approx(-2 * known, rel=1e-12)
+    assert twice.reference().unknowns == first.reference().unknowns
+
+
+def test_a_point_in_the_middle_of_a_side_is_no_corner():
+    case = st.LoadCase(
+        "push", (st.Support("left", x=0.0, y=0.0),), (st.Traction("right", (0.0, 1.0)),),
+        quantities=(st.Quantity("mid", "displacement", "mid", "x"),),
+    )  # fmt: skip
+    shape = st.Shape.rectangle(1.0, 1.0, thickness=1.0, points={"mid": (0.5, 1.0)}, loads={"push": case})
+    with pytest.raises(ReferenceNotConvergedError, match=r"'mid' of 'mid': .* the tolerance is 1.0e-08$"):
+        solve_shape(shape, case, st.Material(1.0, 0.3), tolerance=1e-8)
+
+
+def test_what_is_next_to_nothing_does_not_count_in_a_choice():
+    """Inside a rim under pressure one stress all but vanishes; errors relative to it are of no use."""
+    case = st.LoadCase(
+        "pull", (st.Support("left", x=0.0), st.Support("lower", y=0.0)), (st.Traction("right", ("4 kN", 1e-3)),),
+        quantities=(st.Quantity("end", "displacement", "right", "x"), st.Quantity("top", "stress", "in", "xy")),
+    )  # fmt: skip
+    shape = st.Shape.rectangle(0.1, 0.04, points={"in": (0.05, 0.02)}, loads={"pull": case})
+    for choice in st.predict(shape, st.mesh_shape(shape, "8 mm"), STEEL):
+        assert np.isnan(choice.errors["top"])
+        assert choice.worst == abs(choice.errors["end"]) < 0.2
+    alone = replace(case, quantities=case.quantities[1:])
+    only = replace(shape, loads={"pull": alone})
+    assert min(choice.worst for choice in st.predict(only, st.mesh_shape(only, "8 mm"), STEEL)) < np.inf
+
+
+@pytest.mark.parametrize("material", [STEEL, st.AnisotropicMaterial(140e9, 10e9, 3e9, 5e9, C16=2e9)])
+def test_even_tests_of_a_body_without_a_lower_side_do_not_contradict_their_supports(material):
+    """What linear triangles do under their forces, held as they are, is what they say."""
+    corners = [(0.0, -0.03), (0.05, 0.005), (0.0, 0.04), (-0.05, 0.0)]
+    rhombus = st.Shape("rhombus", 1e-3, [st.Segment(corner) for corner in corners])
+    for shape in (rhombus, st.Shape.rectangle(0.03, 0.05, holes=[st.Hole.circle((0.015, 0.02), 0.005)])):
+        mesh = st.mesh_shape(shape, "10 mm").mesh
+        springs = DEFINITIONS["delingette"].springs(mesh, material, 1e-3)
+        for case in patch_cases(mesh, material, 1e-3):
+            assert np.abs(case.displacements[case.held]).max() <= 1e-15
+            network = Network(mesh, case.held, springs.relative, springs.energies)
+            moved = network.expand(network.rest_factor.solve(network.reduce(case.forces / springs.reference)))
+            np.testing.assert_allclose(moved, case.displacements, rtol=0, atol=1e-9 * np.abs(moved).max())
+
+
+def test_bodies_in_pieces_are_refused_by_tests_of_one_body():
+    """Two inclusions of one material, which the search would hold at two particles of one of them."""
+    holes = [st.Hole.circle((x, 0.02), 0.006, part=part) for x, part in ((0.03, "a"), (0.07, "b"))]
+    shape = replace(PLATE, holes=tuple(holes), points={}, loads={"pull": replace(PULL, quantities=PULL.quantities[:2])})
+    materials = {"": STEEL, "a": THIRD, "b": THIRD}
+    scene = st.Scene(shape, st.mesh_shape(shape, "8 mm"), materials, "pull", definition="adjoint")
+    with pytest.raises(st.DefinitionError, match="'adjoint': on 'a' and 'b': the mesh has 2 parts that no edge joins"):
+        scene.solve()
+
+
+@pytest.mark.parametrize("materials", [{"": BOARD, "core": STEEL}, {"": BOARD, "core": BOARD}])
+def test_choices_for_anisotropic_bodies(grouped, materials):
+    """Springs alone among them, which have C12 = C66."""
+    pull = {"pull": replace(PULL, quantities=PULL.quantities[:2])}
+    choices = st.predict(replace(PLATE, loads=pull), grouped, materials)
+    assert {choice.definition for choice in choices} == {"energy-fit", "element-fit", "delingette"}
+    assert all(choice.worst < 0.5 and not choice.failures for choice in choices)
+    assert [choice.energies for choice in choices if choice.definition == "energy-fit"] == [False]
+
+
+def test_a_motion_does_not_follow():
+    shape = holed(0.008)
+    scene = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="delingette")
+    with pytest.raises(ValueError, match="load: 'push' turns with the side that it acts on, and forces of a motion"):
+        scene.motion()
