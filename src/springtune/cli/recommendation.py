@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 
 if TYPE_CHECKING:
-    from ..prediction import Choice, MeshChoice, MeshSearch, Number, References
+    from ..prediction import Choice, MeshChoice, MeshSearch, Number, References, ShapeReferences
     from ..problem.geometry import Beam
     from ..problem.materials import Material
+    from ..scene.statements import ShapeStatement
 
 
 def prediction_text(
@@ -77,6 +78,67 @@ def prediction_text(
         *notes,
     ]
     return "\n".join(lines)
+
+
+def shape_text(
+    mesh_name: str,
+    about: dict[str, Any],
+    statement: "ShapeStatement",
+    choices: "Sequence[Choice]",
+    known: "ShapeReferences",
+) -> str:
+    """Text of a prediction for a shape.
+
+    Parameters
+    ----------
+    mesh_name : str
+        Such as ``"free 2 mm"``.
+    about : dict
+        Its ``particles`` and ``springs``.
+    statement : ShapeStatement
+    choices : list of Choice
+    known : dict
+        What `springtune.prediction.shape_references` gave.
+
+    Returns
+    -------
+    str
+    """
+    from ..output.text import aligned
+
+    quantities, load = list(known), statement.load
+    rows = [["definition", "springs inside", "on the outline", *quantities, "besides springs"]]
+    notes = [f"{name}: no reference; {found}" for name, found in known.items() if isinstance(found, str)]
+    for choice in choices:
+        rows.append([choice.definition])
+        rows[-1] += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
+        rows[-1] += [_bounds(choice.errors[name], _percent, _missing(choice, load)) for name in quantities]
+        rows[-1] += [choice.extra]
+        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
+    references = [[name, f"{found.value:.6g} {_unit(statement, name)}", f"{100 * found.error_estimate:.1g} %"]
+                  for name, found in known.items() if not isinstance(found, str)]  # fmt: skip
+    first, plain = (name or "none" for name in recommended(choices))
+    lines = [
+        f"{statement.shape.name}, load {load}, {mesh_name}: {about['particles']} particles, {about['springs']} "
+        f"springs; {statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
+        "",
+        f"recommended: {first}; with springs alone: {plain}",
+        "",
+        aligned(rows, left=2, right=range(3, 3 + len(quantities))),
+        "",
+        "Errors are (network - reference) / |reference| of each quantity, solved on this mesh,",
+        f"{KINEMATICS_TEXT}.",
+        "The first row is the best one by its worst error.",
+    ]
+    if references:
+        lines += ["", aligned([["quantity", "reference", "error estimate"], *references], left=1, right=(1, 2))]
+    return "\n".join([*lines, *(["", *notes] if notes else [])])
+
+
+def _unit(statement: "ShapeStatement", name: str) -> str:
+    """Unit of a quantity of interest."""
+    kind = next(one.kind for one in statement.case.quantities if one.name == name)
+    return {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}[kind]
 
 
 def search_text(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
@@ -179,6 +241,42 @@ def prediction_json(
         | {
             "mesh": mesh,
             "extrapolated_from": list(sizes),
+            "recommended": first,
+            "recommended_springs_alone": plain,
+            "choices": [_choice_json(choice) for choice in choices],
+        }
+    )
+
+
+def shape_json(
+    statement: "ShapeStatement", mesh: dict[str, Any], choices: "Sequence[Choice]", known: "ShapeReferences"
+) -> str:
+    """A prediction for a shape as JSON; numbers that are not there are null.
+
+    Parameters
+    ----------
+    statement : ShapeStatement
+    mesh : dict
+        Its ``type``, ``file``, ``size``, ``particles`` and ``springs``.
+    choices, known
+        As of `shape_text`.
+
+    Returns
+    -------
+    str
+    """
+    first, plain = recommended(choices)
+    return _json(
+        {
+            "springtune": __version__,
+            "shape": statement.shape.name,
+            "load": statement.load,
+            "thickness": statement.thickness,
+            "materials": {part: asdict(one) for part, one in statement.by_part.items()},
+            "references": {
+                name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
+            },
+            "mesh": mesh,
             "recommended": first,
             "recommended_springs_alone": plain,
             "choices": [_choice_json(choice) for choice in choices],

@@ -12,10 +12,13 @@ from .choices import (
     SOLVED_FROM_FILE,
     Choice,
     Number,
+    QuantityReference,
     References,
+    ShapeReferences,
     check_beam,
     predict,
     references,
+    shape_references,
 )
 from .search import MeshChoice, MeshSearch, SolvedMesh, find_mesh
 
@@ -28,11 +31,14 @@ __all__ = [
     "MeshChoice",
     "MeshSearch",
     "Number",
+    "QuantityReference",
     "References",
+    "ShapeReferences",
     "SolvedMesh",
     "check_beam",
     "extrapolate",
     "find_mesh",
     "predict",
     "references",
+    "shape_references",
 ]
