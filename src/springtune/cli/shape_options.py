@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from ..problem.shapes import Shape
     from ..study import Study
 
-A_SHAPE = "config/shapes.yaml:cook"
+NAMED_SHAPE = "config/shapes.yaml:cook"
 """How a shape is named, for messages."""
 
-SHAPE_HELP = f"A study's shape, such as {A_SHAPE}, in the place of a beam; the name may be left out where there is one."
+SHAPE_HELP = (
+    f"A study's shape, such as {NAMED_SHAPE}, in the place of a beam; the name may be left out where there is one."
+)
 
 MESH_SIZE = re.compile("^mesh size: [^ ]+ ")
 """How messages of a mesh size begin."""
@@ -57,7 +59,7 @@ def check_kind(shape: str | None, beam: str | None, of_shapes: tuple[str, ...]) 
     """
     context = click.get_current_context()
     if shape is None and beam is None:
-        raise click.UsageError(f"Missing option '--beam' such as 200x40, or '--shape' such as {A_SHAPE}.", context)
+        raise click.UsageError(f"Missing option '--beam' such as 200x40, or '--shape' such as {NAMED_SHAPE}.", context)
     options = {one.name: one.opts[0] for one in context.command.params if isinstance(one, click.Option)}
     given = {
         name: option
@@ -179,7 +181,7 @@ def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
 
     path, colon, name = (text, "", "") if Path(text).is_file() else text.rpartition(":")
     if not Path(path).is_file():
-        raise ValueError(f"--shape: '{text}': there is no study {path or text}; give one such as {A_SHAPE}")
+        raise ValueError(f"--shape: '{text}': there is no study {path or text}; give one such as {NAMED_SHAPE}")
     if Path(path).suffix not in (".yaml", ".yml"):
         raise ValueError(
             f"--shape: '{text}' is no study, which has the supports and loads; write one with 'file: "
