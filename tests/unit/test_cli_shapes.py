@@ -137,6 +137,15 @@ class TestPredict:
         choices = st.predict(angle, st.mesh_shape(angle, "4 mm"), st.Material("1 MPa", 0.3))
         assert np.isfinite(choices[0].worst) and np.isnan(choices[0].errors["peak"])
 
+    def test_of_a_laminate_springs_alone_are_tried_that_can_be_one(self):
+        end = st.Quantity("end", "displacement", "right", "x")
+        pull = st.LoadCase("pull", [st.Support("left", 0, 0)], [st.Traction("right", (1.0, 0))], quantities=[end])
+        plate = st.Shape.rectangle("40 mm", "20 mm", loads={"pull": pull})
+        ply = st.AnisotropicMaterial.orthotropic("12 GPa", "4 GPa", 0.3, "2 GPa")
+        choices = {one.definition: one for one in st.predict(plate, st.mesh_shape(plate, "5 mm"), ply)}
+        assert {"delingette", "element-fit", "energy-fit"} <= {name for name in choices if not choices[name].failures}
+        assert "needs an isotropic material" in choices["lattice"].failures["springs"]
+
 
 class TestSprings:
     def test_springs_are_those_of_the_scene(self, here, tmp_path):

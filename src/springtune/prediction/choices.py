@@ -47,6 +47,10 @@ by their worst load on many beams; without any of them the choice is worse by po
 ON_QUADS = ("patch", "baudet", "element-fit", "area")
 """As `ON_TRIANGLES`, on meshes that have quadrilaterals. On rectangles a patch test changes nothing."""
 
+FOR_ANISOTROPIC = {False: ("element-fit", "energy-fit"), True: ("energy-fit", "orthotropic")}
+"""What is tried besides where a material is anisotropic, on triangles and on meshes that have quadrilaterals: most of
+the others are for one Poisson's ratio, and refuse."""
+
 NEED_ENERGIES = ("delingette", "area", "patch-area")
 """Those of them that need more than springs."""
 
@@ -259,8 +263,9 @@ def predict(
     Returns
     -------
     list of Choice
-        Of `ON_TRIANGLES` or `ON_QUADS`, the same springs once; those that fail come last. On a shape their errors are
-        by quantity of interest, and moduli are none, since a patch test between rollers is one of strips.
+        Of `ON_TRIANGLES` or `ON_QUADS`, and of `FOR_ANISOTROPIC` materials, the same springs once; those that fail come
+        last. On a shape their errors are by quantity of interest, and moduli are none, since a patch test between
+        rollers is one of strips.
 
     Raises
     ------
@@ -411,7 +416,9 @@ class TriedShape:
         self._sheet = Sheet(statement.mesh, statement.thickness, networks=1)
         self._values: dict[str, dict[str, float] | str] = {}
         self._springs, self.same, self.failures = _distinct(
-            statement.mesh, lambda name: statement.springs(self._sheet, DEFINITIONS[name], None)[0]
+            statement.mesh,
+            lambda name: statement.springs(self._sheet, DEFINITIONS[name], None)[0],
+            all(one.isotropic for one in statement.materials),
         )
         self.names = list(self._springs)
 
@@ -632,14 +639,15 @@ class TriedMesh:
 
 
 def _distinct(
-    mesh: Mesh, derive: Callable[[str], Springs]
+    mesh: Mesh, derive: Callable[[str], Springs], isotropic: bool = True
 ) -> tuple[dict[str, Springs], dict[str, str], dict[str, dict[str, str]]]:
     """Springs of the definitions that are tried on a mesh, each once; by definition whose they are; and failures."""
     found: dict[str, Springs] = {}
     same: dict[str, str] = {}
     failures: dict[str, dict[str, str]] = {}
     first: dict[tuple[object, ...], str] = {}  # of each springs
-    for name in ON_QUADS if len(mesh.quads) else ON_TRIANGLES:
+    quads = len(mesh.quads) > 0
+    for name in (*(ON_QUADS if quads else ON_TRIANGLES), *(() if isotropic else FOR_ANISOTROPIC[quads])):
         try:
             springs = derive(name)
         except DefinitionError as error:
