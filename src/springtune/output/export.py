@@ -343,12 +343,12 @@ def export(
     if ending == ".nc":
         return _mesh(tree, path, group, variables, selection or {})
     if ending in (".vtu", ".pvd"):
-        if group.strip("/") not in ("", "fields", SHAPE_FIELDS) or variables:
+        if group.strip("/") not in ("", "fields", NETWORKS_OF_SHAPES) or variables:
             raise RequestError(
-                f"{path}: ParaView gets the group 'fields', or --group {SHAPE_FIELDS}; leave --variables out"
+                f"{path}: ParaView gets the group 'fields', or --group {NETWORKS_OF_SHAPES}; leave --variables out"
             )
-        alone = not group.strip("/") and "fields" not in tree.children and SHAPE_FIELDS in tree.children
-        if alone or group.strip("/") == SHAPE_FIELDS:
+        alone = not group.strip("/") and "fields" not in tree.children and NETWORKS_OF_SHAPES in tree.children
+        if alone or group.strip("/") == NETWORKS_OF_SHAPES:
             return _shapes_for_paraview(tree, path, selection or {})
         return _paraview(tree, path, selection or {})
     if ending == ".zarr":
@@ -527,7 +527,7 @@ class _SceneFiles:
 
 # -- networks of shapes ------------------------------------------------------------------------------------------------
 
-SHAPE_FIELDS = "shape_fields"
+NETWORKS_OF_SHAPES = "shape_fields"
 """Group of the networks of shapes."""
 
 CASE_LABELS = {"shape": "shape_name", "load": "load_name"}
@@ -538,10 +538,12 @@ def _shapes_for_paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, 
     """Write networks of shapes as files for ParaView."""
     from ..handover.paraview import MOST_PIECES, series
 
-    fields = _group(tree, SHAPE_FIELDS).load()
+    fields = _group(tree, NETWORKS_OF_SHAPES).load()
     scenes = _shape_scenes(fields, selection)
     if not scenes:
-        raise ValueError(f"the group '/{SHAPE_FIELDS}' has no solved network of such labels; give others to --select")
+        raise ValueError(
+            f"the group '/{NETWORKS_OF_SHAPES}' has no solved network of such labels; give others to --select"
+        )
     if path.suffix.lower() == ".vtu":
         if len(scenes) > 1:
             several = [name for name in (*CASE_LABELS, "definition") if len({one[name] for one in scenes}) > 1]

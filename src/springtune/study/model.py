@@ -301,7 +301,7 @@ class Study:
         >>> cook = study.shape("cook")
         >>> choices = st.predict(cook, st.mesh_shape(cook, "4 mm"), study.material("third"), load="shear")
         >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
-        delingette: -1.8 %
+        patch: -0.4 %
         """
         known = {name: one for part in self.parts.values() for name, one in getattr(part, "declared", {}).items()}
         if name not in known:
