@@ -305,7 +305,7 @@ def predict(
     >>> for choice in st.predict(plate, st.mesh_shape(plate, "2 mm"), steel, load="pull")[:2]:
     ...     print(choice.definition, f"{100 * choice.errors['end']:+.1f} %")
     delingette -0.8 %
-    van-gelder -2.5 %
+    patch-area -2.3 %
     """
     if isinstance(beam, Shape):
         return _on_shape(beam, mesh, material, cast("ShapeReferences | None", known), load)
