@@ -174,6 +174,60 @@ class TestSprings:
         assert net.masses.sum() == pytest.approx(1e-3 * 1e3 * 8e-4 * 0.94, rel=0.02)
 
 
+class TestError:
+    """`predict --error`."""
+
+    ASKED = ("predict", "--shape", f"{SHAPES}:cook", "--material", "third", "--error", "3 %")
+
+    def test_the_mesh_that_is_found_keeps_the_error_and_finer_ones_do(self, tmp_path):
+        result = run(*self.ASKED, "--springs-alone", "--json", "--write", tmp_path / "net.json")
+        assert result.exit_code == 0, result.output
+        found = json.loads(result.stdout)["recommended_springs_alone"]
+        study = st.load_study(SHAPES)
+        cook, third = study.shape("cook"), study.material("third")
+        same = st.find_mesh(cook, third, "3 %", load="shear").best_springs
+        assert (found["size"], found["choice"]["definition"]) == (same.size, same.choice.definition)
+        assert found["confirmed"] and len(found["finer_sizes"]) >= 2 and min(found["finer_sizes"]) <= found["size"] / 2
+        for size in (found["size"], *found["finer_sizes"]):
+            scene = st.Scene(cook, st.mesh_shape(cook, size), third, "shear", definition=same.choice.definition,
+                             kinematics="linear")  # fmt: skip
+            values, known = scene.solve().values, {"tip": 0.0239676, "edge": 0.0240414}
+            assert all(abs(values[name] / known[name] - 1) <= 0.03 for name in known)
+        assert st.SpringNet.read(tmp_path / "net.json").header["mesh"]["particles"] == found["particles"]
+
+    def test_it_says_what_it_found(self):
+        said = run(*self.ASKED).stdout
+        assert said.startswith("cook, load shear; third, t = 1 mm; an error of at most 3 % in tip and edge")
+        assert "recommended: free " in said and "with springs alone: free " in said
+
+    @pytest.mark.parametrize(
+        ("options", "code", "message"),
+        [
+            (("--size", "2 mm"), 2, "--size: '2 mm' is what --error finds; leave one of them out"),
+            (("--error", "1"), 2, "--error: '1' is no error above 0 and below 100 %; give one such as '1 %'"),
+            (("--error", "1e-9 %"), 2, "--error: '1e-9 %' is below the error estimate of the reference; give at least"),
+        ],
+    )
+    def test_refusals(self, options, code, message):
+        result = run(*self.ASKED, *options)
+        assert result.exit_code == code and result.stderr.startswith(message), result.output
+
+    def test_what_has_no_mesh_or_no_reference_is_refused(self, here):
+        result = run("predict", *OWN, "--error", "1 %")
+        assert result.exit_code == 1 and "'own' has the mesh of its file; give it an outline" in result.stderr
+        result = run("predict", *PLATE[:-2], "--error", "1 %")
+        assert result.exit_code == 2
+        assert result.stderr == (
+            "--load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out of the "
+            "quantities\n"
+        )
+        study = st.load_study("study.yaml")
+        with pytest.raises(ValueError, match="of beams alone"):
+            st.find_mesh(study.shape("plate"), study.material("steel"), "1 %", loads=["bending"])
+        with pytest.raises(ValueError, match="load: 'pull' is of shapes alone"):
+            st.find_mesh(st.Beam("40 mm", "20 mm"), study.material("steel"), "1 %", load="pull")
+
+
 REFUSALS = [
     (("--shape", "study.yaml:plat"), "has no shape 'plat'; did you mean 'plate'? known: plate, own, other"),
     (("--shape", "study.yaml"), "names no shape; give such as study.yaml:<name>; known: plate, own, other"),

@@ -1,6 +1,7 @@
 """Recommend a definition for one mesh, or a mesh for one error."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ from .shape_options import SHAPE_HELP, asked_shape, check_kind
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
-    from ..mesh import Mesh
+    from ..mesh import GroupedMesh, Mesh
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from .shape_options import AskedShape
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
         'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4 --json',
         'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
         'springtune predict --shape config/shapes.yaml:cook --load shear --size "2 mm" --material third',
+        'springtune predict --shape config/shapes.yaml:cook --material third --error "2 %"',
     )
 )
 @click.option("--beam", help="Length x height in mm, such as 200x40.")
@@ -100,6 +102,7 @@ def predict(
     Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
     strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
+    A shape of a study has errors in the quantities that its load case asks for.
     """
     from ..prediction import CASES, check_beam
     from ..springs import DefinitionError
@@ -141,9 +144,8 @@ def _on_shape(asked: "AskedShape", error: str | None, springs_alone: bool, as_js
     from .recommendation import shape_json, shape_text
 
     if error is not None:
-        raise Unmet(
-            f"--error: '{error}' finds meshes of beams alone; give --size, and a smaller one until the error is kept"
-        )
+        _find_on_shape(asked, error, springs_alone, as_json, target)
+        return
     grouped = asked.mesh()
     count = len(grouped.mesh.points)
     if count > SOLVED_FROM_FILE:
@@ -170,6 +172,38 @@ def _on_shape(asked: "AskedShape", error: str | None, springs_alone: bool, as_js
 
         net = net_of_shape(asked, solved[0])
         _say_written(net, target, as_json)
+
+
+def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool, as_json: bool, target: Path | None) -> None:
+    """Find the mesh of a shape that keeps an error."""
+    from ..prediction import find_shape_mesh
+    from ..scene.statements import ShapeStatement
+    from .recommendation import shape_search_json, shape_search_text
+    from .springs import net_of_shape
+
+    if asked.shape.file:
+        raise Unmet(
+            f"--error: '{error}' finds sizes of meshes that are made, and '{asked.shape.name}' has the mesh of its "
+            "file; give it an outline, or leave --error out"
+        )
+    if asked.size is not None:
+        raise ValueError(f"--size: '{asked.size_text}' is what --error finds; leave one of them out")
+
+    def make(size: float) -> "GroupedMesh":
+        return replace(asked, size=size).mesh()
+
+    try:
+        search = find_shape_mesh(asked.shape, asked.materials, error, load=asked.load, make=make)
+    except ValueError as problem:
+        raise ValueError(f"--{problem}" if str(problem).startswith(("error:", "load ")) else str(problem)) from None
+    best = search.best_springs if springs_alone else search.best
+    grouped = make(best.size if best else search.tried[-1].size)
+    statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
+    click.echo((shape_search_json if as_json else shape_search_text)(statement, search, springs_alone))
+    if target is not None:
+        if best is None:
+            raise Unmet(f"--write: no mesh keeps {error}, so nothing is written; allow a larger error")
+        _say_written(net_of_shape(replace(asked, size=best.size), best.choice.definition), target, as_json)
 
 
 def _predict(

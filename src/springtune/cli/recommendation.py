@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from .. import __version__
 
@@ -119,8 +119,8 @@ def shape_text(
                   for name, found in known.items() if not isinstance(found, str)]  # fmt: skip
     first, plain = (name or "none" for name in recommended(choices))
     lines = [
-        f"{statement.shape.name}, load {load}, {mesh_name}: {about['particles']} particles, {about['springs']} "
-        f"springs; {statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
+        f"{_shape_head(statement)}, {mesh_name}: {about['particles']} particles, {about['springs']} springs; "
+        f"{_made_of(statement)}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
         "",
@@ -156,6 +156,40 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
     -------
     str
     """
+    head = f"{beam.label}; {_body_text(beam, material)}"
+    meaning = f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,"
+    return _search_text(head, "under", meaning, search, springs_alone, material.density is not None)
+
+
+def shape_search_text(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
+    """Text of a search for a mesh of a shape.
+
+    Parameters
+    ----------
+    statement : ShapeStatement
+    search : MeshSearch
+    springs_alone : bool, optional
+        As of `search_text`.
+
+    Returns
+    -------
+    str
+    """
+    head = f"{_shape_head(statement)}; {_made_of(statement)}"
+    meaning = "Errors are (network - reference) / |reference| of each quantity, solved on each mesh,"
+    dense = all(one.density is not None for one in statement.materials)
+    return _search_text(head, "in", meaning, search, springs_alone, dense)
+
+
+def _shape_head(statement: "ShapeStatement") -> str:
+    return f"{statement.shape.name}, load {statement.load}"
+
+
+def _made_of(statement: "ShapeStatement") -> str:
+    return f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
+
+
+def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", springs_alone: bool, steps: bool) -> str:
     from ..output.text import aligned
 
     wanted = f"{100 * search.error:.6g} %"
@@ -165,11 +199,10 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
         answers.insert(0, ("recommended", search.best))
         tables.insert(0, ("with any definition", search.by_type, False))
     lines = [
-        f"{beam.label}; {_body_text(beam, material)}; an error of at most {wanted} under {_listed(search.loads)}",
+        f"{head}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
         *(f"{what}: {_answer(one)}" for what, one in answers),
     ]
-    steps = material.density is not None
     heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
     heads += ["largest step"] if steps else []
     right = (3, *range(5, 9 + len(search.loads) + steps))
@@ -204,7 +237,7 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
         f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
         "tried on, up to one with twice as many cells across, and would if its errors changed once more by as much as",
         "over the last doubling. Meshes are ranked by their particles.",
-        f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,",
+        meaning,
         f"{KINEMATICS_TEXT} (error estimate {_estimate(search.known)}).",
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
@@ -267,15 +300,8 @@ def shape_json(
     """
     first, plain = recommended(choices)
     return _json(
-        {
-            "springtune": __version__,
-            "shape": statement.shape.name,
-            "load": statement.load,
-            "thickness": statement.thickness,
-            "materials": {part: asdict(one) for part, one in statement.by_part.items()},
-            "references": {
-                name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
-            },
+        _shape_json(statement, known)
+        | {
             "mesh": mesh,
             "recommended": first,
             "recommended_springs_alone": plain,
@@ -296,6 +322,40 @@ def search_json(beam: "Beam", material: "Material", search: "MeshSearch", spring
     -------
     str
     """
+    return _json(_head_json(beam, material, cast("References", search.known)) | _found_json(search, springs_alone))
+
+
+def shape_search_json(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
+    """A search for a mesh of a shape as JSON; numbers that are not there are null.
+
+    Parameters
+    ----------
+    statement, search, springs_alone
+        As of `shape_search_text`.
+
+    Returns
+    -------
+    str
+    """
+    return _json(_shape_json(statement, cast("ShapeReferences", search.known)) | _found_json(search, springs_alone))
+
+
+def _shape_json(statement: "ShapeStatement", known: "ShapeReferences") -> dict[str, Any]:
+    """What is said of a shape and its references."""
+    return {
+        "springtune": __version__,
+        "shape": statement.shape.name,
+        "load": statement.load,
+        "thickness": statement.thickness,
+        "materials": {part: asdict(one) for part, one in statement.by_part.items()},
+        "references": {
+            name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
+        },
+    }
+
+
+def _found_json(search: "MeshSearch", springs_alone: bool) -> dict[str, Any]:
+    """What was found."""
 
     def one_json(one: "MeshChoice | None") -> dict[str, Any] | None:
         if one is None:
@@ -312,13 +372,9 @@ def search_json(beam: "Beam", material: "Material", search: "MeshSearch", spring
         "recommended": one_json(search.best),
         "by_type": {name: one_json(one) for name, one in search.by_type.items()},
     }
-    return _json(
-        _head_json(beam, material, search.known)
-        | {"error": search.error, "most": search.most}
-        | ({} if springs_alone else of_any)
-        | alone
-        | {"tried": [asdict(one) for one in search.tried]}
-    )
+    asked = {"error": search.error, "most": search.most}
+    tried = {"tried": [asdict(one) for one in search.tried]}
+    return asked | ({} if springs_alone else of_any) | alone | tried
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
@@ -381,7 +437,7 @@ def _body_text(beam: "Beam", material: "Material") -> str:
     return f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
 
 
-def _estimate(known: "References") -> str:
+def _estimate(known: "References | ShapeReferences") -> str:
     estimates = [found.error_estimate for found in known.values() if not isinstance(found, str)]
     return f"{100 * max(estimates, default=0):.1g} %"
 

@@ -345,7 +345,8 @@ def export(
     if ending in (".vtu", ".pvd"):
         if group.strip("/") not in ("", "fields", NETWORKS_OF_SHAPES) or variables:
             raise RequestError(
-                f"{path}: ParaView gets the group 'fields', or --group {NETWORKS_OF_SHAPES}; leave --variables out"
+                f"{path}: ParaView gets the group 'fields', or --group {NETWORKS_OF_SHAPES}; leave --group and "
+                "--variables out"
             )
         alone = not group.strip("/") and "fields" not in tree.children and NETWORKS_OF_SHAPES in tree.children
         if alone or group.strip("/") == NETWORKS_OF_SHAPES:

@@ -20,7 +20,7 @@ from .choices import (
     references,
     shape_references,
 )
-from .search import MeshChoice, MeshSearch, SolvedMesh, find_mesh
+from .search import MeshChoice, MeshSearch, SolvedMesh, find_mesh, find_shape_mesh
 
 __all__ = [
     "CASES",
@@ -38,6 +38,7 @@ __all__ = [
     "check_beam",
     "extrapolate",
     "find_mesh",
+    "find_shape_mesh",
     "predict",
     "references",
     "shape_references",

@@ -339,7 +339,7 @@ def _on_shape(
     load: str | None,
 ) -> list[Choice]:
     """As `predict`, of a shape."""
-    statement = ShapeStatement(shape, mesh, material, _only_load(shape, load), 1.0, "linear")
+    statement = ShapeStatement(shape, mesh, material, only_load(shape, load), 1.0, "linear")
     tried = TriedShape(statement, shape_references(statement) if known is None else known)
     choices = [tried.choice(name) for name in tried.names]
     choices += [tried.failed(name) for name in tried.failures]
@@ -348,7 +348,23 @@ def _on_shape(
     return sorted(choices, key=lambda choice: choice.worst)
 
 
-def _only_load(shape: Shape, load: str | None) -> str:
+def only_load(shape: Shape, load: str | None) -> str:
+    """Load case of a shape, its only one where none is named.
+
+    Parameters
+    ----------
+    shape : Shape
+    load : str or None
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        If none is named of several.
+    """
     if load is not None:
         return load
     if len(shape.loads) != 1:
