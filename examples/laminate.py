@@ -36,7 +36,10 @@ def main():
         errors = ", ".join(f"{name} {100 * error:+.2f} %" for name, error in choice.errors.items())
         print(f"{choice.definition}: {errors}")
     print(f"refused: {', '.join(one.definition for one in choices if one.failures)}")
-    found.plot()
+    for scale, colour in ((0, "lightgrey"), (20, "C0")):
+        moved = 1e3 * (mesh.mesh.points + scale * found.displacements)
+        plt.triplot(*moved.T, mesh.mesh.triangles, color=colour, linewidth=0.8)
+    plt.gca().set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title="displacements 20-fold")
     return found.values["end"] / exact["end"]
 
 
