@@ -619,3 +619,38 @@ def test_what_no_file_tells_of_shapes_is_refused_and_nothing_written(ending, tmp
     with pytest.raises(ValueError, match="density: material 'bare' has none"):
         holed("pull", material=bare).springs.write(tmp_path / f"net{ending}", errors=False)
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("load", ["pull", "press", "weigh"])
+def test_files_of_shapes_balance_by_what_they_hold_alone(load, tmp_path):
+    """Supports, forces and springs of files for SOFA and XPBD, and of plain arrays."""
+    one = holed(load, "patch")
+    moved = one.solve().displacements
+    sofa = as_sofa_reads(written(one, tmp_path, ".scn"))
+    rows = np.array(sofa["SpringForceField"][0]["spring"].split(), dtype=float).reshape(-1, 5)
+    held, forces = np.zeros(moved.shape, dtype=bool), np.zeros(moved.shape)
+    for fixed in sofa.get("FixedProjectiveConstraint", ()):
+        held[np.array(fixed["indices"].split(), dtype=int)] = True
+    for partly in sofa["PartialFixedProjectiveConstraint"]:
+        axes = np.array(partly["fixedDirections"].split(), dtype=int).astype(bool)
+        held[np.array(partly["indices"].split(), dtype=int)] = axes[:2]
+    [field] = sofa["ConstantForceField"]
+    loads = np.array(field["forces"].split(), dtype=float).reshape(-1, 3)[:, :2]
+    forces[np.array(field["indices"].split(), dtype=int)] = loads
+    found = {"SOFA": (rows[:, :2].astype(int), rows[:, 2], rows[:, 4], held, forces)}
+    xpbd = json.loads(written(one, tmp_path, ".xpbd.json"))
+    pairs, lengths, compliance = (
+        np.array(xpbd["constraints"][key]) for key in ("particles", "rest_lengths", "compliance")
+    )
+    held = np.zeros(moved.shape, dtype=bool)
+    for particle, axis in xpbd["held_directions"]:
+        held[particle, axis] = True
+    held[np.array(xpbd["inverse_masses"]) == 0] = True
+    found["XPBD"] = pairs, 1 / compliance, lengths, held, np.array(xpbd["forces"])
+    one.springs.write(tmp_path / "net.h5", errors=False)
+    net = SpringNet.read(tmp_path / "net.h5")
+    found["arrays"] = net.springs, net.stiffness, net.rest_lengths, net.held, net.forces
+    for program, (springs, stiffness, lengths, held, forces) in found.items():
+        assert np.array_equal(held, one.held), program
+        left = pulls(one.mesh.points, springs, stiffness, lengths, one.mesh.points + moved) + forces
+        assert np.linalg.norm(left[~held]) < 1e-9 * np.linalg.norm(forces), program
