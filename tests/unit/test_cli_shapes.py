@@ -134,8 +134,15 @@ class TestPredict:
         groups = ["", "foot", "", "", "top", ""]
         sides = [st.Segment(place, group=group) for place, group in zip(places, groups, strict=True)]
         angle = st.Shape("angle", 1e-3, tuple(sides), points={"corner": (0.01, 0.01)}, loads={"pull": load})
-        choices = st.predict(angle, st.mesh_shape(angle, "4 mm"), st.Material("1 MPa", 0.3))
+        grouped, soft = st.mesh_shape(angle, "4 mm"), st.Material("1 MPa", 0.3)
+        choices = st.predict(angle, grouped, soft)
         assert np.isfinite(choices[0].worst) and np.isnan(choices[0].errors["peak"])
+        best = choices[0].definition
+        header = st.SpringNet.from_scene(st.Scene(angle, grouped, soft, "pull", definition=best)).header
+        assert header["expected_error"]["end"] == pytest.approx(choices[0].errors["end"], abs=1e-4)
+        assert header["expected_error"]["peak"].startswith("not computed: ")
+        with pytest.raises(ValueError, match="'peak' has no reference, so no error of it can be kept: "):
+            st.find_mesh(angle, soft, "1 %")
 
     def test_of_a_laminate_springs_alone_are_tried_that_can_be_one(self):
         end = st.Quantity("end", "displacement", "right", "x")
