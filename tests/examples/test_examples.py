@@ -34,6 +34,12 @@ KNOWN = {
     "pressed_block": (3.14e-3, 2e-3),
     # Closed form of the equilateral lattice.
     "predict": (math.sqrt(3) / 2 * STEEL * 1e-3, 1e-9),
+    # Closed form: uniform strain, which linear triangles hold.
+    "laminate": (1.0, 1e-9),
+    # Closed form of uniaxial tension of a neo-Hooke sheet: the force is that of twice its length.
+    "stretched_rubber": (2.0, 1e-8),
+    # Lame; linear triangles of a twentieth of the ring's wall.
+    "shape_from_file": (1.0, 5e-3),
     # Howland, hole a fifth of the width, by Peterson's polynomial; recovered from triangles of .4 mm at the rim.
     "plate": ((3 - 3.14 * 0.2 + 3.667 * 0.2**2 - 1.527 * 0.2**3) / (1 - 0.2), 1.5e-2),
 }

@@ -542,3 +542,115 @@ def test_two_commands_bring_springs_into_mujoco(tmp_path):
     done = CliRunner().invoke(main, ["springs", *words, "--definition", "area", "--out", str(tmp_path / "area.xml")])
     assert done.exit_code == 2 and done.output.startswith("--definition 'area': has energies of areas")
     assert not (tmp_path / "area.xml").exists()
+
+
+# -- shapes ------------------------------------------------------------------------------------------------------------
+
+
+def holed(load, definition="lattice", material=STEEL, size="4 mm", **options):
+    """A scene of a plate with a hole, under one of a few load cases."""
+    end = st.Quantity("end", "displacement", "right", "x")
+    fixed, right = st.Support("left", x=0, y=0), st.Traction("right", ("2 kN", "200 N"))
+    rollers = (st.Support("left", x=0), st.Support("corner", y=0))
+    cases = (
+        st.LoadCase("pull", rollers, (right,), quantities=(end,)),
+        st.LoadCase("press", (fixed,), pressures=(st.Pressure("hole", "20 MPa"),), quantities=(end,)),
+        st.LoadCase("weigh", (fixed,), gravity=(1e5, -3e5), quantities=(end,)),
+        st.LoadCase("turn", (fixed,), pressures=(st.Pressure("upper", "1 MPa", True),), quantities=(end,)),
+        st.LoadCase("move", (fixed, st.Support("right", x="0.1 mm")), quantities=(end,)),
+    )
+    plate = st.Shape.rectangle(
+        "60 mm",
+        "20 mm",
+        holes=[st.Hole.circle(("30 mm", "10 mm"), "5 mm")],
+        points={"corner": (0, 0)},
+        loads={case.name: case for case in cases},
+    )
+    return st.Scene(plate, st.mesh_shape(plate, size), material, load, definition=definition, **options)
+
+
+@pytest.mark.parametrize("definition", ["lattice", "patch", "element-fit", "delingette"])
+@pytest.mark.parametrize("load", ["pull", "press", "weigh"])
+def test_equilibria_of_shapes_are_those_of_mujoco(load, definition, tmp_path):
+    """Under a force on rollers and a point, pressure in a hole, and gravity, which is forces in the file."""
+    one = holed(load, definition)
+    result = one.solve()
+    model, data = loaded(one, tmp_path)
+    positions = result.displacements[~one.held]
+    assert str(result.status) == "solved" and out_of_balance(model, data, positions) < 1e-9
+    assert np.allclose(model.key_qpos[0], positions, rtol=0, atol=1e-8 * np.abs(positions).max())
+    assert not model.opt.gravity.any()
+
+
+def test_parts_of_shapes_keep_their_masses_in_mujoco(tmp_path):
+    """A core of another material: the file's masses are those of both, and its springs balance."""
+    light = st.Material("70 GPa", 0.3, density="2700 kg/m^3", name="light")
+    pull = st.LoadCase(
+        "pull",
+        (st.Support("left", x=0, y=0),),
+        (st.Traction("right", ("1 kN", 0)),),
+        quantities=(st.Quantity("end", "displacement", "right", "x"),),
+    )
+    core = st.Hole.circle(("30 mm", "10 mm"), "5 mm", part="core")
+    plate = st.Shape.rectangle("60 mm", "20 mm", holes=[core], loads={"pull": pull})
+    grouped = st.mesh_shape(plate, "2 mm")
+    one = st.Scene(plate, grouped, {"": STEEL, "core": light}, "pull", definition="lattice")
+    model, data = loaded(one, tmp_path)
+    assert out_of_balance(model, data, one.solve().displacements[~one.held]) < 1e-9
+    area = np.pi * 25e-6
+    whole = 1e-3 * (7850 * (1.2e-3 - area) + 2700 * area)
+    assert one.statement.masses().sum() == pytest.approx(whole, rel=2e-3)
+    free = ~one.held.all(axis=1)
+    moving = model.body_mass[1:].sum()
+    assert moving == pytest.approx(one.statement.masses()[free].sum(), rel=1e-9)
+    assert "Other parts are of 'light'." in written(one, tmp_path, ".xml")
+
+
+@pytest.mark.parametrize("ending", PROGRAMS)
+def test_what_no_file_tells_of_shapes_is_refused_and_nothing_written(ending, tmp_path):
+    loads = {
+        "turn": "load 'turn': turns with the side .*give its pressures 'follower: false'",
+        "move": "load 'move': prescribes displacements",
+    }
+    for load, message in loads.items():
+        with pytest.raises(ValueError, match=message):
+            holed(load).springs.write(tmp_path / f"net{ending}", errors=False)
+    bare = st.Material("70 GPa", 0.3, name="bare")
+    with pytest.raises(ValueError, match="density: material 'bare' has none"):
+        holed("pull", material=bare).springs.write(tmp_path / f"net{ending}", errors=False)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("load", ["pull", "press", "weigh"])
+def test_files_of_shapes_balance_by_what_they_hold_alone(load, tmp_path):
+    """Supports, forces and springs of files for SOFA and XPBD, and of plain arrays."""
+    one = holed(load, "patch")
+    moved = one.solve().displacements
+    sofa = as_sofa_reads(written(one, tmp_path, ".scn"))
+    rows = np.array(sofa["SpringForceField"][0]["spring"].split(), dtype=float).reshape(-1, 5)
+    held, forces = np.zeros(moved.shape, dtype=bool), np.zeros(moved.shape)
+    for fixed in sofa.get("FixedProjectiveConstraint", ()):
+        held[np.array(fixed["indices"].split(), dtype=int)] = True
+    for partly in sofa["PartialFixedProjectiveConstraint"]:
+        axes = np.array(partly["fixedDirections"].split(), dtype=int).astype(bool)
+        held[np.array(partly["indices"].split(), dtype=int)] = axes[:2]
+    [field] = sofa["ConstantForceField"]
+    loads = np.array(field["forces"].split(), dtype=float).reshape(-1, 3)[:, :2]
+    forces[np.array(field["indices"].split(), dtype=int)] = loads
+    found = {"SOFA": (rows[:, :2].astype(int), rows[:, 2], rows[:, 4], held, forces)}
+    xpbd = json.loads(written(one, tmp_path, ".xpbd.json"))
+    pairs, lengths, compliance = (
+        np.array(xpbd["constraints"][key]) for key in ("particles", "rest_lengths", "compliance")
+    )
+    held = np.zeros(moved.shape, dtype=bool)
+    for particle, axis in xpbd["held_directions"]:
+        held[particle, axis] = True
+    held[np.array(xpbd["inverse_masses"]) == 0] = True
+    found["XPBD"] = pairs, 1 / compliance, lengths, held, np.array(xpbd["forces"])
+    one.springs.write(tmp_path / "net.h5", errors=False)
+    net = SpringNet.read(tmp_path / "net.h5")
+    found["arrays"] = net.springs, net.stiffness, net.rest_lengths, net.held, net.forces
+    for program, (springs, stiffness, lengths, held, forces) in found.items():
+        assert np.array_equal(held, one.held), program
+        left = pulls(one.mesh.points, springs, stiffness, lengths, one.mesh.points + moved) + forces
+        assert np.linalg.norm(left[~held]) < 1e-9 * np.linalg.norm(forces), program

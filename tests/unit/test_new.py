@@ -4,6 +4,8 @@ import re
 import shutil
 from pathlib import Path
 
+import meshio
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -65,6 +67,56 @@ class TestNew:
             Path("config/other.yaml").write_text(text)
             assert len(load_study("config/other.yaml").scenes) == 2
         assert (Path("config") / re.search(r"\$schema=(\S+)", lines[0])[1]).is_file()
+
+    def test_a_study_of_a_shape_is_explained_and_runs_as_it_is(self, checkout):
+        result = run("new", "my-plate", "--shape")
+        assert result.stdout.startswith("config/my-plate.yaml: 4 scenes; change it as you like")
+        text = Path("config/my-plate.yaml").read_text()
+        assert max(map(len, text.splitlines())) <= 120
+        study = load_study("config/my-plate.yaml")
+        assert len(study.parts["shapes"].scenes) == 4 and study.title == "My plate"
+        # What the comments offer may be put in.
+        Path("config/pressed.yaml").write_text(text.replace("# pressures:", "pressures:"))
+        assert load_study("config/pressed.yaml").shape("plate").loads["pull"].pressures[0].pressure == 1e6
+        Path("config/rollers.yaml").write_text(text.replace("left: fixed", "left: {x: 0 mm}, top: {y: 0}"))
+        assert load_study("config/rollers.yaml").shape("plate").loads["pull"].supports[0].y is None
+        campaign = Campaign("config/my-plate.yaml")
+        campaign.plan.write()
+        for name in campaign.jobs:
+            campaign.do(name)
+        with st.open("results/my-plate") as tree:
+            scenes = tree["shapes"].to_dataset().squeeze(drop=True)
+            assert (scenes.status == st.Status.SOLVED).all()
+            assert float(abs(scenes.error.sel(quantity="stretch")).max()) < 0.1
+        for product in ("figures", "tables/index.html", "index.html"):
+            assert (campaign.folder / product).exists()
+        # And what it drew goes to ParaView.
+        said = run("export", "results/my-plate", "--to", "plate.pvd")
+        assert said.exit_code == 0 and "2 networks of shapes, in the folder plate" in said.stdout, said.output
+        found = meshio.read("plate/plate_pull_patch.vtu")
+        with st.open("results/my-plate") as tree:
+            one = tree["shape_fields"].to_dataset().isel(case=0).sel(definition="patch")
+            count = int(np.isfinite(one.x).sum())
+            assert np.array_equal(found.points[:, 0], one.x.values[:count])
+            assert np.array_equal(found.point_data["displacement"][:, 1], one.displacement_y.values[:count])
+            scene = tree["shapes"].to_dataset().sel(definition="patch", quantity="stretch", mesh_size=4e-3)
+            number = re.search(r'Name="error_of_stretch"[^>]*>([^<]*)<', Path("plate/plate_pull_patch.vtu").read_text())
+            assert float(number[1]) == float(scene.error.squeeze())
+        assert {block.type for block in found.cells} == {"line", "triangle"}
+        asked = ("export", "results/my-plate", "--to", "one.vtu")
+        assert run(*asked, "--select", "shape=plate,definition=lattice").stdout == "one.vtu: plate, pull, lattice\n"
+        Path("one.vtu").unlink()
+        for options, message in (
+            (
+                (),
+                "one.vtu: 2 networks, and a .vtu file has one; --select one definition, or give a name ending in .pvd",
+            ),
+            (("--select", "definition=latice"), "no such label; did you mean 'lattice'?"),
+            (("--select", "beam=200x40"), "networks of shapes are told apart by shape, load, definition"),
+            (("--group", "fields"), "the dataset has no group '/fields'"),
+        ):
+            result = run(*asked, *options)
+            assert result.exit_code in (1, 2) and message in result.stderr and not Path("one.vtu").exists()
 
     def test_it_runs_as_it_is(self, checkout):
         run("new", "my-study")

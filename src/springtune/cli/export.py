@@ -14,6 +14,7 @@ from .options import WrongCall
         "springtune export results/paper --group sensitivity --select beam=200x30 --to curves.parquet",
         "springtune export results/paper --group fields --select beam=200x40,mesh_type=free --to network.nc",
         "springtune export results/paper --select beam=200x40,load=traction --to traction.pvd",
+        "springtune export results/shapes --select shape=cook,definition=lattice --to cook.vtu",
     )
 )
 @click.argument("path", type=click.Path(path_type=Path))
@@ -32,7 +33,7 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
     """Write a dataset as a long table, one row a cell (CSV, Parquet), whole (Zarr), or one mesh with its fields (.nc).
 
     For ParaView: one scene with displacements, their error, and each spring's stiffness and force (.vtu), or a
-    collection of all that are selected (.pvd).
+    collection of all that are selected (.pvd); of shapes, by shape, load and definition, the networks that are drawn.
 
     PATH is results/<study>, or its dataset.nc.
     """

@@ -32,13 +32,55 @@ grids:  # all combinations of the values of a grid are its scenes; [5 mm, 2 mm] 
 outputs: [sensitivity, deformed, tables]
 """
 
+SHAPE_TEMPLATE = """\
+{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
+# Every quantity carries its unit. Names of shapes, groups, loads, quantities, materials and grids are yours;
+# {manual} explains every key.
+title: "{title}"
+materials:
+  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
+shapes:
+  plate:
+    thickness: 1 mm
+    outline:  # sides from corner to corner, counter-clockwise, each of a group; with a `centre` it is an arc
+      - {{from: [0, 0], group: lower}}
+      - {{from: [100 mm, 0], group: right}}
+      - {{from: [100 mm, 40 mm], group: upper}}
+      - {{from: [0, 40 mm], group: left}}
+    holes: [{{circle: {{centre: [50 mm, 20 mm], radius: 8 mm}}, group: hole}}]
+    # file: plate.msh  # a mesh file, with groups of its own, in the place of outline, holes, points and refined
+    points: {{top: [50 mm, 28 mm]}}  # particles of every mesh, to be held, loaded or asked for
+    refined: {{hole: 0.5}}  # edges there, over the mesh size
+    loads:
+      pull:
+        supports: {{left: fixed}}  # or displacements by group or point: {{x: 0 mm}} leaves y free
+        forces: {{right: [4 kN, 0]}}  # along x and y, spread over the group
+        # pressures: {{hole: 1 MPa}}  # towards the body; gravity: [0, -9.81 m/s^2] needs densities
+        quantities:  # what is asked; errors are theirs
+          stretch: {{displacement: x, of: right}}
+          peak: {{stress: xx, at: top}}
+shape_grids:  # all combinations of the values of a grid are its scenes; [8 mm, 4 mm] are two values
+  plate:
+    shape: plate
+    mesh_size: [8 mm, 4 mm]
+    material: steel
+    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
+    kinematics: linear  # small strain; nonlinear: springs keep their length law
+outputs: [shapes, tables]
+"""
+
 LOADS_BY_FORCE = ("compression", "bending", "shear")
 """Loads that a person is told of first; all take a force."""
 
 
-@click.command(epilog=examples("springtune new my-study", "springtune new studies/my-study.yaml"))
+@click.command(
+    epilog=examples(
+        "springtune new my-study", "springtune new studies/my-study.yaml", "springtune new my-plate --shape"
+    )
+)
 @click.argument("study")
-def new(study: str) -> None:
+@click.option("--shape", is_flag=True, help="A study of a shape, an outline with a hole, rather than of a beam.")
+def new(study: str, shape: bool) -> None:
     """Write a small study with comments, to be changed into your own; it runs as it is.
 
     STUDY is its name, or the path of its file. A name alone becomes config/<name>.yaml in a checkout, and <name>.yaml
@@ -54,14 +96,14 @@ def new(study: str) -> None:
     if not path.parent.is_dir():
         raise click.ClickException(f"{path.parent}: there is no such folder; make it, or name another")
     try:
-        write_text(path, template_text(path))
+        write_text(path, template_text(path, SHAPE_TEMPLATE if shape else TEMPLATE))
     except OSError as error:
         raise click.ClickException(
             f"{path}: cannot be written: {error.strerror or error}; name another place"
         ) from None
     if not path.resolve().is_relative_to(Path.cwd().resolve()):
         click.echo(f"written outside of this folder: {path.resolve()}")
-    click.echo(f"{path}: 2 scenes; change it as you like, and run it:\n  springtune run {path}")
+    click.echo(f"{path}: {4 if shape else 2} scenes; change it as you like, and run it:\n  springtune run {path}")
 
 
 def _path(given: str) -> Path:
@@ -75,13 +117,15 @@ def _path(given: str) -> Path:
     return path
 
 
-def template_text(path: Path) -> str:
+def template_text(path: Path, template: str = TEMPLATE) -> str:
     """Text of a study to begin with.
 
     Parameters
     ----------
     path : Path
         Where it is to be.
+    template : str, optional
+        `TEMPLATE` or `SHAPE_TEMPLATE`.
 
     Returns
     -------
@@ -91,7 +135,7 @@ def template_text(path: Path) -> str:
 
     schema = _beside(path, SCHEMA)
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
-    return TEMPLATE.format(
+    return template.format(
         schema=f"# yaml-language-server: $schema={schema}\n" if schema else "",
         manual="config/README.md",
         path=path.as_posix(),

@@ -1,6 +1,7 @@
 """Recommend a definition for one mesh, or a mesh for one error."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,11 +22,14 @@ from .options import (
     known_materials,
     refused,
 )
+from .shape_options import SHAPE_HELP, asked_shape, check_kind
 
 if TYPE_CHECKING:
-    from ..mesh import Mesh
+    from ..handover.net import SpringNet
+    from ..mesh import GroupedMesh, Mesh
     from ..problem.geometry import Beam
     from ..problem.materials import Material
+    from .shape_options import AskedShape
 
 
 @click.command(
@@ -36,9 +40,13 @@ if TYPE_CHECKING:
         "--write net.csv",
         'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4 --json',
         'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
+        'springtune predict --shape config/shapes.yaml:cook --load shear --size "2 mm" --material third',
+        'springtune predict --shape config/shapes.yaml:cook --material third --error "2 %"',
     )
 )
-@click.option("--beam", required=True, help="Length x height in mm, such as 200x40.")
+@click.option("--beam", help="Length x height in mm, such as 200x40.")
+@click.option("--shape", help=SHAPE_HELP)
+@click.option("--load", help="Load case of a shape.  [default: its only one]")
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
 @click.option(
     "--mesh",
@@ -50,7 +58,9 @@ if TYPE_CHECKING:
 @click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
 @click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
 @click.option(
-    "--material", shell_complete=known_materials, help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson."
+    "--material",
+    shell_complete=known_materials,
+    help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
 )
 @click.option("--young", help="Young's modulus, such as '210 GPa'.")
 @click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
@@ -70,7 +80,9 @@ if TYPE_CHECKING:
     help=f"Write the springs of what is recommended to a file: {SPRING_FILES}.",
 )
 def predict(
-    beam: str,
+    beam: str | None,
+    shape: str | None,
+    load: str | None,
     thickness: str,
     mesh_type: str | None,
     size: str | None,
@@ -90,13 +102,20 @@ def predict(
     Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
     strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
+    A shape of a study has errors in the quantities that its load case asks for.
     """
     from ..prediction import CASES, check_beam
     from ..springs import DefinitionError
 
     try:
+        check_kind(shape, beam, ("load",))
         if target is not None:
             check_target("--write", target)
+        if shape is not None:
+            asked = asked_shape(shape, load, material, density, size, sized=error is None)
+            _on_shape(asked, error, springs_alone, as_json, target)
+            return
+        assert beam is not None
         sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
         try:
             check_beam(sheet)
@@ -112,8 +131,79 @@ def predict(
     except OSError as problem:
         why = os.strerror(problem.errno) if problem.errno else problem
         raise SystemExit(refused(problem, f"--write: {target}: {why}; give a file that can be written")) from None
+    except click.UsageError:
+        raise
     except (click.ClickException, DefinitionError, ValueError) as problem:
         raise SystemExit(refused(problem, str(getattr(problem, "message", problem)))) from None
+
+
+def _on_shape(asked: "AskedShape", error: str | None, springs_alone: bool, as_json: bool, target: Path | None) -> None:
+    """Recommend a definition for a mesh of a shape."""
+    from ..prediction import SOLVED_FROM_FILE, predict, shape_references
+    from ..scene.statements import ShapeStatement
+    from .recommendation import shape_json, shape_text
+
+    if error is not None:
+        _find_on_shape(asked, error, springs_alone, as_json, target)
+        return
+    grouped = asked.mesh()
+    count = len(grouped.mesh.points)
+    if count > SOLVED_FROM_FILE:
+        option = "--shape" if asked.size is None else "--size"
+        raise Unmet(f"{option}: {count} particles, more than the {SOLVED_FROM_FILE} that are solved here; give a "
+                    "coarser mesh, or run its study")  # fmt: skip
+    statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
+    known = shape_references(statement)
+    found = predict(asked.shape, grouped, asked.materials, known, load=asked.load)
+    if springs_alone:
+        found = [choice for choice in found if not choice.energies]
+    about = {"particles": count, "springs": len(grouped.mesh.edges)}
+    if as_json:
+        made = asked.size is not None
+        where = {"type": "free" if made else None, "file": None if made else asked.shape.file, "size": asked.size}
+        click.echo(shape_json(statement, where | about, found, known))
+    else:
+        click.echo(shape_text(asked.mesh_name, about, statement, found, known))
+    if target is not None:
+        solved = [choice.definition for choice in found if choice.worst < float("inf")]
+        if not solved:
+            raise Unmet("--write: nothing is recommended for this mesh, so nothing is written; take another mesh")
+        from .springs import net_of_shape
+
+        net = net_of_shape(asked, solved[0])
+        _say_written(net, target, as_json)
+
+
+def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool, as_json: bool, target: Path | None) -> None:
+    """Find the mesh of a shape that keeps an error."""
+    from ..prediction import find_shape_mesh
+    from ..scene.statements import ShapeStatement
+    from .recommendation import shape_search_json, shape_search_text
+    from .springs import net_of_shape
+
+    if asked.shape.file:
+        raise Unmet(
+            f"--error: '{error}' finds sizes of meshes that are made, and '{asked.shape.name}' has the mesh of its "
+            "file; give it an outline, or leave --error out"
+        )
+    if asked.size is not None:
+        raise ValueError(f"--size: '{asked.size_text}' is what --error finds; leave one of them out")
+
+    def make(size: float) -> "GroupedMesh":
+        return replace(asked, size=size).mesh()
+
+    try:
+        search = find_shape_mesh(asked.shape, asked.materials, error, load=asked.load, make=make)
+    except ValueError as problem:
+        raise ValueError(f"--{problem}" if str(problem).startswith(("error:", "load ")) else str(problem)) from None
+    best = search.best_springs if springs_alone else search.best
+    grouped = make(best.size if best else search.tried[-1].size)
+    statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
+    click.echo((shape_search_json if as_json else shape_search_text)(statement, search, springs_alone))
+    if target is not None:
+        if best is None:
+            raise Unmet(f"--write: no mesh keeps {error}, so nothing is written; allow a larger error")
+        _say_written(net_of_shape(replace(asked, size=best.size), best.choice.definition), target, as_json)
 
 
 def _predict(
@@ -229,8 +319,13 @@ def _write(
 ) -> None:
     """Write the springs of a definition, and say so; not where what is printed is for a program."""
     from ..handover.net import SpringNet
+
+    _say_written(SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name, loads=loads), target, quiet)
+
+
+def _say_written(net: "SpringNet", target: Path, quiet: bool) -> None:
+    """Write springs, and say so."""
     from .springs import written_text
 
-    net = SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name, loads=loads)
     written = net.write(target)
     click.echo(written_text(net, written) if quiet else "\n" + written_text(net, written), err=quiet)

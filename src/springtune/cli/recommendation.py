@@ -4,14 +4,15 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from .. import __version__
 
 if TYPE_CHECKING:
-    from ..prediction import Choice, MeshChoice, MeshSearch, Number, References
+    from ..prediction import Choice, MeshChoice, MeshSearch, Number, References, ShapeReferences
     from ..problem.geometry import Beam
     from ..problem.materials import Material
+    from ..scene.statements import ShapeStatement
 
 
 def prediction_text(
@@ -79,6 +80,67 @@ def prediction_text(
     return "\n".join(lines)
 
 
+def shape_text(
+    mesh_name: str,
+    about: dict[str, Any],
+    statement: "ShapeStatement",
+    choices: "Sequence[Choice]",
+    known: "ShapeReferences",
+) -> str:
+    """Text of a prediction for a shape.
+
+    Parameters
+    ----------
+    mesh_name : str
+        Such as ``"free 2 mm"``.
+    about : dict
+        Its ``particles`` and ``springs``.
+    statement : ShapeStatement
+    choices : list of Choice
+    known : dict
+        What `springtune.prediction.shape_references` gave.
+
+    Returns
+    -------
+    str
+    """
+    from ..output.text import aligned
+
+    quantities, load = list(known), statement.load
+    rows = [["definition", "springs inside", "on the outline", *quantities, "besides springs"]]
+    notes = [f"{name}: no reference; {found}" for name, found in known.items() if isinstance(found, str)]
+    for choice in choices:
+        rows.append([choice.definition])
+        rows[-1] += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
+        rows[-1] += [_bounds(choice.errors[name], _percent, _missing(choice, load)) for name in quantities]
+        rows[-1] += [choice.extra]
+        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
+    references = [[name, f"{found.value:.6g} {_unit(statement, name)}", f"{100 * found.error_estimate:.1g} %"]
+                  for name, found in known.items() if not isinstance(found, str)]  # fmt: skip
+    first, plain = (name or "none" for name in recommended(choices))
+    lines = [
+        f"{_shape_head(statement)}, {mesh_name}: {about['particles']} particles, {about['springs']} springs; "
+        f"{_made_of(statement)}",
+        "",
+        f"recommended: {first}; with springs alone: {plain}",
+        "",
+        aligned(rows, left=2, right=range(3, 3 + len(quantities))),
+        "",
+        "Errors are (network - reference) / |reference| of each quantity, solved on this mesh,",
+        f"{KINEMATICS_TEXT}.",
+        "The first row is the best one by its worst error.",
+    ]
+    if references:
+        lines += ["", aligned([["quantity", "reference", "error estimate"], *references], left=1, right=(1, 2))]
+    return "\n".join([*lines, *(["", *notes] if notes else [])])
+
+
+def _unit(statement: "ShapeStatement", name: str) -> str:
+    """Unit of a quantity of interest."""
+    kind = next(one.kind for one in statement.case.quantities if one.name == name)
+    return {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}[kind]
+
+
 def search_text(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh.
 
@@ -94,6 +156,40 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
     -------
     str
     """
+    head = f"{beam.label}; {_body_text(beam, material)}"
+    meaning = f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,"
+    return _search_text(head, "under", meaning, search, springs_alone, material.density is not None)
+
+
+def shape_search_text(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
+    """Text of a search for a mesh of a shape.
+
+    Parameters
+    ----------
+    statement : ShapeStatement
+    search : MeshSearch
+    springs_alone : bool, optional
+        As of `search_text`.
+
+    Returns
+    -------
+    str
+    """
+    head = f"{_shape_head(statement)}; {_made_of(statement)}"
+    meaning = "Errors are (network - reference) / |reference| of each quantity, solved on each mesh,"
+    dense = all(one.density is not None for one in statement.materials)
+    return _search_text(head, "in", meaning, search, springs_alone, dense)
+
+
+def _shape_head(statement: "ShapeStatement") -> str:
+    return f"{statement.shape.name}, load {statement.load}"
+
+
+def _made_of(statement: "ShapeStatement") -> str:
+    return f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
+
+
+def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", springs_alone: bool, steps: bool) -> str:
     from ..output.text import aligned
 
     wanted = f"{100 * search.error:.6g} %"
@@ -103,11 +199,10 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
         answers.insert(0, ("recommended", search.best))
         tables.insert(0, ("with any definition", search.by_type, False))
     lines = [
-        f"{beam.label}; {_body_text(beam, material)}; an error of at most {wanted} under {_listed(search.loads)}",
+        f"{head}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
         *(f"{what}: {_answer(one)}" for what, one in answers),
     ]
-    steps = material.density is not None
     heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
     heads += ["largest step"] if steps else []
     right = (3, *range(5, 9 + len(search.loads) + steps))
@@ -142,7 +237,7 @@ def search_text(beam: "Beam", material: "Material", search: "MeshSearch", spring
         f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
         "tried on, up to one with twice as many cells across, and would if its errors changed once more by as much as",
         "over the last doubling. Meshes are ranked by their particles.",
-        f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,",
+        meaning,
         f"{KINEMATICS_TEXT} (error estimate {_estimate(search.known)}).",
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
@@ -186,6 +281,35 @@ def prediction_json(
     )
 
 
+def shape_json(
+    statement: "ShapeStatement", mesh: dict[str, Any], choices: "Sequence[Choice]", known: "ShapeReferences"
+) -> str:
+    """A prediction for a shape as JSON; numbers that are not there are null.
+
+    Parameters
+    ----------
+    statement : ShapeStatement
+    mesh : dict
+        Its ``type``, ``file``, ``size``, ``particles`` and ``springs``.
+    choices, known
+        As of `shape_text`.
+
+    Returns
+    -------
+    str
+    """
+    first, plain = recommended(choices)
+    return _json(
+        _shape_json(statement, known)
+        | {
+            "mesh": mesh,
+            "recommended": first,
+            "recommended_springs_alone": plain,
+            "choices": [_choice_json(choice) for choice in choices],
+        }
+    )
+
+
 def search_json(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
     """A search for a mesh as JSON; numbers that are not there are null.
 
@@ -198,6 +322,40 @@ def search_json(beam: "Beam", material: "Material", search: "MeshSearch", spring
     -------
     str
     """
+    return _json(_head_json(beam, material, cast("References", search.known)) | _found_json(search, springs_alone))
+
+
+def shape_search_json(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
+    """A search for a mesh of a shape as JSON; numbers that are not there are null.
+
+    Parameters
+    ----------
+    statement, search, springs_alone
+        As of `shape_search_text`.
+
+    Returns
+    -------
+    str
+    """
+    return _json(_shape_json(statement, cast("ShapeReferences", search.known)) | _found_json(search, springs_alone))
+
+
+def _shape_json(statement: "ShapeStatement", known: "ShapeReferences") -> dict[str, Any]:
+    """What is said of a shape and its references."""
+    return {
+        "springtune": __version__,
+        "shape": statement.shape.name,
+        "load": statement.load,
+        "thickness": statement.thickness,
+        "materials": {part: asdict(one) for part, one in statement.by_part.items()},
+        "references": {
+            name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
+        },
+    }
+
+
+def _found_json(search: "MeshSearch", springs_alone: bool) -> dict[str, Any]:
+    """What was found."""
 
     def one_json(one: "MeshChoice | None") -> dict[str, Any] | None:
         if one is None:
@@ -214,13 +372,9 @@ def search_json(beam: "Beam", material: "Material", search: "MeshSearch", spring
         "recommended": one_json(search.best),
         "by_type": {name: one_json(one) for name, one in search.by_type.items()},
     }
-    return _json(
-        _head_json(beam, material, search.known)
-        | {"error": search.error, "most": search.most}
-        | ({} if springs_alone else of_any)
-        | alone
-        | {"tried": [asdict(one) for one in search.tried]}
-    )
+    asked = {"error": search.error, "most": search.most}
+    tried = {"tried": [asdict(one) for one in search.tried]}
+    return asked | ({} if springs_alone else of_any) | alone | tried
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
@@ -283,7 +437,7 @@ def _body_text(beam: "Beam", material: "Material") -> str:
     return f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
 
 
-def _estimate(known: "References") -> str:
+def _estimate(known: "References | ShapeReferences") -> str:
     estimates = [found.error_estimate for found in known.values() if not isinstance(found, str)]
     return f"{100 * max(estimates, default=0):.1g} %"
 

@@ -23,13 +23,15 @@ from .options import (
     known_materials,
     refused,
 )
+from .shape_options import SHAPE_HELP, asked_shape, check_kind
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
     from ..problem.geometry import Beam
     from ..problem.materials import Material
+    from .shape_options import AskedShape
 
-OPTIONS = re.compile(r"^(?=(load|force|definition|stiffness|density)\b)")
+OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density)\b)")
 """Beginnings of messages that name an argument, which is an option here."""
 
 
@@ -53,9 +55,12 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
         'springtune springs --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber --out net.vtu',
         'springtune springs --beam 200x40 --size "5 mm" --material steel --density "7850 kg/m^3" --load traction '
         '--force "400 kN" --out net.json',
+        'springtune springs --shape config/shapes.yaml:hole --size "2 mm" --material steel --density "7850 kg/m^3" '
+        "--definition lattice --out hole.xml",
     )
 )
-@click.option("--beam", required=True, help="Length x height in mm, such as 200x40.")
+@click.option("--beam", help="Length x height in mm, such as 200x40.")
+@click.option("--shape", "shape", help=SHAPE_HELP)
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
 @click.option(
     "--mesh",
@@ -67,7 +72,11 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
 )
 @click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
 @click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
-@click.option("--material", shell_complete=known_materials, help="steel or rubber; or give --young and --poisson.")
+@click.option(
+    "--material",
+    shell_complete=known_materials,
+    help="steel or rubber; or give --young and --poisson; of a shape one of its study.",
+)
 @click.option("--young", help="Young's modulus, such as '210 GPa'.")
 @click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
 @click.option("--density", help="Density, such as '7850 kg/m^3': for masses, and the largest stable time steps.")
@@ -79,8 +88,13 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
     help="Rule for the stiffness; `springtune definitions` lists them, `springtune predict` recommends one.",
 )
 @click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
-@click.option("--load", shell_complete=known_loads, help="What holds and pulls the beam; nothing without.")
-@click.option("--force", help="Size of the load's force, such as '400 kN'.")
+@click.option(
+    "--load",
+    shell_complete=known_loads,
+    help="What holds and pulls the beam, nothing without; or a shape, its only load without.",
+)
+@click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
+@click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
 @click.option(
     "--out",
     "target",
@@ -89,7 +103,8 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
     help=f"File: {SPRING_FILES}; one that is there is replaced.",
 )
 def springs(
-    beam: str,
+    beam: str | None,
+    shape: str | None,
     thickness: str,
     mesh_type: str,
     size: str | None,
@@ -102,30 +117,39 @@ def springs(
     stiffness: str | None,
     load: str | None,
     force: str | None,
+    scale: float,
     target: Path,
 ) -> None:
     """Write the springs of a mesh: their rest lengths and stiffnesses, masses, and energies besides them.
 
     The file says what its numbers are: definition, formula and source, and how far off the network is under traction,
-    bending, shear and the load that is given, solved on this very mesh.
+    bending, shear and the load that is given, solved on this very mesh; of a shape in the quantities that its load case
+    asks for.
     """
     from ..handover.simulation import EquilibriumWarning
     from ..springs import DefinitionError
 
     try:
+        check_kind(shape, beam, ("scale",))
         check_target("--out", target)
-        sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
-        made = is_made(mesh_type)
-        edge = asked_size(sheet, mesh_type, size) if made else None
-        mesh = asked_mesh(sheet, mesh_type, edge, unit)
-        name = f"{mesh_type} {size}" if made else Path(mesh_type).name
-        net = _net(sheet, solid, mesh, name, definition, stiffness, load, force)
+        if shape is not None:
+            net = net_of_shape(asked_shape(shape, load, material, density, size), definition, scale, stiffness)
+        else:
+            assert beam is not None
+            sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
+            made = is_made(mesh_type)
+            edge = asked_size(sheet, mesh_type, size) if made else None
+            mesh = asked_mesh(sheet, mesh_type, edge, unit)
+            name = f"{mesh_type} {size}" if made else Path(mesh_type).name
+            net = _net(sheet, solid, mesh, name, definition, stiffness, load, force)
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", EquilibriumWarning)
             written = net.write(target)
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else error
         raise SystemExit(refused(error, f"--out: {target}: {why}; give a file that can be written")) from None
+    except click.UsageError:
+        raise
     except (click.ClickException, DefinitionError, ValueError) as error:
         said = OPTIONS.sub("--", str(getattr(error, "message", error)), count=1)
         raise SystemExit(refused(error, said)) from None
@@ -161,6 +185,51 @@ def _net(
         raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
+def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiffness: str | None = None) -> "SpringNet":
+    """Springs of a shape, held and loaded as its load case says.
+
+    Parameters
+    ----------
+    asked : AskedShape
+    definition : str
+    scale : float, optional
+        Factor on the load [1].
+    stiffness : str, optional
+        For definitions that are told one.
+
+    Returns
+    -------
+    SpringNet
+
+    Raises
+    ------
+    ValueError
+        If the load moves a support, or an argument is wrong; the message names the option.
+    """
+    from ..handover.net import SpringNet
+    from ..linalg.factors import SingularError
+    from ..scene.single import Scene
+
+    if any(one.x or one.y for one in asked.shape.loads[asked.load].supports):
+        raise ValueError(
+            f"--load: '{asked.load}' of shape '{asked.shape.name}' moves a support, and files of springs have forces "
+            "and directions that are held; give a load of forces"
+        )
+    scene = Scene(
+        asked.shape,
+        asked.mesh(),
+        asked.materials,
+        asked.load,
+        definition=definition,
+        stiffness=stiffness,
+        scale=scale,
+    )
+    try:
+        return SpringNet.from_scene(scene, asked.mesh_name)
+    except SingularError as error:  # of the patch test that scales springs
+        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
+
+
 def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:
     """What was written, and how far off it is.
 
@@ -188,7 +257,8 @@ def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:
             if isinstance(error, str):
                 why.setdefault(error, []).append(load)
         unknown = [f"{', '.join(loads)}: {reason}" for reason, loads in why.items()]
-        lines += [f"error of the displacement, solved on this mesh: {', '.join(known)}"] if known else []
+        what = "error of the displacement" if header["beam"] else "errors"
+        lines += [f"{what}, solved on this mesh: {', '.join(known)}"] if known else []
         lines += unknown
     else:
         lines.append(f"error of the displacement: {errors}")

@@ -27,6 +27,7 @@ from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Ene
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import no_cells, rows_of
+from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import AnyMaterial, Material
@@ -549,7 +550,7 @@ def _steady(load: str) -> str:
 def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
     """Error of each quantity of a load case, linear kinematics against the reference of small strain; or why none."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import SOLVED
+    from ..prediction.choices import SOLVED, shape_references
     from ..reference.small_strain import ReferenceNotConvergedError
 
     names, count = [one.name for one in scene.case.quantities], len(scene.mesh.points)
@@ -567,12 +568,21 @@ def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
         sheet=scene.sheet,
     )
     found = linear.solve()
+    why = dict.fromkeys(names, found.message or "the reference is zero")
+    errors: dict[str, float] = {}
     try:
         errors = found.errors if found.status is Status.SOLVED else {}
-    except ReferenceNotConvergedError as error:
-        return dict.fromkeys(names, f"{NOT_COMPUTED}: {error}")
-    why = found.message or "the reference is zero"
-    return {name: errors[name] if np.isfinite(errors.get(name, np.nan)) else f"{NOT_COMPUTED}: {why}" for name in names}
+    except (ReferenceNotConvergedError, ValueError):
+        # One quantity without a reference, such as stress at a corner, does not cost the others theirs.
+        assert isinstance(linear.statement, ShapeStatement)
+        references = shape_references(linear.statement)
+        why |= {name: one for name, one in references.items() if isinstance(one, str)}
+        known = {name: one.value for name, one in references.items() if not isinstance(one, str)}
+        errors = quantity_errors(found.values, known)
+    return {
+        name: errors[name] if np.isfinite(errors.get(name, np.nan)) else f"{NOT_COMPUTED}: {why[name]}"
+        for name in names
+    }
 
 
 def _stable_steps(

@@ -156,12 +156,14 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
 def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
     """Say aloud what a file says of its equilibrium only where somebody looks for it."""
     if displacements is None:
-        said = f"no equilibrium was found, so the file has none: {why}; give a smaller force"
+        smaller = "force" if net.header.get("beam") else "scale"
+        said = f"no equilibrium was found, so the file has none: {why}; give a smaller {smaller}"
     else:
         moved, extent = float(np.abs(displacements).max()), float(np.ptp(net.points, axis=0).max())
         if moved <= extent:
             return
-        said = f"the equilibrium is {moved:.3g} m away from rest, further than the beam is long ({extent:.3g} m)"
+        body = "the beam is long" if net.header.get("beam") else "the shape is wide or high"
+        said = f"the equilibrium is {moved:.3g} m away from rest, further than {body} ({extent:.3g} m)"
     warnings.warn(said, EquilibriumWarning, stacklevel=2)
 
 
@@ -218,20 +220,27 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
         )
     if net.masses is None:
         raise ValueError(
-            f"density: material '{net.header['material']['name']}' has none, and {program} moves masses; give a "
+            f"density: material '{_lacking(net)}' has none, and {program} moves masses; give a "
             "density such as '7850 kg/m^3'"
         )
     load = net.header.get("load")
     if load and load["follower"]:
+        instead = "take 'pressure'" if net.header.get("beam") else "give its pressures 'follower: false'"
         raise ValueError(
             f"load '{load['name']}': turns with the side that it acts on, and forces in a file for {program} do not; "
-            "take 'pressure'"
+            f"{instead}"
         )
     if load and load["kinematics"] == "linear":
         raise ValueError(
             f"kinematics: 'linear', and springs of {program} keep their length law; take 'nonlinear', which is the "
             "same under small loads"
         )
+
+
+def _lacking(net: Net) -> str:
+    """Name of a material without a density."""
+    first, others = net.header["material"], net.header.get("other_materials", {})
+    return next(str(one["name"]) for one in (first, *others.values()) if one.get("density") is None)
 
 
 def _network(net: Net, reference: float) -> Network:
@@ -274,6 +283,8 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
         f"Material '{material['name']}': {constants}density {material['density']:g} kg/m3; thickness "
         f"{header['thickness']:g} m.",
     ]
+    if header.get("other_materials"):
+        lines.append(f"Other parts are of {', '.join(map(repr, header['other_materials']))}.")
     if left_out:
         lines.append(f"{left_out} springs of no stiffness are left out.")
     if load:
@@ -281,7 +292,8 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     if isinstance(errors, dict):
         said = [f"{name} {100 * error:+.2g} %" for name, error in errors.items() if isinstance(error, float)]
         if said:
-            lines.append(f"Expected error of the displacement, small strain: {', '.join(said)}.")
+            what = "Expected error of the displacement" if header.get("beam") else "Expected errors"
+            lines.append(f"{what}, small strain: {', '.join(said)}.")
     lines.append(
         f"The largest stable step of explicit schemes is {simulation.largest_step:.4g} s at rest; {integrator}."
     )

@@ -315,7 +315,8 @@ def export(
     tree : xarray.DataTree
     path : str or Path
         Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh, ``.vtu`` one
-        scene of it for ParaView, and ``.pvd`` a collection of all that are chosen.
+        scene of it for ParaView, and ``.pvd`` a collection of all that are chosen; of shapes those of the group
+        `shape_fields`.
     group, variables, selection
         As of `table`; a Zarr store has the whole tree.
     force : bool, optional
@@ -342,8 +343,14 @@ def export(
     if ending == ".nc":
         return _mesh(tree, path, group, variables, selection or {})
     if ending in (".vtu", ".pvd"):
-        if group.strip("/") not in ("", "fields") or variables:
-            raise RequestError(f"{path}: ParaView gets the group 'fields'; leave --group and --variables out")
+        if group.strip("/") not in ("", "fields", NETWORKS_OF_SHAPES) or variables:
+            raise RequestError(
+                f"{path}: ParaView gets the group 'fields', or --group {NETWORKS_OF_SHAPES}; leave --group and "
+                "--variables out"
+            )
+        alone = not group.strip("/") and "fields" not in tree.children and NETWORKS_OF_SHAPES in tree.children
+        if alone or group.strip("/") == NETWORKS_OF_SHAPES:
+            return _shapes_for_paraview(tree, path, selection or {})
         return _paraview(tree, path, selection or {})
     if ending == ".zarr":
         if group.strip("/") or variables or selection:
@@ -393,7 +400,8 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
 
     if "fields" not in tree.children:
         raise ValueError(
-            "the dataset has no group '/fields'; add 'deformed' or 'paraview' to the outputs of the study, and run it"
+            "the dataset has no group '/fields'; add 'deformed' or 'paraview' to the outputs of the study, and run it "
+            "(networks of shapes: 'shapes')"
         )
     scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
     if not scenes:
@@ -516,6 +524,96 @@ class _SceneFiles:
         units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
         comment = json.dumps(said | {"units": units}, indent=1)
         write_vtu(path, vectors("{}"), cells, of_particles, of_springs, numbers, comment)
+
+
+# -- networks of shapes ------------------------------------------------------------------------------------------------
+
+NETWORKS_OF_SHAPES = "shape_fields"
+"""Group of the networks of shapes."""
+
+CASE_LABELS = {"shape": "shape_name", "load": "load_name"}
+"""What may be selected of the cases of networks of shapes, besides definitions, by their variables."""
+
+
+def _shapes_for_paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
+    """Write networks of shapes as files for ParaView."""
+    from ..handover.paraview import MOST_PIECES, series
+
+    fields = _group(tree, NETWORKS_OF_SHAPES).load()
+    scenes = _shape_scenes(fields, selection)
+    if not scenes:
+        raise ValueError(
+            f"the group '/{NETWORKS_OF_SHAPES}' has no solved network of such labels; give others to --select"
+        )
+    if path.suffix.lower() == ".vtu":
+        if len(scenes) > 1:
+            several = [name for name in (*CASE_LABELS, "definition") if len({one[name] for one in scenes}) > 1]
+            raise ValueError(
+                f"{path}: {len(scenes)} networks, and a .vtu file has one; --select one {', '.join(several)}, or give "
+                "a name ending in .pvd for all of them"
+            )
+        _write_shape(tree, fields, path, scenes[0])
+        return f"{path}: {', '.join(scenes[0].values())}"
+    if len(scenes) > MOST_PIECES:
+        raise ValueError(f"{path}: {len(scenes)} networks, and at most {MOST_PIECES} are written; --select some")
+    with series(path) as add:
+        for number, labels in enumerate(scenes):
+            add(float(number), partial(_write_shape, tree, fields, labels=labels), "_".join(labels.values()))
+    return f"{path}: {len(scenes)} networks of shapes, in the folder {path.with_suffix('')}"
+
+
+def _shape_scenes(fields: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
+    """Labels of the networks of shapes that are there and selected, in the order of the dataset."""
+    known = {name: fields[stored].values.astype(str).tolist() for name, stored in CASE_LABELS.items()}
+    known["definition"] = fields["definition"].values.astype(str).tolist()
+    for name, wanted in selection.items():
+        if name not in known:
+            raise RequestError(f"--select {name}: networks of shapes are told apart by {', '.join(known)}")
+        for label in wanted:
+            if label not in known[name]:
+                there = nearest(label, dict.fromkeys(known[name]))
+                raise RequestError(f"--select {name}={label}: no such label; {there}")
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull().transpose("case", "definition").values
+    found = [
+        {"shape": known["shape"][case], "load": known["load"][case], "definition": known["definition"][definition]}
+        for case, definition in np.argwhere(solved).tolist()
+    ]
+    return [one for one in found if all(one[name] in wanted for name, wanted in selection.items())]
+
+
+def _write_shape(tree: xr.DataTree, fields: xr.Dataset, path: Path, labels: Mapping[str, str]) -> None:
+    """Write a network of a shape: particles and their displacements, springs as lines, cells."""
+    from ..handover.paraview import write_vtu
+
+    chosen = np.logical_and.reduce([fields[stored].values == labels[name] for name, stored in CASE_LABELS.items()])
+    one = fields.isel(case=int(np.argmax(chosen))).sel(definition=labels["definition"])
+    there = np.isfinite(one.x.values)
+    points, moved = (
+        np.stack([one[name.format(axis)].values[there] for axis in "xy"], axis=1).astype(float)
+        for name in ("{}", "displacement_{}")
+    )
+    # What is none was -1, and is NaN as it is read.
+    springs, corners = (
+        one[name].fillna(-1).values.astype(np.int64) for name in (reading.SPRING_NODES, reading.CELL_NODES)
+    )
+    present = springs[:, 0] >= 0
+    cells = {2: springs[present]}
+    for count in (3, 4):
+        cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+    about = {name: str(one[f"{name}_name"].values) for name in ("material", "kinematics", "mesh_type")}
+    size = float(one.case_mesh_size)
+    numbers, scenes = {"mesh_size": size}, tree["shapes"].to_dataset()
+    here = scenes.sel({**labels, **about}).sel(mesh_size=size, method="nearest")
+    for quantity in here["quantity"].values.tolist():
+        for name in ("value", "reference_value", "error"):
+            number = float(here[name].sel(quantity=quantity)) if name in here else np.nan
+            if np.isfinite(number):
+                numbers[f"{name}_of_{quantity}"] = number
+    said = {name: tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels) | about
+    units = {"points": "m", "displacement": "m", "force": "N", "mesh_size": "m", "value": "SI", "error": "1"}
+    comment = json.dumps(said | {"units": units}, indent=1)
+    forces = {"force": {2: one.spring_force.values[present].astype(float)}}
+    write_vtu(path, points, cells, {"displacement": moved}, forces, numbers, comment)
 
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:

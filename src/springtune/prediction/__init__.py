@@ -12,12 +12,15 @@ from .choices import (
     SOLVED_FROM_FILE,
     Choice,
     Number,
+    QuantityReference,
     References,
+    ShapeReferences,
     check_beam,
     predict,
     references,
+    shape_references,
 )
-from .search import MeshChoice, MeshSearch, SolvedMesh, find_mesh
+from .search import MeshChoice, MeshSearch, SolvedMesh, find_mesh, find_shape_mesh
 
 __all__ = [
     "CASES",
@@ -28,11 +31,15 @@ __all__ = [
     "MeshChoice",
     "MeshSearch",
     "Number",
+    "QuantityReference",
     "References",
+    "ShapeReferences",
     "SolvedMesh",
     "check_beam",
     "extrapolate",
     "find_mesh",
+    "find_shape_mesh",
     "predict",
     "references",
+    "shape_references",
 ]

@@ -4,9 +4,10 @@ Every definition worth a choice is solved on the mesh itself under some loads an
 of small strain; a patch test between rollers measures Young's modulus and Poisson's ratio of the network.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from math import inf, nan
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -64,6 +65,25 @@ Number = float | tuple[float, float]
 
 References = dict[str, ReferenceSolution | str]
 """References of 1 N by load, or why there is none."""
+
+
+class QuantityReference(NamedTuple):
+    """What a quantity of interest of a shape is.
+
+    Attributes
+    ----------
+    value : float
+        In SI units.
+    error_estimate : float
+        Relative [1].
+    """
+
+    value: float
+    error_estimate: float
+
+
+ShapeReferences = dict[str, QuantityReference | str]
+"""References by quantity of interest, or why there is none."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +237,7 @@ def predict(
     beam: Beam | Shape,
     mesh: Mesh | GroupedMesh,
     material: AnyMaterial | Mapping[str, AnyMaterial],
-    known: References | None = None,
+    known: References | ShapeReferences | None = None,
     *,
     loads: Iterable[str] = CASES,
     load: str | None = None,
@@ -232,7 +252,8 @@ def predict(
     material : Material, AnisotropicMaterial or mapping of str to those
         Of a shape of several parts by their names.
     known : dict, optional
-        What `springtune.prediction.references` gave for the beam, the material and the loads.
+        What `springtune.prediction.references` gave for the beam, the material and the loads; of a shape what
+        `springtune.prediction.shape_references` gave.
     loads : iterable of str, optional
         Loads of a beam that count: of traction, compression, bending, shear and pressure.
     load : str, optional
@@ -249,8 +270,6 @@ def predict(
     ------
     ValueError
         If an argument is none, the mesh does not fill the beam, or a load cannot be predicted.
-    ReferenceNotConvergedError
-        If the load of a shape has no reference.
     DefinitionError
         If none of them can live on the mesh.
 
@@ -288,9 +307,7 @@ def predict(
     patch-area -2.3 %
     """
     if isinstance(beam, Shape):
-        if known is not None:
-            raise ValueError("known: is of beams alone; leave it out for a shape")
-        return _on_shape(beam, mesh, material, load)
+        return _on_shape(beam, mesh, material, cast("ShapeReferences | None", known), load)
     if load is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
@@ -304,7 +321,7 @@ def predict(
         raise ValueError(
             f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
         )
-    known = references(beam, material, loads) if known is None else known
+    known = references(beam, material, loads) if known is None else cast(References, known)
     tried = TriedMesh(mesh, beam, material, {load: known[load] for load in loads})
     choices = [tried.choice(name) for name in tried.names]
     choices += [tried.failed(name) for name in tried.failures]
@@ -314,56 +331,168 @@ def predict(
 
 
 def _on_shape(
-    shape: Shape, mesh: Mesh | GroupedMesh, material: AnyMaterial | Mapping[str, AnyMaterial], load: str | None
+    shape: Shape,
+    mesh: Mesh | GroupedMesh,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    known: ShapeReferences | None,
+    load: str | None,
 ) -> list[Choice]:
     """As `predict`, of a shape."""
-    if load is None:
-        if len(shape.loads) != 1:
-            raise ValueError(
-                f"load: none, and {shape.name!r} has {len(shape.loads)}; give one of them, such as load='pull'; "
-                f"known: {', '.join(shape.loads) or 'none'}"
-            )
-        (load,) = shape.loads
-    statement = ShapeStatement(shape, mesh, material, load, 1.0, "linear")
-    sheet, names = Sheet(statement.mesh, shape.thickness, networks=1), [one.name for one in statement.case.quantities]
-    reference = statement.reference(sheet)
-    small = set(reference.negligible) if set(names) - set(reference.negligible) else set()
-    known = {name: value for name, value in reference.values.items() if name not in small}
-    single = statement.materials[0] if len(statement.materials) == 1 else None
-    choices, first = [], set()
-    tried: tuple[str, ...] = ON_QUADS if len(statement.mesh.quads) else ON_TRIANGLES
-    if not all(one.isotropic for one in statement.materials):
-        tried = ANISOTROPIC[4 if len(statement.mesh.quads) else 3]
-    for name in tried:
-        failures: dict[str, str] = {}
-        errors: dict[str, Number] = dict.fromkeys(names, nan)
-        parts: tuple[float, float, str] = (nan, nan, "")
-        try:
-            springs = statement.springs(sheet, DEFINITIONS[name], None)[0]
-        except DefinitionError as error:
-            failures["springs"] = str(error)
-        except SingularError as error:
-            failures["patch test"] = f"unstable: {error}"
-        else:
-            # Some are the same network: at nu = 1/3 no energy is left.
-            label = f"{springs.reference:.9g}", *key_of(springs)
-            if label in first:
-                continue
-            first.add(label)
-            parts = in_words(sheet, single, name, springs)
-            try:
-                found = statement.solve(sheet, springs)
-            except SingularError as error:
-                failures[load] = f"unstable: {error}"
-            else:
-                if found.status is Status.SOLVED:
-                    errors |= quantity_errors(statement.values(sheet, springs, found), known)
-                else:
-                    failures[load] = found.message
-        choices.append(Choice(name, *parts, name in NEED_ENERGIES, errors, nan, nan, failures))
-    if all("springs" in choice.failures for choice in choices):
-        raise DefinitionError("; ".join(f"{choice.definition}: {choice.failures['springs']}" for choice in choices))
+    statement = ShapeStatement(shape, mesh, material, only_load(shape, load), 1.0, "linear")
+    tried = TriedShape(statement, shape_references(statement) if known is None else known)
+    choices = [tried.choice(name) for name in tried.names]
+    choices += [tried.failed(name) for name in tried.failures]
+    if not tried.names and all("springs" in found for found in tried.failures.values()):
+        raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
     return sorted(choices, key=lambda choice: choice.worst)
+
+
+def only_load(shape: Shape, load: str | None) -> str:
+    """Load case of a shape, its only one where none is named.
+
+    Parameters
+    ----------
+    shape : Shape
+    load : str or None
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        If none is named of several.
+    """
+    if load is not None:
+        return load
+    if len(shape.loads) != 1:
+        raise ValueError(
+            f"load: none, and {shape.name!r} has {len(shape.loads)}; give one of them, such as load='pull'; "
+            f"known: {', '.join(shape.loads) or 'none'}"
+        )
+    return next(iter(shape.loads))
+
+
+def shape_references(statement: ShapeStatement) -> ShapeReferences:
+    """References of the quantities of interest of a shape under a load case.
+
+    One that has none, such as the stress at a corner, does not cost the others theirs.
+
+    Parameters
+    ----------
+    statement : ShapeStatement
+
+    Returns
+    -------
+    dict of str to QuantityReference or str
+        By quantity; where there is none the reason.
+    """
+    from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
+
+    case, found, small = statement.case, ShapeReferences(), set[str]()
+    as_read = statement.grouped if statement.shape.file else None
+    together = [case.quantities]
+    while together:
+        asked = together.pop(0)
+        try:
+            solved = solve_shape(statement.shape, replace(case, quantities=asked), statement.by_part, as_read)
+        except (ReferenceNotConvergedError, ValueError) as error:
+            if len(asked) > 1:
+                together += [(one,) for one in asked]
+            else:
+                found[asked[0].name] = str(error)
+        else:
+            small.update(solved.negligible)
+            found |= {
+                one.name: QuantityReference(float(solved.values[one.name]), float(solved.error_estimates[one.name]))
+                for one in asked
+            }
+    if len(small) < len(case.quantities):
+        found |= dict.fromkeys(small, "next to nothing beside what is largest of its kind; an error would say nothing")
+    return {one.name: found[one.name] for one in case.quantities}
+
+
+class TriedShape:
+    """A mesh of a shape on which definitions are solved under a load case; the same springs once.
+
+    Parameters
+    ----------
+    statement : ShapeStatement
+        Of linear kinematics.
+    known : dict
+        What `shape_references` gave.
+
+    Attributes
+    ----------
+    names, same, failures
+        As of `TriedMesh`.
+    """
+
+    def __init__(self, statement: ShapeStatement, known: ShapeReferences) -> None:
+        self.statement, self.known = statement, known
+        self._sheet = Sheet(statement.mesh, statement.thickness, networks=1)
+        self._values: dict[str, dict[str, float] | str] = {}
+        self._springs, self.same, self.failures = _distinct(
+            statement.mesh,
+            lambda name: statement.springs(self._sheet, DEFINITIONS[name], None)[0],
+            all(one.isotropic for one in statement.materials),
+        )
+        self.names = list(self._springs)
+
+    def springs(self, name: str) -> Springs:
+        """As of `TriedMesh`."""
+        return self._springs[name]
+
+    def error(self, name: str, quantity: str) -> float | str:
+        """Error of a definition in a quantity [1]; NaN where that has no reference, why the network has no values.
+
+        Parameters
+        ----------
+        name : str
+            Of `names`.
+        quantity : str
+
+        Returns
+        -------
+        float or str
+        """
+        if name not in self._values:
+            self._values[name] = self._solved(self._springs[name])
+        values, known = self._values[name], self.known[quantity]
+        if isinstance(values, str):
+            return values
+        if isinstance(known, str):
+            return nan
+        return quantity_errors({quantity: values[quantity]}, {quantity: known.value})[quantity]
+
+    def _solved(self, springs: Springs) -> dict[str, float] | str:
+        try:
+            found = self.statement.solve(self._sheet, springs)
+        except SingularError as error:
+            return f"unstable: {error}"
+        if found.status is not Status.SOLVED:
+            return found.message
+        return self.statement.values(self._sheet, springs, found)
+
+    def choice(self, name: str) -> Choice:
+        """As of `TriedMesh`, of one load case."""
+        springs, materials = self._springs[name], self.statement.materials
+        found = {quantity: self.error(name, quantity) for quantity in self.known}
+        why = next((error for error in found.values() if isinstance(error, str)), "")
+        return Choice(
+            name,
+            *in_words(self._sheet, materials[0] if len(materials) == 1 else None, name, springs),
+            bool(springs.energies),
+            errors={quantity: nan if isinstance(error, str) else error for quantity, error in found.items()},
+            young_modulus_error=nan,
+            poisson_ratio=nan,
+            failures={self.statement.load: why} if why else {},
+        )
+
+    def failed(self, name: str) -> Choice:
+        """As of `TriedMesh`."""
+        return _failed(name, self.known, self.failures[name])
 
 
 def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
@@ -439,23 +568,7 @@ class TriedMesh:
         self._test = PatchTest(mesh)
         self._displacements: dict[tuple[LoadKind, tuple[bytes, ...]], float | str] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
-        self._springs: dict[str, Springs] = {}
-        self.failures: dict[str, dict[str, str]] = {}
-        self.same: dict[str, str] = {}
-        first: dict[tuple[object, ...], str] = {}  # of each springs
-        for name in ON_QUADS if len(mesh.quads) else ON_TRIANGLES:
-            try:
-                springs = self._sheet.derive(name, material)[0]
-            except DefinitionError as error:
-                self.failures[name] = {"springs": str(error)}
-            except SingularError as error:
-                self.failures[name] = {"patch test": f"unstable: {error}"}
-            else:
-                # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
-                label = f"{springs.reference:.9g}", *key_of(springs)
-                self.same[name] = first.setdefault(label, name)
-                if self.same[name] == name:
-                    self._springs[name] = springs
+        self._springs, self.same, self.failures = _distinct(mesh, lambda name: self._sheet.derive(name, material)[0])
         self.names = list(self._springs)
 
     def springs(self, name: str) -> Springs:
@@ -540,8 +653,38 @@ class TriedMesh:
         -------
         Choice
         """
-        errors: dict[str, Number] = dict.fromkeys(self.known, nan)
-        return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
+        return _failed(name, self.known, self.failures[name])
+
+
+def _distinct(
+    mesh: Mesh, derive: Callable[[str], Springs], isotropic: bool = True
+) -> tuple[dict[str, Springs], dict[str, str], dict[str, dict[str, str]]]:
+    """Springs of the definitions that are tried on a mesh, each once; by definition whose they are; and failures."""
+    found: dict[str, Springs] = {}
+    same: dict[str, str] = {}
+    failures: dict[str, dict[str, str]] = {}
+    first: dict[tuple[object, ...], str] = {}  # of each springs
+    quads = len(mesh.quads) > 0
+    usual: tuple[str, ...] = ON_QUADS if quads else ON_TRIANGLES
+    for name in usual if isotropic else ANISOTROPIC[4 if quads else 3]:
+        try:
+            springs = derive(name)
+        except DefinitionError as error:
+            failures[name] = {"springs": str(error)}
+        except SingularError as error:
+            failures[name] = {"patch test": f"unstable: {error}"}
+        else:
+            # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
+            label = f"{springs.reference:.9g}", *key_of(springs)
+            same[name] = first.setdefault(label, name)
+            if same[name] == name:
+                found[name] = springs
+    return found, same, failures
+
+
+def _failed(name: str, known: Iterable[str], failures: dict[str, str]) -> Choice:
+    errors: dict[str, Number] = dict.fromkeys(known, nan)
+    return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, failures)
 
 
 def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:

@@ -9,20 +9,26 @@ much as it did over the last doubling of the cells, so that it is not just passi
 
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count, takewhile
+from typing import Any
+
+import numpy as np
 
 from ..mechanics.dynamics import masses
-from ..mesh import MESH_TYPES, Mesh
+from ..mesh import MESH_TYPES, Mesh, mesh_shape
+from ..mesh.groups import GroupedMesh
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
-from ..scene.meshes import A_MATERIAL, check_filled, is_a
+from ..problem.shapes import Shape
+from ..scene.meshes import A_MATERIAL, A_SHAPE, check_filled, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet
+from ..scene.statements import ShapeStatement
 from ..springs import Springs
 from ..units import parse
 from .bands import FEWEST_CELLS
@@ -34,10 +40,14 @@ from .choices import (
     SOLVED,
     Choice,
     References,
+    ShapeReferences,
     TriedMesh,
+    TriedShape,
     check_beam,
     check_loads,
+    only_load,
     references,
+    shape_references,
 )
 
 ENOUGH_FINER, FEWEST_FINER = 2.0, 2
@@ -179,7 +189,7 @@ class MeshSearch:
     most : int
         Particles of the largest mesh that may be tried.
     known : dict
-        Reference of 1 N by load.
+        Reference of 1 N by load; of a shape that of each quantity of interest, and `loads` are those quantities.
     by_type : dict of str to MeshChoice or None
         By mesh type the coarsest mesh, with whatever definition keeps the error; None where none does up to `most`
         particles. Where too few finer ones are as small, one that is not `MeshChoice.confirmed`.
@@ -204,7 +214,7 @@ class MeshSearch:
     error: float
     loads: tuple[str, ...]
     most: int
-    known: References = field(repr=False)
+    known: References | ShapeReferences = field(repr=False)
     by_type: dict[str, MeshChoice | None]
     springs_by_type: dict[str, MeshChoice | None]
     tried: tuple[SolvedMesh, ...] = field(repr=False)
@@ -262,26 +272,31 @@ def asked_error(value: float | str) -> float:
 
 
 def find_mesh(
-    beam: Beam,
-    material: Material,
+    beam: Beam | Shape,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
     error: float | str,
     *,
     loads: Iterable[str] = CASES,
     mesh_types: Sequence[str] | None = None,
+    load: str | None = None,
     most: int = SOLVED,
 ) -> MeshSearch:
     """Coarsest mesh of each type on which a definition keeps an error, found by solving.
 
     Parameters
     ----------
-    beam : Beam
-    material : Material
+    beam : Beam or Shape
+        A shape has an outline; what is to be kept is the error of all quantities of interest of a load case.
+    material : Material, AnisotropicMaterial or mapping of str to those
+        Of a shape of several parts by their names.
     error : float or str
         Largest size of an error to keep, a fraction or a text such as ``"1 %"``.
     loads : iterable of str, optional
-        Loads under which it is to be kept: of traction, compression, bending, shear and pressure.
+        Loads of a beam under which it is to be kept: of traction, compression, bending, shear and pressure.
     mesh_types : sequence of str, optional
-        Keys of `springtune.MESH_TYPES`; all without.
+        Keys of `springtune.MESH_TYPES`, for a beam; all without. Meshes of shapes are free ones.
+    load : str, optional
+        Load case of a shape; its only one without.
     most : int, optional
         Particles of the largest mesh that may be tried.
 
@@ -318,8 +333,15 @@ def find_mesh(
     >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=500).best is None
     True
     """
+    if isinstance(beam, Shape):
+        if loads is not CASES or mesh_types is not None:
+            raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
+        return find_shape_mesh(beam, material, error, load=load, most=most)
+    if load is not None:
+        raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
     is_a(material, Material, "material", A_MATERIAL)
+    assert isinstance(material, Material)  # as type checkers are told
     wanted, loads = asked_error(error), check_loads(loads)
     names = tuple(MESH_TYPES) if mesh_types is None else _mesh_types(mesh_types)
     if not (isinstance(most, int) and most > 0):
@@ -330,9 +352,7 @@ def find_mesh(
         if isinstance(found, str):
             raise ValueError(f"loads: {load!r} has no reference, so no error can be kept: {found}")
         estimates[load] = found.error_estimate
-    if wanted <= max(estimates.values()):
-        least = f"{200 * max(estimates.values()):.1g} %"
-        raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")
+    _check_estimates(wanted, estimates, error)
     searches = [_TypeSearch(name, beam, material, known, estimates, wanted, most) for name in names]
     for search in searches:
         search.climb()
@@ -369,24 +389,36 @@ def _number(error: float | str) -> float:
     return math.nan if isinstance(error, str) else error
 
 
-class _TypeSearch:
+class _Search:
     """Meshes of one type, by the number of cells across; each solved once."""
 
     def __init__(
-        self,
-        name: str,
-        beam: Beam,
-        material: Material,
-        known: References,
-        estimates: dict[str, float],
-        error: float,
-        most: int,
+        self, name: str, known: Mapping[str, Any], estimates: dict[str, float], error: float, most: int
     ) -> None:
-        self.name, self.beam, self.material, self.known, self.error = name, beam, material, known, error
-        self._type, self._estimates, self._most = MESH_TYPES[name], estimates, most
+        self.name, self.known, self.error, self._estimates, self._most = name, known, error, estimates, most
         self._tried: dict[int, SolvedMesh] = {}  # by cells across
         self._found: dict[tuple[int, str], MeshChoice] = {}
         self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
+
+    def _exact(self, cells: int) -> tuple[float, float]:
+        """Mesh size of so many cells across, and the smaller side, which no mesh size exceeds [m]."""
+        raise NotImplementedError
+
+    def _particles(self, cells: int) -> float:
+        """Particles of such a mesh, about."""
+        raise NotImplementedError
+
+    def _mesh(self, size: float) -> Mesh:
+        """The mesh of a size."""
+        raise NotImplementedError
+
+    def _trial(self, mesh: Mesh) -> "TriedMesh | TriedShape":
+        """The definitions on it."""
+        raise NotImplementedError
+
+    def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
+        """Seconds of the longest static solve of some loads, and the largest stable explicit step [s]."""
+        raise NotImplementedError
 
     def climb(self) -> None:
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
@@ -402,16 +434,12 @@ class _TypeSearch:
             self._look_between(alone)
 
     def size(self, cells: int) -> float:
-        """Mesh size [m] of so many cells across the beam's smaller side, rounded up."""
-        length, height = self.beam.length, self.beam.height
-        side = min(length, height)
-        exact = 1e3 * (height / self._type.row_height if height <= length else length) / cells
+        """Mesh size [m] of so many cells across the smaller side, rounded up."""
+        exact, side = self._exact(cells)
+        exact *= 1e3
         digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
         # By its text, as the option of a command has it; what is a hair above a digit is that digit.
         return min(side, parse(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm", "length"))
-
-    def _particles(self, cells: int) -> float:
-        return self._type.particles(self.beam.length, self.beam.height, self.size(cells))
 
     def solved(self) -> list[SolvedMesh]:
         """All that was tried, from coarse to fine."""
@@ -427,8 +455,8 @@ class _TypeSearch:
         one = self._tried[cells]
         name = min(names, key=one.worst)
         if (cells, name) not in self._found:
-            mesh = self._type(self.beam.length, self.beam.height, one.size)
-            tried = TriedMesh(mesh, self.beam, self.material, self.known)
+            mesh = self._mesh(one.size)
+            tried = self._trial(mesh)
             same = tried.same[name]  # another name of the same springs
             self._found[cells, name] = MeshChoice(
                 self.name,
@@ -437,7 +465,7 @@ class _TypeSearch:
                 tried.choice(same),
                 one.particles,
                 one.springs,
-                *_cost(mesh, self.beam, self.material, tried.springs(same), list(self.known)),
+                *self._cost(mesh, tried.springs(same)),
                 tuple(self._tried[finer] for finer in self._on(name) if finer > cells),
                 sure is not None,
             )
@@ -448,12 +476,11 @@ class _TypeSearch:
         if self._particles(cells) > self._most:
             return False
         size = self.size(cells)
-        mesh = self._type(self.beam.length, self.beam.height, size)
-        check_filled(mesh, self.beam)
+        mesh = self._mesh(size)
         particles = len(mesh.points)
         if any((particles > one.particles) != (cells > other) for other, one in self._tried.items()):
             return True  # no mesh of its own between its neighbours
-        tried = TriedMesh(mesh, self.beam, self.material, self.known)
+        tried = self._trial(mesh)
         errors = {
             name: {load: _number(tried.error(same, load)) for load in self.known}
             for name, same in tried.same.items()
@@ -533,16 +560,179 @@ class _TypeSearch:
                     return
 
 
-def _cost(mesh: Mesh, beam: Beam, material: Material, springs: Springs, loads: list[str]) -> tuple[float, float]:
-    """Seconds of the longest static solve of some loads, and the largest stable explicit step [s]."""
-    seconds = 0.0
-    for kind in {LOADS[load].kind: None for load in loads}:
-        sheet = Sheet(mesh, beam.thickness)
+class _TypeSearch(_Search):
+    """Meshes of a beam, of one type."""
+
+    def __init__(
+        self,
+        name: str,
+        beam: Beam,
+        material: Material,
+        known: References,
+        estimates: dict[str, float],
+        error: float,
+        most: int,
+    ) -> None:
+        self.beam, self.material, self._type, self._references = beam, material, MESH_TYPES[name], known
+        super().__init__(name, known, estimates, error, most)
+
+    def _exact(self, cells: int) -> tuple[float, float]:
+        length, height = self.beam.length, self.beam.height
+        return (height / self._type.row_height if height <= length else length) / cells, min(length, height)
+
+    def _particles(self, cells: int) -> float:
+        return self._type.particles(self.beam.length, self.beam.height, self.size(cells))
+
+    def _mesh(self, size: float) -> Mesh:
+        mesh = self._type(self.beam.length, self.beam.height, size)
+        check_filled(mesh, self.beam)
+        return mesh
+
+    def _trial(self, mesh: Mesh) -> TriedMesh:
+        return TriedMesh(mesh, self.beam, self.material, self._references)
+
+    def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
+        seconds, thickness, density = 0.0, self.beam.thickness, self.material.density
+        for kind in {LOADS[load].kind: None for load in self.known}:
+            sheet = Sheet(mesh, thickness)
+            begin = time.perf_counter()
+            sheet.solve(kind, springs, springs.reference, "linear")
+            seconds = max(seconds, time.perf_counter() - begin)
+        if density is None:
+            return seconds, math.nan
+        return seconds, _step(Sheet(mesh, thickness), springs, masses(mesh, density, thickness))
+
+
+def _step(sheet: Sheet, springs: Springs, inertia: np.ndarray) -> float:
+    """Largest stable explicit step [s]; NaN where its eigenvalue is not found."""
+    steps = stable_steps(sheet, springs, inertia, ["central-difference"])
+    return math.nan if isinstance(steps, str) else float(steps["central-difference"])
+
+
+class _ShapeSearch(_Search):
+    """Meshes of a shape under a load case."""
+
+    def __init__(
+        self,
+        shape: Shape,
+        materials: AnyMaterial | Mapping[str, AnyMaterial],
+        load: str,
+        make: Callable[[float], GroupedMesh],
+        error: float | str,
+        most: int,
+    ) -> None:
+        self.shape, self.materials, self.load, self._make = shape, materials, load, make
+        (left, low), (right, top) = shape.extent
+        self._side = min(right - left, top - low)
+        self._statements: dict[int, ShapeStatement] = {}
+        self._references = shape_references(self._statement(make(self._side / 4)))
+        estimates = {}
+        for name, one in self._references.items():
+            if isinstance(one, str) or not one.value:
+                why = one if isinstance(one, str) else "it is zero"
+                raise ValueError(f"load {load!r}: {name!r} has no reference, so no error of it can be kept: {why}; "
+                                 "take it out of the quantities")  # fmt: skip
+            estimates[name] = one.error_estimate
+        _check_estimates(asked_error(error), estimates, error)
+        super().__init__("free", self._references, estimates, asked_error(error), most)
+
+    def _statement(self, grouped: GroupedMesh) -> ShapeStatement:
+        found = ShapeStatement(self.shape, grouped, self.materials, self.load, 1.0, "linear")
+        self._statements = {id(grouped.mesh): found}
+        return found
+
+    def _exact(self, cells: int) -> tuple[float, float]:
+        return self._side / cells, self._side
+
+    def _particles(self, cells: int) -> float:
+        return self.shape.area / (ROW_HEIGHT * self.size(cells) ** 2)
+
+    def _mesh(self, size: float) -> Mesh:
+        return self._statement(self._make(size)).mesh
+
+    def _trial(self, mesh: Mesh) -> TriedShape:
+        return TriedShape(self._statements[id(mesh)], self._references)
+
+    def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
+        statement = self._statements[id(mesh)]
         begin = time.perf_counter()
-        sheet.solve(kind, springs, springs.reference, "linear")
-        seconds = max(seconds, time.perf_counter() - begin)
-    if material.density is None:
-        return seconds, math.nan
-    inertia = masses(mesh, material.density, beam.thickness)
-    steps = stable_steps(Sheet(mesh, beam.thickness), springs, inertia, ["central-difference"])
-    return seconds, math.nan if isinstance(steps, str) else steps["central-difference"]
+        statement.solve(Sheet(mesh, statement.thickness), springs)
+        seconds, inertia = time.perf_counter() - begin, statement.masses()
+        if inertia is None:
+            return seconds, math.nan
+        return seconds, _step(Sheet(mesh, statement.thickness), springs, inertia)
+
+
+ROW_HEIGHT = math.sqrt(3) / 2
+"""Height of an equilateral triangle, over its side."""
+
+
+def find_shape_mesh(
+    shape: Shape,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    error: float | str,
+    *,
+    load: str | None = None,
+    make: Callable[[float], GroupedMesh] | None = None,
+    most: int = SOLVED,
+) -> MeshSearch:
+    """Coarsest mesh of a shape on which a definition keeps an error of all quantities of a load case, as `find_mesh`.
+
+    Parameters
+    ----------
+    shape : Shape
+        With an outline.
+    material : Material, AnisotropicMaterial or mapping of str to those
+    error : float or str
+        Largest size of an error to keep, a fraction or a text such as ``"1 %"``.
+    load : str, optional
+        Of the shape; its only one without.
+    make : callable, optional
+        From a mesh size [m] to a mesh; `springtune.mesh_shape` of the shape without.
+    most : int, optional
+        Particles of the largest mesh that may be tried, about.
+
+    Returns
+    -------
+    MeshSearch
+        Its ``loads`` are the quantities of interest, and its one mesh type is ``"free"``.
+
+    Raises
+    ------
+    ValueError
+        If an argument is none or unknown, the shape is that of a file, a quantity has no reference, or the error is
+        below what the reference's own error estimate allows.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> study = st.load_study("config/shapes.yaml")
+    >>> best = st.find_mesh(study.shape("cook"), study.material("third"), "2 %", load="shear").best
+    >>> best.confirmed, best.choice.worst <= 0.02
+    (True, True)
+    """
+    is_a(shape, Shape, "shape", A_SHAPE)
+    if shape.file:
+        raise ValueError(
+            f"shape {shape.name!r}: has the mesh of its file, so there is none to be found; give an outline, or files "
+            "of finer meshes"
+        )
+    wanted, load = asked_error(error), only_load(shape, load)
+    search = _ShapeSearch(shape, material, load, make or partial(mesh_shape, shape), error, most)
+    search.climb()
+    return MeshSearch(
+        wanted,
+        tuple(search.known),
+        most,
+        dict(search.known),
+        {search.name: search.found(springs_alone=False)},
+        {search.name: search.found(springs_alone=True)},
+        tuple(search.solved()),
+    )
+
+
+def _check_estimates(wanted: float, estimates: Mapping[str, float], error: float | str) -> None:
+    """Refuse an error that references cannot tell."""
+    if wanted <= max(estimates.values()):
+        least = f"{200 * max(estimates.values()):.1g} %"
+        raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")

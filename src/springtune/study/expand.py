@@ -318,7 +318,8 @@ def build(
     check_numbers(used, problems)
     check_cells(config, used, bool(curves), problems)
     problems.stop()
-    parts = {kind.name: kind.expand(config, declared(config, problems.folder)) for kind in kinds}
+    bodies = declared(config, problems.folder)
+    parts = {kind.name: kind.expand(config, bodies) for kind in kinds}
     if config.printed and names:
         problems.add(
             ("printed",),
@@ -338,6 +339,7 @@ def build(
         references=references,
         outputs=tuple(name for name in made if name in config.outputs),
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
+        materials=bodies.materials,
         parts=parts,
         limits={"seconds": config.limits.seconds, "memory": config.limits.memory},
         grids=grids,

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ..problem.geometry import Beam
-from ..problem.materials import Material
+from ..problem.materials import AnyMaterial, Material
+from ..problem.quantities import nearest
+from ..problem.shapes import Shape
 from .messages import Problems
 
 FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
@@ -202,6 +204,8 @@ class Study:
         What is made from the dataset.
     further_references : tuple of str
         Of `FURTHER_REFERENCES`.
+    materials : dict of str to Material or AnisotropicMaterial
+        All that the study declares, by name.
     parts : dict
         What further study kinds ask for, by their names; nothing where the study does not have them.
     limits : dict
@@ -234,6 +238,7 @@ class Study:
     mesh_files: MeshFiles
     outputs: tuple[str, ...]
     further_references: tuple[str, ...]
+    materials: dict[str, AnyMaterial]
     parts: dict[str, Any]
     limits: dict[str, float]
     grids: tuple[Grid, ...]
@@ -244,6 +249,66 @@ class Study:
     printed_path: Path | None
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()
+
+    def material(self, name: str) -> AnyMaterial:
+        """A material that the study declares.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        Material or AnisotropicMaterial
+
+        Raises
+        ------
+        ValueError
+            If there is none of that name.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.load_study("config/shapes.yaml").material("steel").young_modulus
+        210000000000.0
+        """
+        if name not in self.materials:
+            raise ValueError(f"material: '{name}' is unknown; {nearest(name, self.materials)}")
+        return self.materials[name]
+
+    def shape(self, name: str) -> Shape:
+        """A shape that the study declares, with its loads.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        Shape
+
+        Raises
+        ------
+        ValueError
+            If there is none of that name.
+
+        Examples
+        --------
+        From a study to the error of each definition:
+
+        >>> import springtune as st
+        >>> study = st.load_study("config/shapes.yaml")
+        >>> cook = study.shape("cook")
+        >>> choices = st.predict(cook, st.mesh_shape(cook, "4 mm"), study.material("third"), load="shear")
+        >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
+        patch: -0.4 %
+        """
+        known = {name: one for part in self.parts.values() for name, one in getattr(part, "declared", {}).items()}
+        if name not in known:
+            there = nearest(name, known) if known else "the study has none; add it under 'shapes'"
+            raise ValueError(f"shape: '{name}' is unknown; {there}")
+        found: Shape = known[name]
+        return found
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
         """Cell of the dataset that is of a scene, a curve or a reference.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
@@ -21,6 +21,9 @@ from .names import OUTLINED, OWN_FILE, OWN_SIZE
 from .outputs import OUTPUTS, stems
 from .plan import STAGES
 from .sections import ShapeConfig, ShapeGridConfig
+
+if TYPE_CHECKING:
+    from ...mesh import GroupedMesh
 
 MOST_SHAPE_SCENES = 100_000
 """Most scenes of shapes of a study."""
@@ -66,6 +69,8 @@ class Shapes:
 
     Attributes
     ----------
+    declared : dict of str to Shape
+        All of the study, by name.
     shapes : tuple of Shape
         Those that have scenes.
     materials : tuple of Material
@@ -80,6 +85,7 @@ class Shapes:
         Mesh size over that of the rest, by shape and group, point or part [1].
     """
 
+    declared: dict[str, Shape]
     shapes: tuple[Shape, ...]
     materials: tuple[Material, ...]
     parts: dict[str, dict[str, str]]
@@ -96,6 +102,36 @@ class Shapes:
     def material(self) -> dict[str, Material]:
         """Materials by name."""
         return {one.name: one for one in self.materials}
+
+    def mesh(self, name: str, size: float | None = None) -> "GroupedMesh":
+        """Mesh of a shape, finer where the study says so; of one from a file that of the file.
+
+        Parameters
+        ----------
+        name : str
+            Of a shape that is declared.
+        size : float, optional
+            Length of an edge [m]; none where the mesh is that of a file.
+
+        Returns
+        -------
+        GroupedMesh
+
+        Raises
+        ------
+        ValueError
+            If the shape cannot be meshed so.
+        MeshError
+            If the file cannot be read.
+        """
+        from ...mesh import mesh_shape, read_shape  # here, since studies are read without scipy
+
+        shape = self.declared[name]
+        if shape.file:
+            return read_shape(shape.file, shape.unit)
+        assert size is not None
+        refined = {where: share * size for where, share in self.refined[name].items()}
+        return mesh_shape(shape, size, refined=refined)
 
     def materials_of(self, shape: str, material: str) -> dict[str, Material]:
         """Material of each part of a shape, that of the main part under ``""``."""
@@ -381,15 +417,17 @@ def _expand(config, declared):
 
     scenes = sorted(found, key=order)
     names = dict.fromkeys(one.shape for one in scenes)
-    parts = {name: dict(config.shapes[name].parts) for name in names}
-    used = {one.material for one in scenes} | {name for own in parts.values() for name in own.values()}
+    parts = {name: dict(one.parts) for name, one in config.shapes.items()}
+    used = {one.material for one in scenes} | {other for name in names for other in parts[name].values()}
+    all_shapes = {name: _shape(name, one, declared.folder) for name, one in config.shapes.items()}
     return Shapes(
-        tuple(_shape(name, config.shapes[name], declared.folder) for name in names),
+        all_shapes,
+        tuple(all_shapes[name] for name in names),
         tuple(material for name, material in declared.materials.items() if name in used),
         parts,
         tuple(scenes),
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
-        {name: dict(config.shapes[name].refined) for name in names},
+        {name: dict(one.refined) for name, one in config.shapes.items()},
     )
 
 

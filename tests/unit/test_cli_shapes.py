@@ -1,0 +1,306 @@
+"""Shapes of a study on the command line: predictions, springs, and what is refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.cli import main
+from springtune.mesh import write_mesh
+
+SHAPES = Path(__file__).parents[2] / "config/shapes.yaml"
+
+STUDY = """
+title: Shapes for the command line
+materials:
+  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}
+  third: {young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}
+shapes:
+  plate:
+    outline:
+      - {from: [0, 0], group: lower}
+      - {from: [40 mm, 0], group: right}
+      - {from: [40 mm, 20 mm], group: upper}
+      - {from: [0, 20 mm], group: left}
+    holes: [{circle: {centre: [20 mm, 10 mm], radius: 4 mm}, group: hole}]
+    refined: {hole: 0.5}
+    loads:
+      pull:
+        supports: {left: fixed}
+        forces: {right: [10 N, 0]}
+        quantities: {end: {displacement: x, of: right}, corner: {displacement: x, at: corner}}
+      push:
+        supports: {left: fixed}
+        pressures: {hole: {pressure: 1 MPa, follower: true}}
+        quantities: {end: {displacement: x, of: right}}
+      move:
+        supports: {left: fixed, right: {x: 0.1 mm}}
+        quantities: {force: {reaction: x, of: right}}
+    points: {corner: [0, 0]}
+  own:
+    file: own.msh
+    loads:
+      pull:
+        supports: {left: fixed}
+        forces: {right: [10 N, 0]}
+        quantities: {end: {displacement: x, of: right}}
+  other: {outline: [{from: [0, 0]}, {from: [1 mm, 0]}, {from: [1 mm, 1 mm]}], loads: {none: {supports: {a: fixed},
+    gravity: [1 m/s^2, 0], quantities: {work: energy}}}, points: {a: [0, 0], b: [1 mm, 0]}}
+shape_grids:
+  one: {shape: plate, mesh_size: 4 mm, material: steel, load: pull, definition: lattice}
+  two: {shape: own, material: [steel, third], definition: lattice}
+"""
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a study, and the mesh file that it names."""
+    folder = tmp_path_factory.mktemp("study")
+    plate = st.Shape.rectangle("40 mm", "20 mm", holes=[st.Hole.circle(("20 mm", "10 mm"), "4 mm")])
+    write_mesh(folder / "own.msh", st.mesh_shape(plate, "4 mm"))
+    (folder / "study.yaml").write_text(STUDY.replace("{supports: {a: fixed}", "{supports: {a: fixed, b: {y: 0}}"))
+    return folder
+
+
+@pytest.fixture
+def here(folder, monkeypatch):
+    """The folder, as the current one."""
+    monkeypatch.chdir(folder)
+    return folder
+
+
+PLATE = ("--shape", "study.yaml:plate", "--load", "pull", "--size", "4 mm")
+OWN = ("--shape", "study.yaml:own", "--material", "steel")
+
+
+def test_a_study_gives_its_shapes_and_materials_by_name(here):
+    study = st.load_study("study.yaml")
+    assert study.shape("other").area == pytest.approx(0.5e-6)  # no grid has it
+    assert study.material("steel").density == 7850
+    with pytest.raises(ValueError, match=r"shape: 'plat' is unknown; did you mean 'plate'\? known: plate, own, other"):
+        study.shape("plat")
+    with pytest.raises(ValueError, match=r"material: 'stel' is unknown; did you mean 'steel'\?"):
+        study.material("stel")
+    with pytest.raises(ValueError, match="shape: 'plate' is unknown; the study has none"):
+        st.load_study(SHAPES.with_name("paper.yaml")).shape("plate")
+
+
+class TestPredict:
+    def test_a_prediction_is_that_of_the_library(self, here):
+        """With the study's refinement, and a quantity without a reference beside one that has one."""
+        found = json.loads(run("predict", *PLATE, "--json").stdout)
+        plate = st.load_study("study.yaml").shape("plate")
+        grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "2 mm"})
+        steel = st.load_study("study.yaml").material("steel")
+        choices = st.predict(plate, grouped, steel, load="pull")
+        assert [one["definition"] for one in found["choices"]] == [one.definition for one in choices]
+        assert [one["errors"]["end"] for one in found["choices"]] == [one.errors["end"] for one in choices]
+        assert found["recommended"] == choices[0].definition and choices[0].worst < 0.05
+        assert found["mesh"] == {
+            "type": "free", "file": None, "size": 0.004, "particles": len(grouped.mesh.points),
+            "springs": len(grouped.mesh.edges),
+        }  # fmt: skip
+        assert found["references"]["end"]["error_estimate"] < 1e-4
+        # Held there: the reference is zero, so there is no error of it, which costs the other one nothing.
+        assert all(one["errors"]["corner"] is None for one in found["choices"])
+
+    def test_the_text_has_a_row_a_definition_and_the_references(self, here):
+        said = run("predict", *PLATE, "--springs-alone").stdout
+        assert said.startswith("plate, load pull, free 4 mm: ") and "steel, t = 1 mm" in said
+        lines = [line.split()[0] for line in said.splitlines() if line.strip()]
+        assert {"patch", "lattice", "van-gelder"} <= set(lines) and "delingette" not in lines
+        assert "end" in lines and "error estimate" in said
+
+    def test_a_shape_of_a_file_has_the_mesh_of_it(self, here, tmp_path):
+        result = run("predict", *OWN, "--write", tmp_path / "net.json", "--springs-alone")
+        assert result.exit_code == 0 and result.stdout.startswith("own, load pull, own.msh: ")
+        net = st.SpringNet.read(tmp_path / "net.json")
+        assert len(net.points) == len(st.read_shape("own.msh").mesh.points)
+        assert net.forces.sum(axis=0) == pytest.approx([10, 0]) and net.header["shape"] == "own"
+
+    def test_quantities_without_a_reference_say_why(self):
+        """Stress at a re-entrant corner has no bound."""
+        corner = st.Quantity("peak", "stress", "corner", "yy")
+        end = st.Quantity("end", "displacement", "foot", "y")
+        load = st.LoadCase("pull", [st.Support("top", 0, 0)], [st.Traction("foot", (0, 1.0))], quantities=[end, corner])
+        places = [(0, 0), (0.02, 0), (0.02, 0.01), (0.01, 0.01), (0.01, 0.02), (0, 0.02)]
+        groups = ["", "foot", "", "", "top", ""]
+        sides = [st.Segment(place, group=group) for place, group in zip(places, groups, strict=True)]
+        angle = st.Shape("angle", 1e-3, tuple(sides), points={"corner": (0.01, 0.01)}, loads={"pull": load})
+        grouped, soft = st.mesh_shape(angle, "4 mm"), st.Material("1 MPa", 0.3)
+        choices = st.predict(angle, grouped, soft)
+        assert np.isfinite(choices[0].worst) and np.isnan(choices[0].errors["peak"])
+        best = choices[0].definition
+        header = st.SpringNet.from_scene(st.Scene(angle, grouped, soft, "pull", definition=best)).header
+        assert header["expected_error"]["end"] == pytest.approx(choices[0].errors["end"], abs=1e-4)
+        assert header["expected_error"]["peak"].startswith("not computed: ")
+        with pytest.raises(ValueError, match="'peak' has no reference, so no error of it can be kept: "):
+            st.find_mesh(angle, soft, "1 %")
+
+    def test_of_a_laminate_springs_alone_are_tried_that_can_be_one(self):
+        end = st.Quantity("end", "displacement", "right", "x")
+        pull = st.LoadCase("pull", [st.Support("left", 0, 0)], [st.Traction("right", (1.0, 0))], quantities=[end])
+        plate = st.Shape.rectangle("40 mm", "20 mm", loads={"pull": pull})
+        ply = st.AnisotropicMaterial.orthotropic("12 GPa", "4 GPa", 0.3, "2 GPa")
+        choices = {one.definition: one for one in st.predict(plate, st.mesh_shape(plate, "5 mm"), ply)}
+        assert {"delingette", "element-fit", "energy-fit"} <= {name for name in choices if not choices[name].failures}
+        assert "needs an isotropic material" in choices["lattice"].failures["springs"]
+
+
+class TestSprings:
+    def test_springs_are_those_of_the_scene(self, here, tmp_path):
+        study = st.load_study("study.yaml")
+        plate = study.shape("plate")
+        grouped = st.mesh_shape(plate, "4 mm", refined={"hole": "2 mm"})
+        linear = st.Scene(
+            plate, grouped, study.material("steel"), "pull", definition="lattice", kinematics="linear"
+        ).solve()
+        for ending in (".json", ".h5", ".csv", ".vtu"):
+            target = tmp_path / f"net{ending}"
+            result = run("springs", *PLATE, "--definition", "lattice", "--scale", "2", "--out", target)
+            assert result.exit_code == 0, result.output
+            net = st.SpringNet.read(target)
+            assert net.forces.sum(axis=0) == pytest.approx([20, 0], rel=1e-12)
+            assert net.held.sum() == 2 * 6
+            assert net.masses.sum() == pytest.approx(7850e-3 * (8e-4 - np.pi * 16e-6), rel=0.01)
+            assert net.header["load"]["name"] == "pull" and net.header["load"]["scale"] == 2
+            assert net.header["expected_error"]["end"] == linear.errors["end"]
+            assert net.header["expected_error"]["corner"].startswith("not computed")
+
+    def test_a_density_is_for_materials_that_have_none(self, here, tmp_path):
+        asked = ("springs", "--shape", "study.yaml:own", "--definition", "lattice", "--out", tmp_path / "net.json")
+        assert run(*asked, "--material", "third", "--density", "1000 kg/m^3").exit_code == 0
+        net = st.SpringNet.read(tmp_path / "net.json")
+        assert net.masses.sum() == pytest.approx(1e-3 * 1e3 * 8e-4 * 0.94, rel=0.02)
+
+
+class TestError:
+    """`predict --error`."""
+
+    ASKED = ("predict", "--shape", f"{SHAPES}:cook", "--material", "third", "--error", "3 %")
+
+    def test_the_mesh_that_is_found_keeps_the_error_and_finer_ones_do(self, tmp_path):
+        result = run(*self.ASKED, "--springs-alone", "--json", "--write", tmp_path / "net.json")
+        assert result.exit_code == 0, result.output
+        found = json.loads(result.stdout)["recommended_springs_alone"]
+        study = st.load_study(SHAPES)
+        cook, third = study.shape("cook"), study.material("third")
+        same = st.find_mesh(cook, third, "3 %", load="shear").best_springs
+        assert (found["size"], found["choice"]["definition"]) == (same.size, same.choice.definition)
+        assert found["confirmed"] and len(found["finer_sizes"]) >= 2 and min(found["finer_sizes"]) <= found["size"] / 2
+        for size in (found["size"], *found["finer_sizes"]):
+            scene = st.Scene(cook, st.mesh_shape(cook, size), third, "shear", definition=same.choice.definition,
+                             kinematics="linear")  # fmt: skip
+            values, known = scene.solve().values, {"tip": 0.0239676, "edge": 0.0240414}
+            assert all(abs(values[name] / known[name] - 1) <= 0.03 for name in known)
+        assert st.SpringNet.read(tmp_path / "net.json").header["mesh"]["particles"] == found["particles"]
+
+    def test_it_says_what_it_found(self):
+        said = run(*self.ASKED).stdout
+        assert said.startswith("cook, load shear; third, t = 1 mm; an error of at most 3 % in tip and edge")
+        assert "recommended: free " in said and "with springs alone: free " in said
+
+    @pytest.mark.parametrize(
+        ("options", "code", "message"),
+        [
+            (("--size", "2 mm"), 2, "--size: '2 mm' is what --error finds; leave one of them out"),
+            (("--error", "1"), 2, "--error: '1' is no error above 0 and below 100 %; give one such as '1 %'"),
+            (("--error", "1e-9 %"), 2, "--error: '1e-9 %' is below the error estimate of the reference; give at least"),
+        ],
+    )
+    def test_refusals(self, options, code, message):
+        result = run(*self.ASKED, *options)
+        assert result.exit_code == code and result.stderr.startswith(message), result.output
+
+    def test_what_has_no_mesh_or_no_reference_is_refused(self, here):
+        result = run("predict", *OWN, "--error", "1 %")
+        assert result.exit_code == 1 and "'own' has the mesh of its file; give it an outline" in result.stderr
+        result = run("predict", *PLATE[:-2], "--error", "1 %")
+        assert result.exit_code == 2
+        assert result.stderr == (
+            "--load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out of the "
+            "quantities\n"
+        )
+        study = st.load_study("study.yaml")
+        with pytest.raises(ValueError, match="of beams alone"):
+            st.find_mesh(study.shape("plate"), study.material("steel"), "1 %", loads=["bending"])
+        with pytest.raises(ValueError, match="load: 'pull' is of shapes alone"):
+            st.find_mesh(st.Beam("40 mm", "20 mm"), study.material("steel"), "1 %", load="pull")
+
+
+REFUSALS = [
+    (("--shape", "study.yaml:plat"), "has no shape 'plat'; did you mean 'plate'? known: plate, own, other"),
+    (("--shape", "study.yaml"), "names no shape; give such as study.yaml:<name>; known: plate, own, other"),
+    (("--shape", "none.yaml:plate"), "there is no study none.yaml; give one such as config/shapes.yaml:cook"),
+    (("--shape", "own.msh"), "is no study, which has the supports and loads; write one with 'file: own.msh'"),
+    (("--shape", "study.yaml:plate"), "--load: missing; shape 'plate' has pull, push, move; give one"),
+    (("--shape", "study.yaml:plate", "--load", "pul"), "has no load 'pul'; did you mean 'pull'? known: pull, push"),
+    (("--shape", "study.yaml:plate", "--load", "pull"), "--size: missing; give the length of an edge such as '2 mm'"),
+    (("--shape", "study.yaml:own"), "--material: missing; the study has steel, third for shape 'own'; give one"),
+    ((*OWN, "--size", "2 mm"), "--size: '2 mm' is beside the mesh of own.msh; leave --size out"),
+    ((*PLATE, "--material", "stel"), "--material: 'stel' is unknown; did you mean 'steel'? known: steel, third"),
+    ((*PLATE, "--density", "1 kg/m^3"), "--density: '1 kg/m^3' is beside material 'steel', which has its own"),
+    ((*PLATE[:-1], "30 mm"), "--size: '30 mm' is larger than shape 'plate'; give at most 20 mm"),
+    ((*PLATE[:-1], "1e-5 mm"), "--size: '1e-05 mm': refined 'hole': 5e-09 is less than"),
+    ((*PLATE, "--beam", "20x10"), "--beam: '20x10' is beside --shape study.yaml:plate, give one of the two"),
+    ((*PLATE, "--mesh", "free"), "--mesh: 'free' is beside --shape study.yaml:plate, whose mesh is made at --size"),
+    ((*PLATE, "--young", "1 MPa"), "whose materials are those of its study; give one of them by --material"),
+    ((*PLATE, "--thickness", "2 mm"), "which has the one of its study; leave it out"),
+]
+
+
+@pytest.mark.parametrize("command", [("predict",), ("springs", "--out", "net.csv")], ids=lambda one: one[0])
+@pytest.mark.parametrize(("arguments", "message"), REFUSALS, ids=[" ".join(one) for one, _ in REFUSALS])
+def test_refusals_are_one_line(command, arguments, message, here):
+    before = sorted(here.iterdir())
+    result = run(*command, *arguments)
+    assert result.exit_code == 2 and message in result.stderr, result.output
+    assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("predict", *PLATE, "--loads", "bending"), "--loads: 'bending' is beside --shape study.yaml:plate, whose"),
+        (("predict", "--beam", "20x10", "--size", "5 mm", "--material", "steel", "--load", "pull"),
+         "--load: 'pull' is of shapes alone; give --shape, or leave it out"),
+        (("springs", *PLATE, "--force", "1 N", "--out", "net.csv"), "whose loads have their sizes; give --scale"),
+        (("springs", *PLATE, "--scale", "0", "--out", "net.csv"), "--scale: 0.0 is no factor; give a finite number"),
+        (("springs", *PLATE, "--definition", "latice", "--out", "net.csv"), "--definition: 'latice' is unknown; did"),
+        (("springs", "--shape", "study.yaml:plate", "--load", "move", "--size", "4 mm", "--out", "net.csv"),
+         "--load: 'move' of shape 'plate' moves a support, and files of springs have forces"),
+        (("springs", "--beam", "20x10", "--size", "5 mm", "--material", "steel", "--scale", "2", "--out", "net.csv"),
+         "--scale: '2.0' is of shapes alone; give --shape, or leave it out"),
+    ],
+)  # fmt: skip
+def test_refusals_of_one_command(arguments, message, here):
+    before = sorted(here.iterdir())
+    result = run(*arguments)
+    assert result.exit_code == 2 and message in result.stderr, result.output
+    assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
+
+
+@pytest.mark.parametrize("ending", [".xml", ".scn", ".xpbd.json"])
+def test_follower_pressure_is_refused_by_simulators(ending, here, tmp_path):
+    asked = ("--shape", "study.yaml:plate", "--load", "push", "--size", "4 mm", "--definition", "lattice")
+    result = run("springs", *asked, "--out", tmp_path / f"net{ending}")
+    assert "load 'push': turns with the side that it acts on" in result.stderr
+    assert "give its pressures 'follower: false'" in result.stderr and not [*tmp_path.iterdir()]
+
+
+def test_neither_a_beam_nor_a_shape(here):
+    for command in (("predict",), ("springs", "--out", "net.csv")):
+        result = run(*command)
+        assert result.exit_code == 2 and "Missing option '--beam' such as 200x40, or '--shape'" in result.stderr
+
+
+def test_a_study_without_shapes_says_so(here):
+    result = run("predict", "--shape", f"{SHAPES.with_name('paper.yaml')}:plate")
+    assert result.exit_code == 2 and "has no shapes; add 'shapes' and 'shape_grids', or give --beam" in result.stderr
