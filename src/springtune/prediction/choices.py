@@ -403,7 +403,7 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
             else:
                 found[asked[0].name] = str(error)
         else:
-            small.update(solved.negligible)
+            small.update(name for name in solved.negligible if solved.values[name])
             found |= {
                 one.name: QuantityReference(float(solved.values[one.name]), float(solved.error_estimates[one.name]))
                 for one in asked
