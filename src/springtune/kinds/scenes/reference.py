@@ -29,7 +29,8 @@ def run(tasks, spent):
         `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
         with ``key, beam, material, force, load, law, plane, follower``, where ``load`` is the name of the kind and
         ``law`` ``"neo-hooke"`` or ``"yeoh"``. There may be ``interpolants``, each with ``key``, ``kind``, by name,
-        ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two ratios of each unit problem that is asked of it, by its own key.
+        ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two ratios of each unit problem that is
+        asked of it, by its own key.
     spent : Spent
         What tasks cost is added to it.
     """
