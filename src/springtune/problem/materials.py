@@ -192,7 +192,7 @@ class Rubber(Material):
         --------
         >>> import springtune as st
         >>> st.fit_rubber("config/treloar/uniaxial.csv", terms=1).errors["uniaxial"].__round__(2)
-        0.29
+        0.28
         """
         return dict(self.test_errors)
 
