@@ -13,6 +13,7 @@ import springtune as st
 from springtune.campaign.provenance import inputs
 from springtune.jobs.keys import material_key
 from springtune.kinds import load_study
+from springtune.kinds.moduli.tables import decision
 from springtune.kinds.scenes import plan
 from springtune.kinds.scenes.figures import like_with_like
 from springtune.problem.materials import material_of
@@ -139,3 +140,25 @@ def test_networks_are_compared_with_the_law_of_their_material(here):
     for material, reference in own.items():
         exact = error.sel(material=material, reference=reference).values
         assert np.array_equal(shown.sel(material=material).values, exact, equal_nan=True)
+
+
+def test_which_definition_marks_what_is_beyond_small_strain(here):
+    """Errors against small strain of rubber at large strain are no definition's alone; near rest they are."""
+    head = STUDY.partition("further_references")[0]
+    grid = """\
+outputs: definitions
+grids:
+  pull: {beam: block, mesh_type: free, mesh_size: 2.5 mm, material: [tested, plain], load: [traction, compression],
+         force: FORCE, definition: [neo-hooke, delingette], sensitivity: false, moduli: true}
+"""
+    pages = {}
+    for name, force in (("far", "3 N"), ("near", "0.03 N")):
+        study(head + grid.replace("FORCE", force), f"{name}.yaml")
+        campaign = Campaign(f"{name}.yaml")
+        campaign.plan.write()
+        for job in campaign.jobs:
+            if job in campaign.plan.jobs or job == "collect":
+                campaign.do(job)
+        pages[name] = decision(st.open(campaign.folder))
+    assert "Beyond small strain" not in pages["near"] and "`delingette`" in pages["near"]
+    assert "Beyond small strain, where errors hold more" in pages["far"] and "tested, traction" in pages["far"]
