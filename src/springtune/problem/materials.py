@@ -152,7 +152,7 @@ class Rubber(Material):
     >>> rubber.young_modulus, rubber.poisson_ratio
     (1200000.0, 0.5)
     >>> print(f"{float(rubber.stress('uniaxial', 5.0)) / 1e6:.2f} MPa")
-    2.10 MPa
+    2.29 MPa
     """
 
     young_modulus: float = field(init=False)
@@ -648,6 +648,7 @@ def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
 
     Examples
     --------
+    >>> import numpy as np
     >>> along = np.diag([1.0, 0.0, 0.0])  # fibres along x
     >>> rotated(along, np.pi / 4).round(6).tolist()
     [[0.25, 0.25, 0.25], [0.25, 0.25, 0.25], [0.25, 0.25, 0.25]]

@@ -1,8 +1,4 @@
-r"""Springs of rubber that was tested: nominal stress over stretch, as a testing machine gives it.
-
-`springs` are of a `springtune.Rubber`, whose law is Yeoh's, see `springtune.fit_rubber`. In a network
-``I_1 = tr C + J^-2`` of a triangle follows from its edges and its area, so that springs of zero rest length, stiffer or
-softer with I_1, and areas are linear triangles of this law exactly, see `springtune.mechanics.energies.YeohEnergy`.
+"""One law for all springs of a lattice, fitted to a uniaxial test of rubber: springs alone.
 
 `SpringLaw` is for springs alone, on a lattice of equilateral triangles pulled along a row: there the oblique springs
 keep their length, and the springs of the row alone carry. So their law is the test's, whatever that is, up to a stretch
@@ -16,35 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh import Mesh
-from ..problem.materials import Material, Rubber
 from ..problem.rubber import CHECKED, TensileTest, TestDataError, check_terms, fit, told
-from .base import DefinitionError, Springs, definition, triangles_only, zero
-
-
-@definition("yeoh", order=245, cells=(3,), finite_strain=True)
-def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs of zero rest length and areas: equal to linear triangles of rubber fitted to a uniaxial test.
-
-    Parameters and returns as in `springtune.springs.lattice.springs`, the material a `springtune.Rubber`; raises
-    DefinitionError on quadrilaterals and for other materials.
-    """
-    from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
-    from .neo_hooke import zero_length
-
-    triangles_only(mesh)
-    if not isinstance(material, Rubber):
-        raise DefinitionError(
-            f"needs a material that is fitted to a test and {repr(material.name) if material.name else 'this one'} is "
-            "none; give springtune.fit_rubber('uniaxial.csv'), in a study {uniaxial_test: uniaxial.csv}, or take "
-            "'neo-hooke'"
-        )
-    over = np.array(material.coefficients) / material.young_modulus
-    energy = YeohEnergy(mesh.points, mesh.triangles, np.tile(over, (len(mesh.triangles), 1)), material.largest)
-    return Springs(
-        material.young_modulus * thickness, zero(mesh), (energy,), linear_springs=zero_length(mesh, 2 * over[0])
-    )
-
 
 LAW_POWERS = (2, 5, 8)
 """Powers p of the terms s - s^-p of a spring's law, s its stretch: of a row of rubber, and of what is softer sooner."""
