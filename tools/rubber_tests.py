@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from springtune.output import style
-from springtune.springs.rubber import RUBBER_TESTS, SpringLaw, UniaxialTest, Yeoh
+from springtune.problem.materials import RUBBER_TESTS
+from springtune.problem.rubber import TensileTest, fit_rubber
+from springtune.springs.rubber import SpringLaw
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -17,12 +19,12 @@ REPOSITORY = Path(__file__).parents[1]
 def draw(path: Path) -> None:
     """Write the figure."""
     data = {
-        test: UniaxialTest.read(REPOSITORY / f"config/treloar/{test.replace(' ', '-')}.csv") for test in RUBBER_TESTS
+        test: TensileTest.read(REPOSITORY / f"config/treloar/{test.replace(' ', '-')}.csv") for test in RUBBER_TESTS
     }
     fitted = data["uniaxial"]
     laws = {
-        "Yeoh's law": Yeoh.fitted(fitted),
-        "neo-Hooke": Yeoh.fitted(fitted, 1),
+        "Yeoh's law": fit_rubber(fitted),
+        "neo-Hooke": fit_rubber(fitted, terms=1),
         "springs alone, up to 1.9": SpringLaw.fitted(fitted, 2),
     }
     figure, axes = style.panels(None, ncols=3, figsize=(style.PAGE, 2.6))

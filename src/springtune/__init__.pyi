@@ -46,6 +46,8 @@ from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS
 from .problem.materials import AnisotropicMaterial as AnisotropicMaterial
 from .problem.materials import Material as Material
+from .problem.materials import Rubber as Rubber
+from .problem.rubber import fit_rubber as fit_rubber
 from .problem.shapes import Hole as Hole
 from .problem.shapes import LoadCase as LoadCase
 from .problem.shapes import Pressure as Pressure

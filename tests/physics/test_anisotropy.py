@@ -1,5 +1,7 @@
 """Sheets of any anisotropy, and bodies of several materials: closed forms, linear triangles, what springs cannot."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -12,7 +14,7 @@ from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh
 from springtune.prediction import predict
 from springtune.problem.geometry import Beam
-from springtune.problem.materials import AnisotropicMaterial, Material
+from springtune.problem.materials import AnisotropicMaterial, Material, Rubber
 from springtune.scene.moduli import moduli
 from springtune.scene.single import Scene
 from springtune.springs import DEFINITIONS, DefinitionError
@@ -294,7 +296,8 @@ NOT_ADDITIVE = {"density", "oriented", "adjoint", *(name for name in DEFINITIONS
 def test_parts_of_equal_materials_are_one_body(name):
     cells = DEFINITIONS[name].cells
     mesh = MESH_TYPES["structured" if 3 in cells else "braced"](0.04, 0.0104, 2e-3)  # six rows
-    one, other = Material(1.0, 1 / 3, name="one"), Material(1.0, 1 / 3, name="other")
+    made = partial(Rubber, (1 / 6, -0.01, 1e-3)) if name == "yeoh" else partial(Material, 1.0, 1 / 3)
+    one, other = made(name="one"), made(name="other")
     if name == "axis-exact":
         mesh = MESH_TYPES["braced"](0.04, 0.0104, 2e-3)
     whole = DEFINITIONS[name].springs(mesh, one, THICKNESS)
@@ -425,3 +428,20 @@ def test_beams_refuse_what_is_not_isotropic_by_name():
         predict(beam, mesh, PLY)
     with pytest.raises(DefinitionError, match="definition 'lattice': needs an isotropic material and 'ply' is"):
         moduli(mesh, PLY, "lattice")
+
+
+def test_rubber_of_two_tests_in_one_body_keeps_the_law_and_the_range_of_each():
+    """Other numbers of terms and other ends of the data; an answer says of the part that is beyond its own."""
+    mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
+    soft, stiff = Rubber((1e5,), largest=0.5, name="soft"), Rubber((2e5, -5e2, 40.0), largest=50.0, name="stiff")
+    springs = derive_by_parts(DEFINITIONS["yeoh"], halves(mesh, 0), {"": soft, "far": stiff}, THICKNESS)
+    (energy,) = springs.energies
+    there = mesh.points[energy.corners][..., 0].mean(axis=1) > 0.02
+    found = springs.reference / THICKNESS * energy.coefficients
+    assert found[there] == pytest.approx(np.tile(stiff.coefficients, (there.sum(), 1)), rel=1e-12)
+    assert found[~there] == pytest.approx(np.tile([1e5, 0, 0], ((~there).sum(), 1)), rel=1e-12)
+    # I_1 - 3 of 50 % in one direction, the other held: 2.25 + 1 + 1 / 2.25 - 3.
+    assert energy.objection(mesh.points * [0.5, 0]) == (
+        f"extrapolated: {(~there).sum()} of {len(there)} triangles are stretched beyond the test data, to I1 - 3 = "
+        "0.694 where the data end at 0.5"
+    )

@@ -20,12 +20,16 @@ from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
+AS_STIFF = st.Rubber([35e9, -5e9, 1e9], density="7850 kg/m^3")
 BEAM = st.Beam("100 mm", "20 mm", thickness="2 mm")
 ARRAYS = ("points", "springs", "rest_lengths", "stiffness", "masses", "held", "forces", "triangles", "quads")
 
 
 def scene_of(definition, mesh_type="structured", load="traction", force="20 kN", **options):
-    return st.Scene(BEAM, st.make_mesh(BEAM, mesh_type, "5 mm"), STEEL, load, force, definition=definition, **options)
+    material = AS_STIFF if definition == "yeoh" else STEEL
+    return st.Scene(
+        BEAM, st.make_mesh(BEAM, mesh_type, "5 mm"), material, load, force, definition=definition, **options
+    )
 
 
 def net_of(scene, **options):
@@ -115,6 +119,7 @@ SCENES = {
     "delingette-tensile": ("delingette-tensile", "structured"),
     "angular": ("angular", "structured"),
     "neo-hooke": ("neo-hooke", "free"),
+    "yeoh": ("yeoh", "free"),
     "area": ("area", "free"),
     "patch-area": ("patch-area", "structured"),
     "element-fit on quads": ("element-fit", "braced"),

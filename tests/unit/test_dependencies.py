@@ -345,7 +345,7 @@ VERSIONS = {
     "netgen-mesher": {"free", "kinds.shapes.mesh", "kinds.shapes.reference", "kinds.shapes.solve"},
     "meshio": {"from a file"},
     "numba": {"kinds.stability.stage", "kinds.benchmark.stage", "kinds.shapes.solve"},
-    "scikit-fem": {"kinds.scenes.reference", "kinds.benchmark.stage"},
+    "scikit-fem": {"kinds.scenes.reference", "kinds.benchmark.stage", "kinds.shapes.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
     "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "kinds.shapes.mesh", "from a file"},

@@ -103,6 +103,7 @@ def inputs(study: Study, folder: Path) -> dict[str, str]:
     root = next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
     files = {study.path, *(mesh.file for mesh in study.meshes if mesh.file)}
     files |= {study.printed_path} if study.printed_path else set()
+    files |= set(study.test_files)
     files |= {file for kind in kinds() for file in kind.files(study.parts[kind.name])}
     files |= {root / LOCK} if root else set()
     return {_name(file.resolve(), root or folder): _sha256(file) for file in sorted(files)}

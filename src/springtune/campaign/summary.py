@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..jobs.damage import ASIDE
+from ..kinds.scenes.lawful import of_own_law
 from ..output.text import aligned, label_text, without_numbers
 from ..problem.status import Status
-from ..study.model import FINITE_STRAIN_REFERENCE
 from .plan import Plan
 from .workload import clock, computed, keys_of
 
@@ -140,10 +140,10 @@ def _named(cells: Cells) -> Iterator[str]:
 
 def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":
     """Errors of networks of nonlinear kinematics against finite strain, NaN for others; None without a reference."""
-    if finite is None or FINITE_STRAIN_REFERENCE not in finite.reference.values:
+    finite = None if finite is None else of_own_law(finite)
+    if finite is None:
         return None
-    errors = finite.deformation_error.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
-    return errors.where(root.kinematics != "linear").transpose(*root.deformation_error.dims)
+    return finite.deformation_error.where(root.kinematics != "linear").transpose(*root.deformation_error.dims)
 
 
 def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:

@@ -154,7 +154,8 @@ class _Frames:
             self.content.header["reference"] = f"{NOT_COMPUTED}: {error}"
         else:
             self.reference = reference.at(scene.mesh.points)
-            self.content.header["reference"] = scene.objection or "finite elements, small strain, converged"
+            strain = "finite" if scene.finite_strain and not scene.objection else "small"
+            self.content.header["reference"] = scene.objection or f"finite elements, {strain} strain, converged"
 
     def write(
         self,
@@ -170,7 +171,8 @@ class _Frames:
         of_particles = {"displacement": displacements}
         if velocities is not None:
             of_particles["velocity"] = velocities
-        if self.reference is not None:
+        # At finite strain a share of the force is not a share of the displacements.
+        if self.reference is not None and (share == 1 or not scene.finite_strain):
             expected = share * self.reference
             of_particles |= {"reference_displacement": expected, "error": displacements - expected}
         forces = scene.springs.reference * scene.network.spring_forces(displacements, linear)

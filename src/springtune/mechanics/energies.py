@@ -432,32 +432,35 @@ class YeohEnergy(_SheetEnergy):
         As in `Energy`; triangles.
     coefficients : ndarray of float, shape (n_cells, n)
         Coefficients times the thickness over the reference stiffness [1], from the linear one on.
-    largest : float, optional
+    largest : float or ndarray of float, shape (n_cells,), optional
         Largest I_1 - 3 of the test that they were fitted to [1]; beyond, they are extrapolated.
     """
 
     points: np.ndarray
     corners: np.ndarray
     coefficients: np.ndarray
-    largest: float = np.inf
+    largest: float | np.ndarray = np.inf
 
     def _moduli(self) -> tuple[np.ndarray, ...]:
         return self.coefficients, np.array(self.largest)
 
     def objection(self, displacements: np.ndarray) -> str:
         """As of `Energy`: how many triangles are stretched beyond the data."""
-        if not np.isfinite(self.largest):
+        if not np.isfinite(self.largest).any():
             return ""
         with np.errstate(invalid="ignore"):
             moved = self._at_corners(displacements)
             distortion, growth = self._invariants(moved - moved[:, :1])
             excess = distortion + _dilation(growth)[0]
-        beyond = int((excess > self.largest).sum())
+        over = excess > self.largest
+        beyond = int(over.sum())
         if not beyond:
             return ""
+        worst = int(np.argmax(np.where(over, excess, 0.0)))
+        end = np.broadcast_to(self.largest, excess.shape)[worst]
         return (
             f"extrapolated: {beyond} of {len(excess)} triangles are stretched beyond the test data, to I1 - 3 = "
-            f"{excess.max():.3g} where the data end at {self.largest:.3g}"
+            f"{excess[worst]:.3g} where the data end at {end:.3g}"
         )
 
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -1,4 +1,4 @@
-r"""Materials: linearly elastic, isotropic or not.
+r"""Materials: linearly elastic, isotropic or not, and rubber of a law that a test was fitted by.
 
 Sheets are in plane stress. With stresses and strains in Voigt's order, xx, yy and xy, the shear strain being the angle,
 
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -102,6 +102,167 @@ class Material:
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
+
+
+RUBBER_TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
+"""Tests, and the power p of the nominal stress 2 (q - q^-p) W'(I_1) of an incompressible sheet."""
+
+MOST_TERMS = 3
+"""Terms of Yeoh's law."""
+
+
+@dataclass(frozen=True, init=False)
+class Rubber(Material):
+    r"""Incompressible rubber of Yeoh's law, as `springtune.fit_rubber` makes it of a uniaxial test.
+
+    To whatever knows small strain alone it is a `Material` of E = 6 c_1 and nu = 0.5.
+
+    Parameters
+    ----------
+    coefficients : sequence of float
+        c_1 to c_3 or fewer [Pa].
+    largest : float
+        Largest I_1 - 3 of the data that it was fitted to [1]; infinite without any. Beyond, what it says is
+        extrapolated: answers of networks say so.
+    test_errors : sequence of (str, float)
+        Of each test that it was compared with the root mean square of its relative errors [1].
+    density : float, str or None
+        Density rho [kg/m3], or a text with its unit; statics need none.
+    name : str
+        Label of the material.
+
+    Raises
+    ------
+    ValueError
+        If there is another number of coefficients, or one is no number, or the first not above zero.
+
+    Notes
+    -----
+    The energy per volume is (O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990)
+
+    .. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n,
+
+    with one term that of neo-Hooke's law. A stretch q has the nominal stress ``2 (q - b) W'(I_1)``, where b is
+    ``q^-2``, ``q^-5`` or ``q^-3`` in uniaxial tension, equibiaxial tension and pure shear.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> rubber = st.Rubber([0.2e6, -1e3, 50.0], name="soft")
+    >>> rubber.young_modulus, rubber.poisson_ratio
+    (1200000.0, 0.5)
+    >>> print(f"{float(rubber.stress('uniaxial', 5.0)) / 1e6:.2f} MPa")
+    2.29 MPa
+    """
+
+    young_modulus: float = field(init=False)
+    poisson_ratio: float = field(init=False)
+    coefficients: tuple[float, ...] = ()
+    largest: float = math.inf
+    test_errors: tuple[tuple[str, float], ...] = ()
+
+    def __init__(
+        self,
+        coefficients: Sequence[float],
+        largest: float = math.inf,
+        test_errors: Sequence[tuple[str, float]] = (),
+        density: float | str | None = None,
+        name: str = "rubber",
+    ) -> None:
+        given = list(coefficients)
+        if not (1 <= len(given) <= MOST_TERMS and all(isinstance(c, Real) and math.isfinite(c) for c in given)):
+            raise ValueError(
+                f"coefficients: {coefficients!r} is no law of rubber; give 1 to {MOST_TERMS} numbers in Pa"
+            )
+        set_ = object.__setattr__  # of a frozen class
+        set_(self, "coefficients", tuple(map(float, given)))
+        set_(self, "young_modulus", 6 * self.coefficients[0])
+        set_(self, "poisson_ratio", 0.5)
+        set_(self, "largest", float(largest))
+        set_(self, "test_errors", tuple((_known_test(test), float(error)) for test, error in test_errors))
+        set_(self, "density", density)
+        set_(self, "name", name)
+        self.__post_init__()
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Root mean square of the relative errors of its stress, by the test that it was compared with [1].
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.fit_rubber("config/treloar/uniaxial.csv", terms=1).errors["uniaxial"].__round__(2)
+        0.28
+        """
+        return dict(self.test_errors)
+
+    @staticmethod
+    def excess(test: str, stretch: np.ndarray | float) -> np.ndarray:
+        """I_1 - 3 of stretches in a test.
+
+        Parameters
+        ----------
+        test : str
+            ``"uniaxial"``, ``"equibiaxial"`` or ``"pure shear"``.
+        stretch : float or ndarray of float
+            Length over the one at rest [1].
+
+        Returns
+        -------
+        ndarray of float
+            [1], in the shape of the stretches.
+
+        Raises
+        ------
+        ValueError
+            If the test is another.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> [round(float(st.Rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
+        [2.0, 5.062, 2.25]
+        """
+        import numpy as np  # here: making a material needs none
+
+        q = np.asarray(stretch, float)
+        other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
+        return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
+
+    def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
+        """Nominal stress at stretches in a test.
+
+        Parameters
+        ----------
+        test, stretch
+            As of `excess`.
+
+        Returns
+        -------
+        ndarray of float
+            Force over the cross-section at rest [Pa].
+
+        Raises
+        ------
+        ValueError
+            If the test is another.
+
+        Examples
+        --------
+        At small strain E, 2 E and 4/3 E times the strain:
+
+        >>> import springtune as st
+        >>> rubber = st.Rubber([1e6 / 6])
+        >>> [round(float(rubber.stress(test, 1 + 1e-6)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
+        [1.0, 2.0, 1.333]
+        """
+        import numpy as np  # here: making a material needs none
+
+        q, excess = np.asarray(stretch, float), self.excess(test, stretch)
+        slope = np.zeros(q.shape)
+        for n, c in enumerate(self.coefficients, 1):
+            slope = slope + n * c * excess ** (n - 1)
+        return np.asarray(2 * (q - q ** -float(RUBBER_TESTS[test])) * slope)
 
 
 @dataclass(frozen=True)
@@ -546,15 +707,18 @@ def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
 
     Returns
     -------
-    Material or AnisotropicMaterial
+    Material, Rubber or AnisotropicMaterial
 
     Examples
     --------
     >>> from dataclasses import asdict
     >>> steel, board = Material(210e9, 0.3), AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9)
-    >>> material_of(asdict(steel)) == steel, material_of(asdict(board)) == board
-    (True, True)
+    >>> rubber = Rubber([2e5, -1e3], largest=40.0)
+    >>> [material_of(asdict(one)) == one for one in (steel, board, rubber)]
+    [True, True, True]
     """
+    if "coefficients" in fields:
+        return Rubber(**{key: value for key, value in fields.items() if key not in ("young_modulus", "poisson_ratio")})
     return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
 
 
@@ -588,6 +752,12 @@ def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
             f"{remedy}"
         )
     return material
+
+
+def _known_test(test: str) -> str:
+    if test not in RUBBER_TESTS:
+        raise ValueError(f"test: {test!r} is unknown; known: {', '.join(RUBBER_TESTS)}")
+    return test
 
 
 def _check_name(name: object) -> None:

@@ -1,15 +1,16 @@
-r"""Reference at finite strain: a neo-Hookean sheet, plane stress or plane strain, by quadratic finite elements.
+r"""Reference at finite strain: a sheet of rubber by quadratic finite elements.
 
-The strain energy is that of CalculiX and Abaqus,
+It is neo-Hookean in plane stress or plane strain, or of Yeoh's law in plane stress. The strain energy of the former is
+that of CalculiX and Abaqus,
 
 .. math:: W = \tfrac{\mu}{2} (J^{-2/3} I_1 - 3) + \tfrac{K}{2} (J - 1)^2,
 
 with the shear modulus mu and the bulk modulus K of the material at small strain. In plane stress the stretch across
 the sheet is eliminated in every point; an incompressible material, nu = 0.5, has there
-:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane. Kinds of load are those of
-`springtune.problem.loads`: where the force acts across the loaded side, half of the beam is solved, which does not
-buckle; where it acts along it, as in bending and shear, the whole, since large rotations break the symmetry. Elements
-shrink towards the corners, and the load grows in steps where it must.
+:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane, and Yeoh's law is a polynomial of the same
+bracket. Kinds of load are those of `springtune.problem.loads`: where the force acts across the loaded side, half of the
+beam is solved, which does not buckle; where it acts along it, as in bending and shear, the whole, since large rotations
+break the symmetry. Elements shrink towards the corners, and the load grows in steps where it must.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,9 @@ from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 from ..linalg.factors import SingularError, SuperLUFactor
 from ..problem.geometry import Beam
 from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
-from ..problem.materials import Material
+from ..problem.materials import Material, Rubber
+from .field import interpolate
+from .small_strain import ReferenceNotConvergedError
 
 COUNTS = (5, 8)
 """Elements over half the height of the two meshes that are solved; the second is the answer."""
@@ -49,7 +52,7 @@ class IncompressibleError(ValueError):
     """A material that displacements alone cannot describe."""
 
 
-class FiniteStrainError(RuntimeError):
+class FiniteStrainError(ReferenceNotConvergedError):
     """A reference that did not converge; the message says how far it came."""
 
 
@@ -70,6 +73,11 @@ class FiniteStrainSolution:
         Places on the loaded side over its length [1], ascending.
     profile : ndarray of float, shape (n,)
         Displacements there along the force [m].
+    x : ndarray of float, shape (n_x,)
+    y : ndarray of float, shape (n_y,)
+        Coordinates at rest of a grid on which the field is given [m]; closer to each other near the corners.
+    displacements : ndarray of float, shape (n_x, n_y, 2)
+        Displacement there [m].
     """
 
     displacement: float
@@ -77,6 +85,24 @@ class FiniteStrainSolution:
     error_estimate: float
     positions: np.ndarray
     profile: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    displacements: np.ndarray
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Displacements at points of the beam; see `springtune.reference.field.interpolate`.
+
+        Parameters
+        ----------
+        points : ndarray of float, shape (n, 2)
+            At rest [m].
+
+        Returns
+        -------
+        ndarray of float, shape (n, 2)
+            [m]
+        """
+        return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_neo_hooke(
@@ -112,8 +138,38 @@ def solve_neo_hooke(
         raise IncompressibleError(
             f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999"
         )
+    return _solve(beam, material, force, kind, NeoHooke(nu, plane), follower)
+
+
+def solve_yeoh(
+    beam: Beam, material: Rubber, force: float, kind: LoadKind = FACE, follower: bool = False
+) -> FiniteStrainSolution:
+    """Displacements of a beam of Yeoh's law in plane stress under a load.
+
+    Parameters
+    ----------
+    beam : Beam
+    material : Rubber
+    force, kind, follower
+        As of `solve_neo_hooke`.
+
+    Returns
+    -------
+    FiniteStrainSolution
+
+    Raises
+    ------
+    FiniteStrainError
+        If Newton's method does not converge in small load steps.
+    """
+    return _solve(beam, material, force, kind, Yeoh(material), follower)
+
+
+def _solve(
+    beam: Beam, material: Material, force: float, kind: LoadKind, law: "_PlaneLaw", follower: bool
+) -> FiniteStrainSolution:
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
-    sheets = [_Sheet(beam.length / beam.height, nu, count, kind, plane, follower) for count in COUNTS]
+    sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
     coarse, fine = (sheet.solve(stress, f"{beam.name}, {material.name}") for sheet in sheets)
     # Lengths are over half the height.
     scale = beam.height / 2
@@ -123,6 +179,9 @@ def solve_neo_hooke(
         error_estimate=float(abs(coarse.displacement / fine.displacement - 1)) + fine.rounding,
         positions=fine.positions,
         profile=scale * fine.profile,
+        x=scale * fine.x,
+        y=scale * fine.y,
+        displacements=scale * fine.displacements,
     )
 
 
@@ -133,15 +192,17 @@ class _Solved(NamedTuple):
     mean: float
     positions: np.ndarray
     profile: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    displacements: np.ndarray
     rounding: float
 
 
 class _Sheet:
     """What is solved of a sheet of height 2 with E = 1: half of it where the load keeps it symmetric."""
 
-    def __init__(self, aspect_ratio: float, nu: float, count: int, kind: LoadKind, plane: str, follower: bool) -> None:
-        self.kind = kind
-        self.law = NeoHooke(nu, plane)
+    def __init__(self, aspect_ratio: float, law: "_PlaneLaw", count: int, kind: LoadKind, follower: bool) -> None:
+        self.kind, self.law = kind, law
         length = 2 * aspect_ratio
         self.extent = max(length, 2.0)
         along, across = _element_ends(length, count, kind)
@@ -150,7 +211,7 @@ class _Sheet:
         axis, component, place = kind.normal, kind.axis, kind.loaded.place(along[-1], across[-1])
         facets = mesh.facets_satisfying(lambda x: np.isclose(x[axis], place), boundaries_only=True)
         side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
-        places = basis.doflocs.T
+        places = self.nodes_at = basis.doflocs.T
         self.held = np.zeros(places.shape, dtype=bool)
         for where, axes in kind.half_held if kind.symmetric else kind.held:
             there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
@@ -197,7 +258,21 @@ class _Sheet:
             positions = np.concatenate([self.places, whole - self.places[-2::-1]]) / whole
             profile = np.concatenate([profile, profile[-2::-1]])
         displacement = float(np.interp(0.5, positions, profile)) if self.kind.pressed else mean
-        return _Solved(displacement, mean, positions, profile, uncertain)
+        return _Solved(displacement, mean, positions, profile, *self._field(moved), uncertain)
+
+    def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
+        places = self.nodes_at
+        order = np.lexsort(np.round(places, 12).T[::-1])
+        x, y = (np.unique(np.round(places[:, axis], 12)) for axis in range(2))
+        field = moved[order].reshape(len(x), len(y), 2)
+        if not self.kind.symmetric:
+            return x, y, field
+        if self.kind.cut == BOTTOM:  # the upper half
+            whole = np.concatenate([field[:, :0:-1] * [1, -1], field], axis=1)
+            return x, 1 + np.concatenate([-y[:0:-1], y]), whole
+        whole = np.concatenate([field, field[-2::-1] * [-1, 1]])
+        return np.concatenate([x, 2 * x[-1] - x[-2::-1]]), y, whole
 
     def _newton(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float] | None:
         """Displacements in equilibrium and what rounding leaves open of the load's, relative; None without any.
@@ -339,21 +414,12 @@ _Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]
 """First derivatives of an energy by t and d, and second ones by tt, td, dd."""
 
 
-class NeoHooke:
-    """Neo-Hookean energy of a sheet with E = 1.
+class _PlaneLaw:
+    """Energy of a sheet with E = 1, of the trace and the determinant of C in the plane."""
 
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio at small strain [1].
-    plane : str
-        ``"stress"`` or ``"strain"``.
-    """
-
-    def __init__(self, nu: float, plane: str) -> None:
-        self.shear = 1 / (2 * (1 + nu))
-        self.bulk = np.inf if nu >= 0.5 else 1 / (3 * (1 - 2 * nu))
-        self.plane = plane
+    def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
+        """First derivatives by t and d, and second ones by tt, td, dd."""
+        raise NotImplementedError
 
     def response(self, strain: np.ndarray) -> "Response":
         """Stress and tangent at Green's strains.
@@ -377,8 +443,7 @@ class NeoHooke:
             c[..., 0] * c[..., 1] - c[..., 2] ** 2,
             np.stack([c[..., 1], c[..., 0], -c[..., 2]], axis=-1),
         )
-        of = self._incompressible if np.isinf(self.bulk) else self._compressible
-        first, second = of(c[..., 0] + c[..., 1], determinant)
+        first, second = self.derivatives(c[..., 0] + c[..., 1], determinant)
         unit = np.array([1.0, 1.0, 0.0])
         stress = 2 * (first[0][..., None] * unit + first[1][..., None] * turned)
         mixed = unit[:, None] * turned[..., None, :]
@@ -392,12 +457,55 @@ class NeoHooke:
         )
         return Response(stress, tangent)
 
-    def _incompressible(self, trace: np.ndarray, d: np.ndarray) -> "_Derivatives":
+
+class Yeoh(_PlaneLaw):
+    """Yeoh's law of an incompressible sheet in plane stress, with E = 1.
+
+    Parameters
+    ----------
+    material : Rubber
+    """
+
+    def __init__(self, material: Rubber) -> None:
+        self.coefficients = [one / material.young_modulus for one in material.coefficients]
+
+    def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
+        """As of `_PlaneLaw`, of W = sum_n c_n x^n with x = t + 1/d - 3."""
+        excess = trace + 1 / d - 3
+        first = sum(n * c * excess ** (n - 1) for n, c in enumerate(self.coefficients, 1)) + np.zeros_like(excess)
+        second = np.zeros_like(excess)
+        for n, c in enumerate(self.coefficients[1:], 2):
+            second = second + n * (n - 1) * c * excess ** (n - 2)
+        by_d = -1 / d**2
+        return (first, first * by_d), (second, second * by_d, second * by_d**2 + 2 * first / d**3)
+
+
+class NeoHooke(_PlaneLaw):
+    """Neo-Hookean energy of a sheet with E = 1.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson's ratio at small strain [1].
+    plane : str
+        ``"stress"`` or ``"strain"``.
+    """
+
+    def __init__(self, nu: float, plane: str) -> None:
+        self.shear = 1 / (2 * (1 + nu))
+        self.bulk = np.inf if nu >= 0.5 else 1 / (3 * (1 - 2 * nu))
+        self.plane = plane
+
+    def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
+        """As of `_PlaneLaw`."""
+        return (self._incompressible if np.isinf(self.bulk) else self._compressible)(trace, d)
+
+    def _incompressible(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """First derivatives by t and d, and second ones by tt, td, dd, of W = mu/2 (t + 1/d - 3)."""
         none = np.zeros_like(trace)
         return (none + self.shear / 2, -self.shear / 2 / d**2), (none, none, self.shear / d**3)
 
-    def _compressible(self, trace: np.ndarray, d: np.ndarray) -> "_Derivatives":
+    def _compressible(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """The same of the module's docstring's energy, the stretch z across eliminated in plane stress."""
         z = np.ones_like(d)
         if self.plane == "stress":

@@ -43,6 +43,7 @@ class OwnDefinition:
     uniform: bool = False
     uniaxial: bool = False
     needs: str = ""
+    finite_strain: bool = False
 
     @property
     def name(self) -> str:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from ..mechanics.dynamics import Motion, Run
     from ..mechanics.integrators import BackwardEuler
+    from ..reference.finite_strain import FiniteStrainSolution
     from ..reference.shapes import ShapeReference
     from ..reference.small_strain import ReferenceSolution
 
@@ -325,22 +326,42 @@ class Scene:
             self.statement.values(self.sheet, springs, solution),
         )
 
-    def reference(self) -> "ReferenceSolution | ShapeReference":
-        """Converged finite-element solution in small strain, under the same force or load case.
+    @property
+    def finite_strain(self) -> bool:
+        """Whether the network has the material's law at finite strain: a `neo-hooke` or `yeoh` one, not linear.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, rubber = st.Beam("100 mm", "20 mm"), st.Material("1 MPa", 0.5)
+        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+        >>> pulls = [st.Scene(beam, mesh, rubber, "traction", "10 N", definition=name, kinematics=kinematics)
+        ...          for name in ("neo-hooke", "delingette") for kinematics in ("nonlinear", "linear")]
+        >>> [scene.finite_strain for scene in pulls]
+        [True, False, False, False]
+        """
+        return self.definition.finite_strain and self.kinematics == "nonlinear"
+
+    def reference(self) -> "ReferenceSolution | FiniteStrainSolution | ShapeReference":
+        """Converged finite-element solution under the same force or load case.
+
+        In small strain; of a beam whose network has `finite_strain` at finite strain: of a `springtune.Rubber` by its
+        own law, of another material by neo-Hooke's.
 
         Returns
         -------
-        ReferenceSolution or ShapeReference
+        ReferenceSolution, FiniteStrainSolution or ShapeReference
 
         Raises
         ------
         ReferenceNotConvergedError
-            If its error estimate stays above the tolerance.
+            If its error estimate stays above the tolerance, or there is no equilibrium at finite strain.
 
         Notes
         -----
-        By the hp version of finite elements, whose error falls exponentially and is estimated; see
-        `springtune.reference.small_strain`.
+        In small strain by the hp version of finite elements, whose error falls exponentially and is estimated; see
+        `springtune.reference.small_strain`. At finite strain by quadratic elements on two meshes, see
+        `springtune.reference.finite_strain`.
 
         Examples
         --------
@@ -350,8 +371,15 @@ class Scene:
         >>> reference = scene.reference()
         >>> print(f"{1e3 * reference.displacement:.2f} mm; F L / (E A) = {1e3 * 400e3 * 0.2 / (210e9 * 4e-5):.2f} mm")
         9.50 mm; F L / (E A) = 9.52 mm
+
+        Rubber at half of its length more:
+
+        >>> rubber = st.Material("1 MPa", 0.5)
+        >>> scene = st.Scene(beam, scene.mesh, rubber, "traction", "10 N", definition="neo-hooke")
+        >>> print(f"{1e3 * scene.reference().displacement:.0f} mm, error {100 * scene.solve().error:+.1f} %")
+        65 mm, error -0.1 %
         """
-        return self.statement.reference(self.sheet)
+        return self.statement.reference(self.sheet, self.finite_strain)
 
     def reference_values(self) -> dict[str, float]:
         """Quantities of interest of the reference by name.
@@ -374,17 +402,15 @@ class Scene:
         >>> {name: f"{1e3 * value:.2f} mm" for name, value in scene.reference_values().items()}
         {'displacement': '9.50 mm'}
         """
-        return self.statement.reference_values(self.sheet)
+        return self.statement.reference_values(self.sheet, self.finite_strain)
 
     @property
     def objection(self) -> str:
-        """Why a small-strain reference does not apply to the network; empty where it does, as in linear kinematics."""
-        if self.kinematics == "linear":
-            return ""
-        from ..reference.limits import beyond_linear
+        """Why a small-strain reference does not apply to the network.
 
-        found = self.reference()
-        return beyond_linear(found.rotation, found.strain)
+        Empty where it does, as in linear kinematics, and where the reference is one at finite strain.
+        """
+        return "" if self.kinematics == "linear" else self.statement.objection(self.sheet, self.finite_strain)
 
     def motion(self, **options: Any) -> "Motion":
         """The scene in time, its force switched on at rest and kept; free of damping.
@@ -652,12 +678,12 @@ class Result:
         forces = self.scene.network.spring_forces(self.displacements, self.scene.kinematics == "linear")
         return self.scene.springs.reference * forces
 
-    def reference(self) -> "ReferenceSolution | ShapeReference":
-        """Converged finite-element solution in small strain, under the same force; as `Scene.reference`.
+    def reference(self) -> "ReferenceSolution | FiniteStrainSolution | ShapeReference":
+        """Converged finite-element solution under the same force, as `Scene.reference`.
 
         Returns
         -------
-        ReferenceSolution or ShapeReference
+        ReferenceSolution, FiniteStrainSolution or ShapeReference
 
         Raises
         ------
@@ -670,7 +696,8 @@ class Result:
     def error(self) -> float:
         """Signed deformation error against the reference, (network - reference) / abs(reference) [1].
 
-        `Scene.objection` says where the reference of small strain does not apply.
+        At finite strain where the network has a law for it (`Scene.finite_strain`); for others `Scene.objection` says
+        where the reference of small strain does not apply.
         """
         return next(iter(self.errors.values()))
 

@@ -28,9 +28,10 @@ from ..problem.boundary import (
 from ..problem.cases import check_case
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
 from ..problem.quantities import nearest, positive
 from ..problem.shapes import LoadCase, Quantity, Shape
+from ..reference.limits import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
 from ..springs.identification import Case
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
@@ -38,6 +39,7 @@ from .shape_meshes import check_meshed
 from .sheet import Loading, OwnDefinition, Sheet, Solution, chosen, solved
 
 if TYPE_CHECKING:
+    from ..reference.finite_strain import FiniteStrainSolution
     from ..reference.shapes import ShapeReference
     from ..reference.small_strain import ReferenceSolution
 
@@ -155,13 +157,22 @@ class BeamStatement:
         """Quantities of interest where there are none."""
         return {"displacement": np.nan}
 
-    def reference(self, sheet: Sheet) -> "ReferenceSolution":
-        """Converged finite-element solution."""
+    def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ReferenceSolution | FiniteStrainSolution":
+        """Converged finite-element solution, in small strain or of the material's law at finite strain."""
+        if finite_strain:
+            return _solve_finite(self.beam, self.material, self.force, self.kind, self.follower)
         return unit_reference(self.beam, self.material, self.kind, self.force)
 
-    def reference_values(self, sheet: Sheet) -> dict[str, float]:
+    def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
         """Quantities of interest of the reference."""
-        return {"displacement": self.reference(sheet).displacement}
+        return {"displacement": self.reference(sheet, finite_strain).displacement}
+
+    def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
+        """Why the reference does not apply to networks of nonlinear kinematics; empty where it does."""
+        if finite_strain:
+            return ""
+        found = unit_reference(self.beam, self.material, self.kind, self.force)
+        return beyond_linear(found.rotation, found.strain)
 
 
 class ShapeStatement:
@@ -384,8 +395,8 @@ class ShapeStatement:
         """Quantities of interest where there are none."""
         return dict.fromkeys((one.name for one in self.case.quantities), np.nan)
 
-    def reference(self, sheet: Sheet) -> "ShapeReference":
-        """Converged finite-element solution, once for all scenes of a sheet."""
+    def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ShapeReference":
+        """Converged finite-element solution, once for all scenes of a sheet; of shapes there is small strain alone."""
         case = self.shape.loads[self.load]
         # The shape is kept with it: what is no longer there leaves its number to others.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items())
@@ -399,9 +410,15 @@ class ShapeStatement:
         found: ShapeReference = sheet.references[key, self.scale][1]
         return found
 
-    def reference_values(self, sheet: Sheet) -> dict[str, float]:
-        """Quantities of interest of the reference."""
-        return dict(self.reference(sheet).values)
+    def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
+        """Quantities of interest of the reference; NaN where that is none of what is asked for."""
+        values = dict(self.reference(sheet).values)
+        return dict.fromkeys(values, np.nan) if finite_strain and self.objection(sheet) else values
+
+    def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
+        """Why the reference does not apply to networks of nonlinear kinematics; empty where it does."""
+        found = self.reference(sheet)
+        return beyond_linear(found.rotation, found.strain)
 
 
 Statement = BeamStatement | ShapeStatement
@@ -474,6 +491,17 @@ def _solve_unit(aspect_ratio: float, nu: float, kind: LoadKind) -> "ReferenceSol
     from ..reference.small_strain import solve_unit  # here, since finite elements take half a second to import
 
     return solve_unit(aspect_ratio, nu, kind)
+
+
+@lru_cache(maxsize=32)
+def _solve_finite(
+    beam: Beam, material: Material, force: float, kind: LoadKind, follower: bool
+) -> "FiniteStrainSolution":
+    from ..reference.finite_strain import solve_neo_hooke, solve_yeoh  # here: as of `_solve_unit`
+
+    if isinstance(material, Rubber):
+        return solve_yeoh(beam, material, force, kind, follower)
+    return solve_neo_hooke(beam, material, force, kind, follower=follower)
 
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":

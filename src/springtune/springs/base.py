@@ -107,6 +107,9 @@ class Definition(Declared):
         What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
     anisotropic : bool
         Whether it takes materials that are not isotropic; others need Young's modulus and Poisson's ratio.
+    finite_strain : bool
+        Whether it has the material's law at finite strain, so that in nonlinear kinematics its error is against a
+        reference of that law.
 
     Examples
     --------
@@ -123,6 +126,7 @@ class Definition(Declared):
     uniaxial: bool = False
     needs: str = ""
     anisotropic: bool = False
+    finite_strain: bool = False
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh.
@@ -198,6 +202,7 @@ def definition(
     uniaxial: bool = False,
     needs: str = "",
     anisotropic: bool = False,
+    finite_strain: bool = False,
 ) -> Callable[[Function], Function]:
     """Declare a function to be a definition, by a decorator that returns it as it is.
 
@@ -207,7 +212,7 @@ def definition(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels: a number between those of its neighbours; at the end without.
-    uniform, cells, uniaxial, needs, anisotropic
+    uniform, cells, uniaxial, needs, anisotropic, finite_strain
         As of `Definition`.
 
     Returns
@@ -240,7 +245,9 @@ def definition(
             raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
         if needs not in NEEDS:
             raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        DEFINITIONS.declare(Definition(name, function, order, uniform, tuple(cells), uniaxial, needs, anisotropic))
+        DEFINITIONS.declare(
+            Definition(name, function, order, uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain)
+        )
         return function
 
     return declare

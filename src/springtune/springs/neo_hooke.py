@@ -24,7 +24,7 @@ from ..problem.materials import Material
 from .base import Springs, definition, triangles_only, zero
 
 
-@definition("neo-hooke", order=240, cells=(3,))
+@definition("neo-hooke", order=240, cells=(3,), finite_strain=True)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of zero rest length and areas: equal to linear triangles of neo-Hookean rubber, any nu, any strain.
 

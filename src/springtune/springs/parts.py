@@ -256,6 +256,13 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
         given = [one for one in own if one is not None]
         if part.name in CELL_FIELDS or not given or not isinstance(given[0], np.ndarray):
             continue
+        if part.name == "largest":  # a range of data, not a modulus
+            own = [np.broadcast_to(one, len(where)) for one, (_, where, _) in zip(own, parts)]
+            moduli[part.name] = np.concatenate(own)[order]
+            continue
+        if part.name == "coefficients":  # of laws with fewer terms the others are zero
+            most = max(one.shape[1] for one in given)
+            own = given = [np.pad(one, ((0, 0), (0, most - one.shape[1]))) for one in given]
         # What an energy has besides its cells is in proportion to its stiffness; a part may lack it.
         full = [np.zeros((len(where), *given[0].shape[1:])) for _, where, _ in parts]
         scaled = [none if one is None else scale * one for one, none, (_, _, scale) in zip(own, full, parts)]

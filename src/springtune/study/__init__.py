@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from ..registry import NAME, NAME_RULE
 from .checks import check_counts, check_definitions, check_meshes, check_names
 from .config import StudyConfig, expected_value, json_schema, sections, study_model
-from .expand import Declared, build, expand, files_of_meshes
+from .expand import Declared, build, expand, files_of_meshes, files_of_tests
 from .messages import Key, Problems, StudyError, show
 from .model import CurveSpec, MeshSpec, Reference, SceneSpec, Study, StudyKind
 from .rows import with_rows
@@ -69,6 +69,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
     for kind in kinds:
         kind.check(config, problems)
     problems.stop()
+    test_files = files_of_tests(config, beside, problems)
     mesh_files = files_of_meshes(config, beside, problems)
     grids = expand(config, mesh_files, problems)
     check_meshes(config, content, grids, problems)
@@ -77,6 +78,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
     problems.stop()
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
+    about["test_files"] = test_files
     return build(config, grids, kinds, problems, about)
 
 

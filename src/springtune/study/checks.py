@@ -41,7 +41,8 @@ def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, n
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
     """A material of beams: one that the study declares, and isotropic."""
     check_known(problems, path, "material", name, config.materials)
-    if name in config.materials and config.materials[name].young_modulus is None:
+    given = config.materials[name] if name in config.materials else None
+    if given and given.young_modulus is None and given.uniaxial_test is None:
         problems.add(
             path,
             f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are; put the sheet "

@@ -1,6 +1,7 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
@@ -8,7 +9,7 @@ from pydantic.fields import FieldInfo
 
 from ..mesh import MESH_TYPES
 from ..problem.loads import LOADS
-from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material
+from ..problem.materials import MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
 from ..problem.quantities import nearest
 from .fields import (
     Angle,
@@ -42,6 +43,7 @@ from .fields import (
     Stiffness,
     Stress,
     Stresses,
+    Terms,
     Text,
     one_of,
 )
@@ -124,8 +126,13 @@ MATERIAL_FORMS = (
     ("young_modulus", "poisson_ratio"),
     ("young_modulus_x", "young_modulus_y", "poisson_ratio_xy", "shear_modulus"),
     ("stiffness",),
+    ("uniaxial_test",),
 )
 """Keys that say what a material is: those of one form go together, and no other's with them."""
+
+
+OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
+"""Keys that only a material with a test has."""
 
 
 def _one_form(schema: dict[str, Any]) -> None:
@@ -133,11 +140,12 @@ def _one_form(schema: dict[str, Any]) -> None:
 
 
 class MaterialConfig(Section):
-    """A linearly elastic material, in one of three forms.
+    """A material, in one of four forms.
 
     Isotropic: `young_modulus` and `poisson_ratio`. Orthotropic, such as a ply of fibres: `young_modulus_x`,
     `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, turned by `angle`, or a laminate of
-    such plies. Of any anisotropy: `stiffness`. Only an isotropic one can be a beam's.
+    such plies. Of any anisotropy: `stiffness`. Rubber: `uniaxial_test`, to which Yeoh's law is fitted; what knows
+    small strain alone takes the law's initial modulus, and nu = 0.5. Beams are of isotropic ones or of rubber.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_one_form)
@@ -158,6 +166,20 @@ class MaterialConfig(Section):
         "are the plies of a laminate, of one thickness and symmetric stacking.",
     )
     stiffness: StiffnessConfig | None = Field(None, description="Its constants in plane stress.")
+    uniaxial_test: FileName | None = Field(
+        None,
+        description="CSV file of a uniaxial test of rubber, its path relative to the study's folder: stretch and "
+        "nominal stress under a head such as `stretch,nominal stress [MPa]`. Definition `yeoh` has its law.",
+    )
+    terms: Terms | None = Field(
+        None, description="Terms of the law that is fitted to the test; 3 without, with 1 it is neo-Hooke's."
+    )
+    equibiaxial_test: FileName | None = Field(
+        None, description="Such a file of an equibiaxial test, which the law is compared with."
+    )
+    pure_shear_test: FileName | None = Field(
+        None, description="Such a file of a test in pure shear, which the law is compared with."
+    )
     density: Density | None = Field(None, description="Density rho; for dynamics, statics need none.")
 
     @model_validator(mode="after")
@@ -166,21 +188,37 @@ class MaterialConfig(Section):
         keys = [keys for keys in given if keys]
         if len(keys) > 1:
             both = f"both '{keys[0][0]}' and '{keys[1][0]}', which are of two forms; a material is isotropic"
-            raise refuse(f"{both}, orthotropic or has a stiffness: keep the keys of one", keys[1][0])
+            raise refuse(f"{both}, orthotropic, has a stiffness or a test: keep the keys of one", keys[1][0])
         form = next((form for form, own in zip(MATERIAL_FORMS, given) if own), MATERIAL_FORMS[0])
         if self.angle is not None and form is not MATERIAL_FORMS[1]:
             raise refuse("turns the axes of an orthotropic material, and this is none; remove it", "angle")
+        for key in OF_A_TEST:
+            if getattr(self, key) is not None and form is not MATERIAL_FORMS[3]:
+                raise refuse("goes with a 'uniaxial_test', and this material has none; remove it", key)
         for key in form:
             if getattr(self, key) is None:
                 raise refuse(f"'{key}' is missing; give {expected_value(type(self).model_fields[key])}", key)
+        if self.uniaxial_test is not None:
+            return self  # files are read by who knows where they are
         try:
             self.material("material")
         except ValueError as error:
             raise refuse(str(error).removeprefix("material 'material': ")) from None
         return self
 
-    def material(self, name: str) -> AnyMaterial:
-        """The material."""
+    def material(self, name: str, folder: Path = Path()) -> AnyMaterial:
+        """The material; the names of its files are seen from a folder. ValueError where a file is no test."""
+        if self.uniaxial_test is not None:
+            from ..problem.rubber import fit_rubber  # here: few studies need it
+
+            others = {"equibiaxial": self.equibiaxial_test, "pure_shear": self.pure_shear_test}
+            return fit_rubber(
+                folder / self.uniaxial_test,
+                **{key: folder / file for key, file in others.items() if file is not None},
+                terms=self.terms or MOST_TERMS,
+                density=self.density,
+                name=name,
+            )
         if self.young_modulus is not None and self.poisson_ratio is not None:
             return Material(self.young_modulus, self.poisson_ratio, self.density, name)
         if self.stiffness is not None:
@@ -424,7 +462,8 @@ class StudyConfig(Section):
         [],
         description="References at finite strain besides the small-strain one, for every beam, material and load: in "
         "the group `/finite_strain` with the networks' errors, and under pressure in `/block`, too. They take seconds "
-        "each. An incompressible material has none in plane strain.",
+        "each. An incompressible material has none in plane strain. A material with a `uniaxial_test` has "
+        "'yeoh-plane-stress', of the law that is fitted to it, and no other has.",
     )
     limits: LimitsConfig = Field(default_factory=LimitsConfig, description="What one scene may take.")
     printed: FileName | None = Field(

@@ -10,7 +10,7 @@ from ..mesh import MESH_TYPES
 from ..mesh.formats import LARGEST_FILE
 from ..problem.geometry import Beam
 from ..problem.loads import KINEMATICS, LOADS
-from ..problem.materials import AnyMaterial, Material, only_isotropic
+from ..problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from ..problem.parameters import SWEPT
 from ..springs import DEFINITIONS
 from ..springs.lattice import COEFFICIENT
@@ -42,7 +42,7 @@ Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> MeshFiles:
     """Meshes from files by (mesh type, beam's name, mesh size)."""
     found: MeshFiles = {}
-    beams = declared(config).beams
+    beams = declared(config, folder).beams
     for name, rows in (config.mesh_files or {}).items():
         for number, row in enumerate(rows):
             path, label = folder / row.file, (name, row.beam, row.mesh_size)
@@ -55,6 +55,22 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
             found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
+
+
+def files_of_tests(config: StudyConfig, folder: Path, problems: Problems) -> tuple[Path, ...]:
+    """Files of tests that materials are fitted to or compared with, each read once to see what is wrong with it."""
+    found: list[Path] = []
+    for name, material in config.materials.items():
+        own = [getattr(material, key) for key in ("uniaxial_test", "equibiaxial_test", "pure_shear_test")]
+        if not material.uniaxial_test:
+            continue
+        try:
+            material.material(name, folder)
+        except ValueError as error:
+            problems.add(("materials", name), str(error))
+        found += [folder / file for file in own if file is not None]
+    problems.stop()
+    return tuple(found)
 
 
 def file_fault(path: Path) -> str:
@@ -101,7 +117,7 @@ def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
     """
     return Declared(
         {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
-        {name: material.material(name) for name, material in config.materials.items()},
+        {name: material.material(name, folder) for name, material in config.materials.items()},
         folder,
     )
 
@@ -174,8 +190,8 @@ def swept(config: StudyConfig) -> tuple[str, ...]:
 class _Bodies:
     """Beams, materials and meshes of a study's combinations, each made once."""
 
-    def __init__(self, config: StudyConfig, mesh_files: MeshFiles) -> None:
-        self._declared, self._files = declared(config), mesh_files
+    def __init__(self, config: StudyConfig, mesh_files: MeshFiles, folder: Path) -> None:
+        self._declared, self._files = declared(config, folder), mesh_files
         self._beams: dict[tuple[str, float | None], Beam] = {}
         self._materials: dict[tuple[str, float | None, float | None], Material] = {}
         self._meshes: dict[tuple[Beam, str, float], MeshSpec | None] = {}
@@ -194,7 +210,8 @@ class _Bodies:
         if key not in self._materials:
             own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
             material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
-            self._materials[key] = replace(material, **own)
+            # Moduli of rubber are those of its law: who asks for others is told so.
+            self._materials[key] = material if isinstance(material, Rubber) else replace(material, **own)
         return self._materials[key]
 
     def mesh(self, beam: Beam, one: Combination) -> MeshSpec | None:
@@ -216,7 +233,7 @@ def _force(pressure: float, beam: Beam) -> float:
 
 def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Grids with their scenes and curves."""
-    bodies, several = _Bodies(config, mesh_files), "force" in swept(config)
+    bodies, several = _Bodies(config, mesh_files, problems.folder), "force" in swept(config)
     forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
     for name, grid in config.grids.items():
@@ -225,6 +242,14 @@ def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tu
         absent = set()
         for one in combinations(name, grid, problems):
             beam, material, load = bodies.beam(one), bodies.material(one), one["load"]
+            if isinstance(material, Rubber):
+                for key in ("young_modulus", "poisson_ratio"):
+                    if key in one:
+                        problems.add(
+                            ("grids", name, key),
+                            f"material '{material.name}' has a uniaxial_test, which says its moduli; take it out of "
+                            "this grid, or remove the key",
+                        )
             magnitude = _force(one["pressure"], beam) if "pressure" in one else one["force"]
             if not several:
                 other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))

@@ -11,6 +11,7 @@ from pydantic_core import CoreSchema, core_schema
 from .. import units
 from ..mesh import MESH_TYPES
 from ..problem.loads import KINEMATICS, LOADS
+from ..problem.materials import MOST_TERMS
 from ..problem.quantities import beyond, nearest
 from ..registry import NAME, NAME_RULE
 from ..springs import DEFINITIONS
@@ -147,6 +148,7 @@ SignedStress = Annotated[float, signed("stress")]
 OrthotropicRatio = Annotated[float, number("a number such as 0.3", -100, 100)]
 PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0, 0.5)]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
+Terms = Annotated[int, number(f"a whole number from 1 to {MOST_TERMS}", 1, MOST_TERMS, whole=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
 MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")

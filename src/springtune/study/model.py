@@ -17,7 +17,10 @@ from .messages import Problems
 FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 """Reference of sheets at finite strain: networks of nonlinear kinematics are compared with it where a study has it."""
 
-FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, "neo-hooke-plane-strain")
+TESTED_REFERENCE = "yeoh-plane-stress"
+"""The same of materials that have a uniaxial test: by the law that is fitted to it."""
+
+FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, "neo-hooke-plane-strain", TESTED_REFERENCE)
 """Kinds of reference besides the small-strain one."""
 
 
@@ -225,6 +228,8 @@ class Study:
         Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
     swept : tuple of str
         Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
+    test_files : tuple of Path
+        Of the tests of rubber that materials are fitted to or compared with.
     """
 
     name: str
@@ -249,6 +254,7 @@ class Study:
     printed_path: Path | None
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()
+    test_files: tuple[Path, ...] = ()
 
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...jobs import store
 from ...problem.geometry import Beam
-from ...problem.materials import Material
+from ...problem.materials import material_of
 from ...problem.status import Status
 from . import measure as benchmark
 
@@ -58,7 +58,7 @@ def _hole(task, why):
 
 
 def _case(task):
-    scene = benchmark.LoadedBeam(Beam(**task["beam"]), Material(**task["material"]), task["load"], task["force"])
+    scene = benchmark.LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
     second = Beam(**task["second_beam"]) if task["second_beam"] else None
     limits = task["most_seconds"], task["thorough"], task["most_thorough"]
     found = benchmark.run(scene, task["approaches"], task["mesh_sizes"], *limits, second)

@@ -6,7 +6,7 @@ from functools import partial
 
 from ...jobs import store
 from ...problem.geometry import Strip, Trapezoid
-from ...problem.materials import Material
+from ...problem.materials import material_of
 from ...problem.status import Status
 from ...springs import DefinitionError
 from .cost import cost_units
@@ -54,8 +54,8 @@ def _hole(why):
 def _lay(task):
     try:
         found = lay(
-            Strip(**task["strip"]), Trapezoid(**task["trapezoid"]), Material(**task["material"]),
-            Material(**task["support"]), task["definition"], task["mesh_size"], loading=task["loading"],
+            Strip(**task["strip"]), Trapezoid(**task["trapezoid"]), material_of(task["material"]),
+            material_of(task["support"]), task["definition"], task["mesh_size"], loading=task["loading"],
             pressure=task["pressure"], friction=task["friction"],
         )  # fmt: skip
     except DefinitionError as error:

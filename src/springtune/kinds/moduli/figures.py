@@ -308,10 +308,14 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     lines = labels.wrapped(f"{title}: deformation error [%] on the finest mesh solved", wide - 0.1, 8.5)
     style.arrange(figure, axes, left=left, right=0.62, bottom=bottom, top=0.35 + 0.14 * labels.lines_of(lines),
                   across=0.08, title=lines)  # fmt: skip
+    doubted = False
     for panel, material in zip(axes[0], materials):
         cells = root.sel(material=material)
+        beyond = cells.reference_applies == 0 if "reference_applies" in cells else cells.status < 0
+        beyond = beyond.any([name for name in beyond.dims if name != "load"]).values
         image = _heat(panel, *(cells[name].transpose("mesh_size", "definition", "load").values
-                               for name in ("deformation_error", "status")))  # fmt: skip
+                               for name in ("deformation_error", "status")), beyond)  # fmt: skip
+        doubted |= bool(beyond.any())
         panel.set_xticks(range(len(loads)), loads)
         panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
         panel.set_yticks(range(len(names)), names)
@@ -323,6 +327,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
         flags = root.status.values
         said = ["×: no result"] * bool((flags > 1).any()) + ["–: not asked for"] * bool((flags == 0).any())
+        said += ["*: beyond small strain"] * doubted
         figure.text(0.05 / width, 0.05 / height, "; ".join(said), fontsize=style.SMALL, color="0.25")
     return axes[0]
 
@@ -331,8 +336,8 @@ CELL_WIDTH = 0.3
 """Width that the number in a cell needs [inch]."""
 
 
-def _heat(panel, errors, flags):
-    """Draw errors by definition and load, each with its number: an image."""
+def _heat(panel, errors, flags, beyond):
+    """Draw errors by definition and load, each with its number, marked beyond small strain: an image."""
     error = np.full(errors.shape[1:], np.nan)
     for values in 100 * errors[::-1]:  # the finest mesh that each was solved on stays
         error = np.where(np.isfinite(values), values, error)
@@ -342,6 +347,7 @@ def _heat(panel, errors, flags):
     for row, column in np.ndindex(error.shape):
         size = abs(error[row, column])
         text = f"{error[row, column]:+.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
+        text += "*" * bool(beyond[column])
         if np.isnan(size):
             text = "×" if asked[row, column] else "–"
         colour = "white" if shade[row, column] > 1.2 else "0.5" if text == "–" else "k"

@@ -143,7 +143,22 @@ def decision(tree: xr.DataTree) -> str:
         if lines:
             parts += [f"### Mesh type `{mesh_type}`", "", *lines, ""]
     cells = _paper_cells(root)
-    return "\n".join(parts + (["### The paper's cells", "", *cells, ""] if cells else []))
+    parts += ["### The paper's cells", "", *cells, ""] if cells else []
+    return "\n".join(parts + _beyond(root))
+
+
+def _beyond(root):
+    """Scenes of these tables whose reference does not apply; nothing without any."""
+    here = root.sel(kinematics=most_requested(root, "kinematics"))
+    if "reference_applies" not in here:
+        return []
+    place = ("material", "load")
+    beyond = (here.reference_applies == 0) & (here.status == 1)
+    beyond = beyond.any([name for name in beyond.dims if name not in place]).transpose(*place)
+    if not beyond.any():
+        return []
+    named = "; ".join(f"{here.material.values[i]}, {here['load'].values[j]}" for i, j in np.argwhere(beyond.values))
+    return [f"Beyond small strain, where errors hold more than the network's own: {named}.", ""]
 
 
 def _materials(root, beam):

@@ -143,6 +143,13 @@ def _check(config, problems):
         check_known(problems, (*path, "beam"), "beam", section.beam, config.beams)
         check_beam_material(problems, (*path, "material"), section.material, config)
         _check_definitions(section, path, problems)
+        material = config.materials.get(section.material)
+        if material and material.uniaxial_test and section.parameter in ("young_modulus", "poisson_ratio"):
+            problems.add(
+                (*path, "material"),
+                f"'{section.material}' has a uniaxial_test, which says its moduli; vary another parameter, or take "
+                "another material",
+            )
         for made in MADE:
             given = getattr(section, made) is not None
             if given and made == section.parameter:

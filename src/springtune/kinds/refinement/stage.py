@@ -15,7 +15,7 @@ from ...jobs import store
 from ...problem.compare import deformation_error
 from ...problem.geometry import Beam
 from ...problem.loads import LOAD_KINDS
-from ...problem.materials import Material
+from ...problem.materials import material_of
 from ...problem.status import Status
 from ...reference.limits import beyond_linear
 from ...reference.similarity import unit_problem, unit_scales
@@ -100,7 +100,7 @@ class _Solver:
             replace(body, **{name: given[name] for name in names if name in given})
             for body, names in (
                 (Beam(**task["beam"]), ("thickness",)),
-                (Material(**task["material"]), ("young_modulus", "poisson_ratio")),
+                (material_of(task["material"]), ("young_modulus", "poisson_ratio")),
             )
         )
         force, kind = task["force"] * given["force"], LOAD_KINDS[task["kind"]]

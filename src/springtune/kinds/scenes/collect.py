@@ -9,6 +9,7 @@ from ...output.selection import OF_FIELDS
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.compare import deformation_error
 from ...problem.loads import LOADS
+from ...problem.materials import Rubber
 from ...problem.status import Status
 from ...reference.field import interpolate, outline
 from ...reference.limits import objection
@@ -88,7 +89,8 @@ def groups(study, folder):
 
 
 def _bodies(study, root):
-    """Materials and beams."""
+    """Materials and beams; what rubber was fitted by, and how well, beside its modulus."""
+    fits = {}
     for material in {scene.material for scene in study.scenes}:
         values = {
             "material_young_modulus": material.young_modulus,
@@ -97,6 +99,15 @@ def _bodies(study, root):
         }
         labels = {"young_modulus": material.young_modulus, "poisson_ratio": material.poisson_ratio}
         root.put(values, material=material.name, **labels)
+        if isinstance(material, Rubber):
+            fits[material.name] = material
+    if fits:
+        root.data.material_young_modulus.attrs["comment"] = "; ".join(
+            f"{name}: Yeoh's law of {', '.join(f'{c:.6g}' for c in law.coefficients)} Pa, fitted to a uniaxial test; "
+            "root mean square of its relative errors "
+            + ", ".join(f"{100 * error:.2g} % ({test})" for test, error in law.errors.items())
+            for name, law in sorted(fits.items())
+        )
     for beam in {scene.mesh.beam for scene in study.scenes}:
         body = {"beam_length": beam.length, "beam_height": beam.height, "beam_thickness": beam.thickness}
         root.put(body, beam=beam.name, thickness=beam.thickness)

@@ -9,8 +9,8 @@ from ...output.dataset import NO_NODE, STATUS
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
 from ...problem.loads import LOADS
 from ...problem.parameters import with_unit
-from ...study.model import FINITE_STRAIN_REFERENCE
 from ..base import distinct
+from .lawful import of_own_law, own_law
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
@@ -309,9 +309,10 @@ def like_with_like(data):
     """
     root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
-    if finite is None or FINITE_STRAIN_REFERENCE not in finite.reference.values:
+    finite = None if finite is None else of_own_law(finite)
+    if finite is None:
         return root
-    errors = finite.deformation_error.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
+    errors = finite.deformation_error
     errors = root.deformation_error.where(root.kinematics == "linear", errors).transpose(*root.deformation_error.dims)
     return root.assign(deformation_error=errors).assign_attrs(finite_strain=True)
 
@@ -807,11 +808,13 @@ def _profile(panel, block, root, load):
     x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])
-    finite = FINITE_STRAIN_REFERENCE in block.reference.values and bool(
-        of_networks.sel(kinematics=of_networks.kinematics != "linear").any()
-        and pressed.reference_face_profile.sel(reference=FINITE_STRAIN_REFERENCE).notnull().any()
+    law = own_law(pressed, "reference_face_profile")
+    finite = bool(
+        law
+        and np.isfinite(pressed.reference_face_profile.sel(reference=law).values).any()
+        and of_networks.sel(kinematics=of_networks.kinematics != "linear").any()
     )
-    kind = FINITE_STRAIN_REFERENCE if finite else str(block.reference.values[0])
+    kind = law if finite else str(block.reference.values[0])
     panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)", pad=13)
     profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
     if np.isfinite(profile).any():

@@ -278,7 +278,8 @@ def _references(study, folder, groups):
                 "material": material_key(one.material),
                 "force": one.force,
                 "load": LOADS[one.load].kind.name,
-                "plane": kind.rpartition("-")[2],
+                "law": kind.partition("-plane-")[0],
+                "plane": kind.partition("-plane-")[2],
                 "follower": LOADS[one.load].follower,
             }
             for one, kind in references

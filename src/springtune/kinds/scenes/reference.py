@@ -10,9 +10,13 @@ from pathlib import Path
 from ...jobs import store
 from ...problem.geometry import Beam
 from ...problem.loads import LOAD_KINDS
-from ...problem.materials import Material
+from ...problem.materials import Rubber, material_of
 from ...reference.small_strain import ReferenceNotConvergedError, solve_unit
 from . import stored_interpolant
+
+NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
+OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
+"""Why a material has no reference of the other law."""
 
 
 def run(tasks, spent):
@@ -23,9 +27,10 @@ def run(tasks, spent):
     tasks : dict
         ``folder``, ``references``, each with ``key`` and ``problem``, what
         `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
-        with ``key, beam, material, force, load, plane, follower``, where ``load`` is the name of the kind. There may be
-        ``interpolants``, each with ``key``, ``kind``, by name, ``box`` (of aspect ratios and Poisson's ratios) and
-        ``problems``, the two ratios of each unit problem that is asked of it, by its own key.
+        with ``key, beam, material, force, load, law, plane, follower``, where ``load`` is the name of the kind and
+        ``law`` ``"neo-hooke"`` or ``"yeoh"``. There may be ``interpolants``, each with ``key``, ``kind``, by name,
+        ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two ratios of each unit problem that is
+        asked of it, by its own key.
     spent : Spent
         What tasks cost is added to it.
     """
@@ -77,11 +82,17 @@ def _unit(task):
 def _finite(task):
     """Result at finite strain."""
     # Here, since few studies need it.
-    from ...reference.finite_strain import FiniteStrainError, IncompressibleError, solve_neo_hooke
+    from ...reference.finite_strain import FiniteStrainError, IncompressibleError, solve_neo_hooke, solve_yeoh
 
-    beam, material, kind = Beam(**task["beam"]), Material(**task["material"]), LOAD_KINDS[task["load"]]
+    beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
+    tested = isinstance(material, Rubber)
+    if tested != (task["law"] == "yeoh"):
+        return {"message": f"material {OF_TESTED if tested else NOT_TESTED}"}
     try:
-        solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
+        if tested:
+            solution = solve_yeoh(beam, material, task["force"], kind, task["follower"])
+        else:
+            solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
     except (FiniteStrainError, IncompressibleError) as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")

@@ -10,7 +10,7 @@ import numpy as np
 from ...jobs import sealed, store
 from ...problem.boundary import FACE_POSITIONS
 from ...problem.loads import LOAD_KINDS
-from ...problem.materials import Material
+from ...problem.materials import material_of
 from ...problem.status import Status
 from ...reference.field import field_error, interpolate
 from ...scene.sheet import Sheet, definition_of
@@ -173,7 +173,7 @@ def _solved(sheet, scene, reference, calibration):
     field = reference(scene["reference"]) if reference and "reference" in scene else None
     kind, force, kinematics = LOAD_KINDS[scene["kind"]], scene["force"], scene["kinematics"]
     definition = definition_of(scene["definition"])
-    springs, seconds = sheet.derive(definition, Material(**scene["material"]), stiffness, (kind, force, field))
+    springs, seconds = sheet.derive(definition, material_of(scene["material"]), stiffness, (kind, force, field))
     if "stiffness_scale" in scene:
         springs = replace(springs, reference=scene["stiffness_scale"] * springs.reference)
     solution = sheet.solve(kind, springs, force, kinematics, scene["follower"])

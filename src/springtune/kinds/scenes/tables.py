@@ -6,7 +6,7 @@ from ...output.dataset import STATUS
 from ...output.tables import cells_with_values
 from ...problem.loads import LOADS
 from ...problem.parameters import SWEPT
-from ...study.model import FINITE_STRAIN_REFERENCE
+from .lawful import of_own_law, own_law
 from .outputs import TABLE, stem
 
 ROW = ("beam", "mesh_size")
@@ -44,9 +44,9 @@ def _selections(root):
 def _finite(tree):
     """References at finite strain, and errors of networks of nonlinear kinematics against them; None without any."""
     found = tree["finite_strain"].to_dataset() if "finite_strain" in tree else None
-    if found is None or FINITE_STRAIN_REFERENCE not in found.reference.values:
+    found = None if found is None else of_own_law(found)
+    if found is None:
         return None
-    found = found.sel(reference=FINITE_STRAIN_REFERENCE, drop=True)
     names = ("reference_displacement", "deformation_error", "reference_message")
     return found[list(names)].rename({name: f"finite_{name}" for name in names})
 
@@ -151,9 +151,10 @@ def _finite_strain(finite, root):
             }
         )
     note = (
-        "Networks of nonlinear kinematics against neo-Hookean finite elements. At finite strain an error holds the "
-        "difference of two material laws; where a slender beam turns and hardly stretches, it does not. Networks are "
-        "in plane stress: an error against plane strain holds that difference, too."
+        "Networks of nonlinear kinematics against finite elements of rubber: neo-Hookean ones, or of the law that is "
+        "fitted to a uniaxial test. At finite strain an error holds the difference of two material laws, where "
+        "there are two; where a slender beam turns and hardly stretches, it does not. Networks are in plane "
+        "stress: an error against plane strain holds that difference, too."
     )
     lacking = [text for text in np.unique(finite.reference_message.values.astype(str)) if text]
     note += "".join(f" No reference: {text}." for text in lacking)
@@ -167,8 +168,8 @@ def _block(block, root):
     swept = [name for name in SWEPT if name in block.face_displacement.dims]
     for place in cells_with_values(block.face_displacement, (*dimensions, *swept)):
         cell = block.sel(place)
-        finite = place["kinematics"] != "linear" and FINITE_STRAIN_REFERENCE in cell.reference.values
-        reference = cell.sel(reference=FINITE_STRAIN_REFERENCE) if finite else cell.isel(reference=0)
+        law = own_law(cell, "reference_face_displacement") if place["kinematics"] != "linear" else None
+        reference = cell.sel(reference=law) if law else cell.isel(reference=0)
         rows.append(
             {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
             | {"reference": str(reference.reference.values)}

@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 from math import isfinite
 from typing import Any
 
-from ...problem.materials import AnisotropicMaterial, AnyMaterial, Material
+from ...problem.materials import AnyMaterial, material_of
 from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
 UNNAMED, ONE_LOAD = "shape", "load"
@@ -157,7 +157,4 @@ def _pair(values: Any) -> tuple[float, float]:
 
 def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, AnyMaterial]:
     """Materials by part, of what `springtune.jobs.keys.material_key` gives of each."""
-    return {
-        part: Material(**one) if "young_modulus" in one else AnisotropicMaterial(**one)
-        for part, one in described.items()
-    }
+    return {part: material_of(one) for part, one in described.items()}

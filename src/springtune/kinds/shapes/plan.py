@@ -93,7 +93,8 @@ def scene_task(part, one, kept=()):
     """Task of a scene."""
     task = _case(part, one.shape, one.material, one.load)
     task |= {"definition": one.definition, "kinematics": one.kinematics}
-    code = stage_key("kinds.shapes.solve"), definition_key(one.definition)
+    # Scenes of shapes have no reference at finite strain.
+    code = stage_key("kinds.shapes.solve", without=("reference.finite_strain",)), definition_key(one.definition)
     key = hash_of(mesh_key(part, one), task, code)
     return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
 

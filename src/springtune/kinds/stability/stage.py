@@ -7,7 +7,7 @@ import numpy as np
 
 from ...jobs import store
 from ...problem.geometry import Beam
-from ...problem.materials import Material
+from ...problem.materials import material_of
 from . import experiments as stability
 
 
@@ -51,7 +51,7 @@ def _hole(why):
 
 def _experiment(task):
     setup = stability.Setup(
-        Beam(**task["beam"]), Material(**task["material"]), task["force"], task["definition"], task["mesh_type"],
+        Beam(**task["beam"]), material_of(task["material"]), task["force"], task["definition"], task["mesh_type"],
         tuple(task["mesh_sizes"]),
     )  # fmt: skip
     begin = time.perf_counter()

@@ -1,0 +1,261 @@
+"""Tests of rubber as a testing machine writes them, and Yeoh's law fitted to one: see `fit_rubber`."""
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
+from .quantities import positive
+
+LEAST_SHARE = 0.05
+"""Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
+
+CHECKED = 400
+"""Stretches of each test over the range of the data at which a fitted law has to be stable."""
+
+FIT_DIGITS = 10
+"""Digits of what is fitted."""
+
+TWO_COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa]'"
+
+
+class TestDataError(ValueError):
+    """A test that no law can be fitted to; the message says why and what to do."""
+
+    __test__ = False  # to pytest
+
+
+@dataclass(frozen=True, eq=False)
+class TensileTest:
+    """A tensile test of rubber, uniaxial, equibiaxial or in pure shear: nominal stress over stretch.
+
+    Attributes
+    ----------
+    stretch : ndarray of float, shape (n,)
+        Length over the one at rest [1], ascending.
+    stress : ndarray of float, shape (n,)
+        Force over the cross-section at rest [Pa].
+    name : str
+        What it is called in messages.
+
+    Raises
+    ------
+    TestDataError
+        If there are fewer than three points at different stretches, or one with a stress of the wrong sign.
+    """
+
+    stretch: np.ndarray
+    stress: np.ndarray
+    name: str = "test"
+
+    def __post_init__(self) -> None:
+        stretch, stress = np.asarray(self.stretch, float), np.asarray(self.stress, float)
+        if stretch.ndim != 1 or stretch.shape != stress.shape:
+            raise TestDataError(f"{self.name}: stretch and stress have other lengths; give pairs")
+        if not (np.isfinite(stretch).all() and np.isfinite(stress).all() and (stretch > 0).all()):
+            raise TestDataError(f"{self.name}: a stretch or stress is no number, or not above zero; correct the line")
+        order = np.argsort(stretch, kind="stable")
+        stretch, stress = stretch[order], stress[order]
+        told = stretch != 1
+        wrong = told & ((stress > 0) != (stretch > 1))
+        if wrong.any():
+            place = int(np.argmax(wrong))
+            raise TestDataError(
+                f"{self.name}: a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is "
+                "positive, above a stretch of 1; give nominal stress over stretch (1 plus strain), not over strain"
+            )
+        if len(np.unique(stretch[told])) < 3:
+            raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")
+        object.__setattr__(self, "stretch", stretch[told])
+        object.__setattr__(self, "stress", stress[told])
+
+    @classmethod
+    def read(cls, path: str | Path) -> "TensileTest":
+        """Test data of a CSV file: stretch, and nominal stress with its unit in the head of its column.
+
+        Parameters
+        ----------
+        path : str or Path
+            Lines that begin with # are left out.
+
+        Returns
+        -------
+        TensileTest
+
+        Raises
+        ------
+        TestDataError
+            If the file cannot be read, its head has no unit of stress, or a line no two numbers; the message names it.
+
+        Examples
+        --------
+        >>> from springtune.problem.rubber import TensileTest
+        >>> test = TensileTest.read("config/treloar/uniaxial.csv")
+        >>> len(test.stretch), float(test.stretch.max())
+        (24, 7.6)
+        """
+        try:
+            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            why = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error.strerror
+            raise TestDataError(f"'{path}' cannot be read: {why}; {TWO_COLUMNS}") from None
+        rows = [(number, row) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
+                for row in csv.reader([line])]  # fmt: skip
+        if not rows:
+            raise TestDataError(f"'{path}' is empty; {TWO_COLUMNS}")
+        head = rows[0][1]
+        unit = head[1].partition("[")[2].partition("]")[0] if len(head) == 2 else ""
+        if "stretch" not in head[0].lower() or not unit:
+            raise TestDataError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a test; {TWO_COLUMNS}")
+        try:
+            scale = positive(f"1 {unit}", "stress", "nominal stress")
+        except ValueError as error:
+            raise TestDataError(f"'{path}', line {rows[0][0]}: {error}") from None
+        found = []
+        for number, row in rows[1:]:
+            try:
+                stretch, stress = map(float, row)
+            except ValueError:
+                raise TestDataError(
+                    f"'{path}', line {number}: {','.join(row)!r} is not two numbers; correct it"
+                ) from None
+            found.append((stretch, scale * stress))
+        stretches, stresses = np.array(found).reshape(-1, 2).T
+        return cls(stretches, stresses, str(path))
+
+
+def told(test: TensileTest | str | Path) -> TensileTest:
+    """A test, read where its file is given."""
+    return test if isinstance(test, TensileTest) else TensileTest.read(test)
+
+
+def _weights(test: TensileTest) -> np.ndarray:
+    """Of relative errors."""
+    size = np.abs(test.stress)
+    return 1 / np.maximum(size, LEAST_SHARE * size.max())
+
+
+def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
+    """Coefficients of columns that add up to a test's stress, by least squares of relative errors.
+
+    Parameters
+    ----------
+    columns : ndarray of float, shape (n, n_terms)
+        Stress for a coefficient of 1 at each stretch of the test.
+    test : TensileTest
+
+    Returns
+    -------
+    tuple of float
+        To ten digits, so that keys of stored results do not depend on the machine.
+    """
+    weights = _weights(test)
+    scaled = columns * weights[:, None]
+    sizes = np.linalg.norm(scaled, axis=0)
+    found = np.linalg.lstsq(scaled / sizes, test.stress * weights, rcond=None)[0] / sizes
+    return tuple(float(f"{one:.{FIT_DIGITS}g}") for one in found)
+
+
+def relative_error(stress: np.ndarray, test: TensileTest) -> float:
+    """Root mean square of the relative errors of a law's stresses at the stretches of a test [1], to six digits."""
+    return float(f"{np.sqrt(((stress / test.stress - 1) ** 2).mean()):.6g}")
+
+
+def check_terms(terms: object, most: int) -> None:
+    """Refuse what is no number of terms."""
+    if isinstance(terms, bool) or not isinstance(terms, int) or not 1 <= terms <= most:
+        raise ValueError(f"terms: {terms!r} is not a number of terms; give 1 to {most}")
+
+
+def fit_rubber(
+    uniaxial: TensileTest | str | Path,
+    *,
+    equibiaxial: TensileTest | str | Path | None = None,
+    pure_shear: TensileTest | str | Path | None = None,
+    terms: int = MOST_TERMS,
+    density: float | str | None = None,
+    name: str = "rubber",
+) -> Rubber:
+    """Rubber of Yeoh's law, fitted to a uniaxial test, with its errors beside that and other tests.
+
+    Parameters
+    ----------
+    uniaxial : str or Path
+        CSV file of two columns, stretch and nominal stress with its unit in the column's head, such as
+        ``stretch,nominal stress [MPa]``; lines that begin with # are left out. Or a
+        `springtune.problem.rubber.TensileTest`.
+    equibiaxial, pure_shear : str or Path, optional
+        Such files of other tests, which the law is compared with, not fitted to.
+    terms : int, optional
+        1 to 3; with one it is neo-Hooke's law.
+    density : float, str or None
+        [kg/m3]
+    name : str
+
+    Returns
+    -------
+    Rubber
+
+    Raises
+    ------
+    TestDataError
+        If a file cannot be read as a test, by its line, or the fitted law is unstable within the data's range: its true
+        stress has to rise with the stretch in all of the three tests. It is a ValueError.
+    ValueError
+        If the number of terms or the density is out of its range.
+
+    Examples
+    --------
+    Treloar's rubber, its tests as a testing machine writes them:
+
+    >>> import springtune as st
+    >>> folder = "config/treloar"
+    >>> rubber = st.fit_rubber(f"{folder}/uniaxial.csv", equibiaxial=f"{folder}/equibiaxial.csv",
+    ...                        pure_shear=f"{folder}/pure-shear.csv")
+    >>> print([f"{c / 1e6:.3g} MPa" for c in rubber.coefficients], f"E = {rubber.young_modulus / 1e6:.2f} MPa")
+    ['0.167 MPa', '-0.00141 MPa', '4.13e-05 MPa'] E = 1.00 MPa
+    >>> print({test: f"{100 * error:.0f} %" for test, error in rubber.errors.items()})
+    {'uniaxial': '7 %', 'equibiaxial': '23 %', 'pure shear': '7 %'}
+
+    A sheet of it, pulled by the force that stretches it to some twice its length:
+
+    >>> beam = st.Beam("100 mm", "20 mm")
+    >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+    >>> result = st.Scene(beam, mesh, rubber, "traction", "12 N", definition="yeoh").solve()
+    >>> print(f"{result.status}: {1e3 * result.displacement:.0f} mm")
+    solved: 108 mm
+    """
+    test = told(uniaxial)
+    check_terms(terms, MOST_TERMS)
+    q = test.stretch
+    excess = Rubber.excess("uniaxial", q)
+    columns = np.stack([2 * (q - q**-2) * n * excess ** (n - 1) for n in range(1, terms + 1)], axis=1)
+    found = fit(columns, test)
+    if not found[0] > 0:
+        raise TestDataError(f"{test.name}: fits a modulus that is not above zero; give points of small stretches, too")
+    law = Rubber(found, float(f"{excess.max():.{FIT_DIGITS}g}"), (), density, name)
+    _check(law, test.name)
+    data = {"uniaxial": test} | {
+        kind: told(other)
+        for kind, other in (("equibiaxial", equibiaxial), ("pure shear", pure_shear))
+        if other is not None
+    }
+    errors = tuple((kind, relative_error(law.stress(kind, one.stretch), one)) for kind, one in data.items())
+    return replace(law, test_errors=errors)
+
+
+def _check(law: Rubber, name: str) -> None:
+    """Refuse a law whose true stress falls somewhere in the range of I_1 of the data, in one of the tests."""
+    for test in RUBBER_TESTS:
+        most = 1.0
+        while law.excess(test, 1.1 * most) <= law.largest:
+            most *= 1.1
+        q = np.linspace(1, most, CHECKED)
+        falls = np.flatnonzero(np.diff(q * law.stress(test, q)) <= 0)
+        if len(falls):
+            raise TestDataError(
+                f"{name}: the fit of {len(law.coefficients)} terms is unstable: its stress falls in {test} at a "
+                f"stretch of {q[falls[0]]:.3g}; give fewer terms, or more data"
+            )

@@ -1,0 +1,43 @@
+r"""Sheets of rubber that was tested: linear triangles of Yeoh's law, written as springs of zero rest length and areas.
+
+The law of a `springtune.Rubber`, which `springtune.fit_rubber` fits to a uniaxial test (O. H. Yeoh, Rubber Chem.
+Technol. 63:792, 1990),
+
+.. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2},
+
+is one of edges and areas: ``tr C A_0`` of a triangle is half the sum over its sides of the opposite angle's cotangent
+times the length squared, and J its area over the one at rest. So springs of zero rest length, stiffer or softer with
+I_1, and areas are linear triangles of this law exactly, on any mesh and at any strain, see
+`springtune.mechanics.energies.YeohEnergy`. With one term it is `neo-hooke` of an incompressible sheet. Where triangles
+are stretched beyond the test's I_1 the law is extrapolated, and the answer's message says so.
+"""
+
+import numpy as np
+
+from ..mesh import Mesh
+from ..problem.materials import Material, Rubber
+from .base import DefinitionError, Springs, definition, triangles_only, zero
+
+
+@definition("yeoh", order=245, cells=(3,), finite_strain=True)
+def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
+    """Springs of zero rest length and areas: equal to linear triangles of rubber fitted to a uniaxial test.
+
+    Parameters and returns as in `springtune.springs.lattice.springs`, the material a `springtune.Rubber`; raises
+    DefinitionError on quadrilaterals and for other materials.
+    """
+    from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
+    from .neo_hooke import zero_length
+
+    triangles_only(mesh)
+    if not isinstance(material, Rubber):
+        raise DefinitionError(
+            f"needs a material that is fitted to a test and {repr(material.name) if material.name else 'this one'} is "
+            "none; give springtune.fit_rubber('uniaxial.csv'), in a study {uniaxial_test: uniaxial.csv}, or take "
+            "'neo-hooke'"
+        )
+    over = np.array(material.coefficients) / material.young_modulus
+    energy = YeohEnergy(mesh.points, mesh.triangles, np.tile(over, (len(mesh.triangles), 1)), material.largest)
+    return Springs(
+        material.young_modulus * thickness, zero(mesh), (energy,), linear_springs=zero_length(mesh, 2 * over[0])
+    )
