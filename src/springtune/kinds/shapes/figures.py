@@ -95,7 +95,8 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     cut, selection = _cut(data, shape, load, material, kinematics)
     names = _quantities(cut)
     rows = max(1, len(names))
-    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + 2.25 * rows), sharey=False)
+    tall = max(2.25, 0.72 + 0.16 * len(_definitions(cut)))  # a line of names for each
+    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows), sharey=False)
     title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
     if not all(_points(cut, name, one)[3].all() for name in names for one in _definitions(cut)):
         title += "; hollow: unstable, or beyond the linear reference"
