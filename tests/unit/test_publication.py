@@ -151,6 +151,30 @@ def test_what_is_wrong_with_a_number_is_told_with_its_name(datasets, entry, told
     assert re.search(told, str(error.value)), error.value
 
 
+def test_values_of_mixed_kinds_are_shown_in_the_units_of_those_that_are_chosen(tmp_path):
+    def mixed(tree):
+        data = xr.Dataset(
+            {
+                "value": ("quantity", [0.024, 92.7e6, np.nan], {"units": "1", "units_variable": "quantity_units"}),
+                "quantity_units": ("quantity", ["m", "Pa", ""]),
+            },
+            {"quantity": ["tip", "stress", "nothing"]},
+        )
+        tree["mixed"] = xr.DataTree(data)
+
+    there = read([write(tmp_path / "mine.nc", mixed)])
+    share = {"variable": "mixed/value", "digits": 1}
+    assert number(there, **share, unit="mm", at={"quantity": "tip"}) == "24.0"
+    assert number(there, **share, unit="MPa", at={"quantity": "stress"}) == "92.7"
+    for entry, told in (
+        ({"unit": "mm", "at": {"quantity": "stress"}}, "'value' is in Pa, which 'mm' does not show"),
+        ({"unit": "mm", "reduce": "mean"}, "it: cells of 'value' are in Pa, m; choose labels that leave one of them"),
+        ({"unit": "mm", "at": {"quantity": "none"}}, "it: quantity 'none' is not in the dataset"),
+    ):
+        with pytest.raises(PaperError, match=told):
+            number(there, **share, **entry)
+
+
 def test_all_that_is_wrong_is_told_at_once(datasets):
     with pytest.raises(PaperError) as error:
         numbers({name: {"study": "mine", "variable": name} for name in ("x", "y")}, {}, datasets)
@@ -347,6 +371,30 @@ def test_figures_tell_what_is_wrong_with_them(tmp_path, datasets):
         assert told in str(error.value)
     with pytest.raises(PaperError, match="figure f: colums: "):
         draw({"f": {"panels": [panel], "colums": 2}}, datasets, tmp_path)
+
+
+def test_an_example_draws_a_figure_of_the_paper(tmp_path, datasets):
+    (tmp_path / "examples").mkdir()
+    one = "import matplotlib.pyplot as plt\ndef main():\n    plt.plot([0, 1], [0, 1])\n    print('drawn')\n"
+    (tmp_path / "examples/one.py").write_text(one)
+    (tmp_path / "examples/none.py").write_text("def main():\n    pass\n")
+
+    def drawn(**declared):
+        return draw({"f": declared}, datasets, tmp_path, tmp_path / "examples")
+
+    assert drawn(example="one") == {"f": "none, drawn by examples/one.py"}
+    content = (tmp_path / "f.pdf").read_bytes()
+    drawn(example="one")
+    assert (tmp_path / "f.pdf").read_bytes() == content
+    panel = {"plot": "plot_sensitivity", "study": "mine", "at": CURVE}
+    for declared, told in (
+        ({"example": "lost"}, "figure f: there is no .*lost.py; give the stem of a script"),
+        ({"example": "none"}, "figure f: .*none.py leaves 0 figures open"),
+        ({}, "figure f: give panels, or the example"),
+        ({"example": "one", "panels": [panel]}, "figure f: give panels, or the example"),
+    ):
+        with pytest.raises(PaperError, match=told):
+            drawn(**declared)
 
 
 def test_without_typst_the_message_says_what_to_install(tmp_path, path, monkeypatch):

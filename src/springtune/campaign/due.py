@@ -31,7 +31,7 @@ COLLECT, BROWSE, PRESENT = "collect", "browse", "present"
 PAPER, PAPER_FILE = "paper", "paper.pdf"
 """The job that sets the paper, and what it makes."""
 
-PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark")
+PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 """Studies that the paper reads."""
 
 
@@ -208,6 +208,8 @@ def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
     Job
     """
     texts = {path.name: records.checksum(path) for path in sorted(source.iterdir()) if path.is_file()}
+    examples = sorted((source.resolve().parents[1] / "examples").glob("*.py"))
+    texts |= {f"examples/{path.name}": records.checksum(path) for path in examples}
     used = ["publication.build", *(one.module for one in outputs().values() if one.module)]
     digest = hash_of(texts, [stage_key(name) for name in dict.fromkeys(used)])
     record = folder / RECORDS / f"{PAPER}.json"

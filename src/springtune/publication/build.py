@@ -52,7 +52,9 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
         "tables": {
             name: numbers.table(entry, datasets, f"table {name}") for name, entry in declared.get("tables", {}).items()
         },
-        "figures": figures.draw(numbers.load(source / "figures.yaml"), datasets, folder),
+        "figures": figures.draw(
+            numbers.load(source / "figures.yaml"), datasets, folder, source.resolve().parents[1] / "examples"
+        ),
         "datasets": [one.origin() for one in datasets.values()],
         "labels": _labels(datasets),
     }

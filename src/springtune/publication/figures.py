@@ -1,10 +1,13 @@
 """Figures of a paper: what the library plots, put together at the paper's width.
 
-``figures.yaml`` declares them: a size and panels, each a public function that plots, a study and a selection.
+``figures.yaml`` declares them: a size and panels, each a public function that plots, a study and a selection; or a
+script of ``examples/`` that draws one from formulas, without a dataset.
 """
 
 import io
+import runpy
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,16 +51,21 @@ class Drawing(BaseModel):
     columns : int
         Panels side by side.
     panels : list of Panel
+    example : str
+        In place of panels: stem of a script whose ``main`` leaves one figure open.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     size: tuple[float, float] | None = None
     columns: int = 1
-    panels: list[Panel]
+    panels: list[Panel] = []
+    example: str = ""
 
 
-def draw(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: Path) -> dict[str, Any]:
+def draw(
+    declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: Path, examples: Path = Path("examples")
+) -> dict[str, Any]:
     """Draw the figures of a paper as PDF files.
 
     Parameters
@@ -67,11 +75,13 @@ def draw(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: P
     datasets : mapping of str to Dataset
     folder : Path
         Where the files go.
+    examples : Path, optional
+        Folder of the scripts.
 
     Returns
     -------
     dict of str to str
-        By name: selection and hash of the datasets, for the caption.
+        By name: selection and hash of the datasets, or the script, for the caption.
 
     Raises
     ------
@@ -80,11 +90,11 @@ def draw(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: P
     """
     drawings = {name: checked(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
     for name, drawing in drawings.items():
-        atomic.write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}"))
+        atomic.write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))
     return {name: _origin(drawing, datasets, f"figure {name}") for name, drawing in drawings.items()}
 
 
-def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> bytes:
+def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples: Path) -> bytes:
     import matplotlib
     import matplotlib.pyplot as plt
     import numpy as np
@@ -99,7 +109,11 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> bytes:
 
     # Fonts as publishers take them.
     with matplotlib.rc_context(SETTINGS | {"pdf.fonttype": 42}):
-        if drawing.size is None and len(drawing.panels) == 1:
+        if bool(drawing.example) == bool(drawing.panels):
+            raise PaperError(f"{name}: give panels, or the example that draws it, one of both")
+        if drawing.example:
+            figure = _drawn(examples / f"{drawing.example}.py", name)
+        elif drawing.size is None and len(drawing.panels) == 1:
             figure = np.ravel(plotted(drawing.panels[0], None))[0].figure
         elif drawing.size is None:
             raise PaperError(f"{name}: several panels; give the figure a size, its width and height in inches")
@@ -114,6 +128,20 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> bytes:
     return content.getvalue()
 
 
+def _drawn(script: Path, name: str) -> Any:
+    """The figure that an example leaves open."""
+    import matplotlib.pyplot as plt
+
+    if not script.is_file():
+        raise PaperError(f"{name}: there is no {script}; give the stem of a script of this folder")
+    plt.close("all")
+    with redirect_stdout(io.StringIO()):
+        runpy.run_path(str(script))["main"]()
+    if len(plt.get_fignums()) != 1:
+        raise PaperError(f"{name}: {script} leaves {len(plt.get_fignums())} figures open; it has to leave one")
+    return plt.gcf()
+
+
 def _plot(plot: str, name: str) -> Callable[..., object]:
     import springtune
 
@@ -126,7 +154,9 @@ def _plot(plot: str, name: str) -> Callable[..., object]:
 
 
 def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Selections of the panels, a study's together, and the hash of each dataset."""
+    """Selections of the panels, a study's together, and the hash of each dataset; or the script."""
+    if drawing.example:
+        return f"none, drawn by examples/{drawing.example}.py"
     told: dict[str, list[str]] = {}
     for panel in drawing.panels:
         labels = [_label(key, value) for key, value in panel.at.items()]

@@ -28,10 +28,10 @@ from .datasets import HASH_SHOWN, Dataset, chosen
 
 TEXT_UNITS = {
     "": ("1", 1.0), "%": ("1", 1e-2),
-    "mm": ("m", 1e-3), "mm²": ("m2", 1e-6),
+    "µm": ("m", 1e-6), "mm": ("m", 1e-3), "mm²": ("m2", 1e-6),
     "s": ("s", 1.0), "ms": ("s", 1e-3), "µs": ("s", 1e-6), "ns": ("s", 1e-9),
-    "N": ("N", 1.0), "kN": ("N", 1e3), "N/m": ("N/m", 1.0), "N/mm": ("N/m", 1e3), "×10⁶ N/m": ("N/m", 1e6),
-    "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9), "MB": ("byte", 1e6),
+    "mN": ("N", 1e-3), "N": ("N", 1.0), "kN": ("N", 1e3), "N/m": ("N/m", 1.0), "N/mm": ("N/m", 1e3),
+    "×10⁶ N/m": ("N/m", 1e6), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9), "J": ("J", 1.0), "MB": ("byte", 1e6),
 }  # fmt: skip
 """Units that a paper shows: the dataset's unit, and how many of that."""
 
@@ -335,10 +335,25 @@ def _group(number: Number, datasets: Mapping[str, Dataset], name: str) -> tuple[
     for wanted in filter(None, (variable, number.over, _flag(number.where)[0], *number.marks)):
         if wanted not in data.variables:
             raise PaperError(f"{name}: {one.path} has no variable '{wanted}' in /{group}; give one that it has")
-    shown, kept = TEXT_UNITS[number.unit][0], data[variable].attrs.get("units", "")
+    shown, kept = TEXT_UNITS[number.unit][0], _units(number, data, variable, name)
     if kept and kept != shown and not number.over and number.reduce != "count":
         raise PaperError(f"{name}: '{variable}' is in {kept}, which '{number.unit}' does not show; give another unit")
     return data, variable
+
+
+def _units(number: Number, data: xr.Dataset, variable: str, name: str) -> str:
+    """Units of a variable: its own, or where its cells have several, those of the cells that are chosen."""
+    array = data[variable]
+    if "units_variable" not in array.attrs:
+        return str(array.attrs.get("units", ""))
+    units = data[array.attrs["units_variable"]]
+    chosen_at = [{key: label for key, label in at.items() if key in units.dims} for at in number.at]
+    found = {str(one) for at in chosen_at for one in np.ravel(_selected(units, at, name, number.optional)) if one}
+    if len(found) > 1:
+        raise PaperError(
+            f"{name}: cells of '{variable}' are in {', '.join(sorted(found))}; choose labels that leave one of them"
+        )
+    return "".join(found)
 
 
 def _selected(array: xr.DataArray, at: Mapping[str, Any], name: str, optional: bool = False) -> xr.DataArray:

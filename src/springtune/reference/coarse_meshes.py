@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy import spatial
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
@@ -23,7 +23,7 @@ from ..problem.outlines import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 
-Ends = tuple[int, int]
+_Ends = tuple[int, int]
 """Points at the ends of a side, the lower number first."""
 
 LARGEST_TURN = np.pi / 6
@@ -98,7 +98,7 @@ class CoarseMesh:
         triangles: np.ndarray,
         parts: np.ndarray,
         names: tuple[str, ...],
-        sides: dict[Ends, Side],
+        sides: dict[_Ends, Side],
         named: dict[str, int],
     ) -> None:
         self.points, self.triangles, self.parts, self.names = points, triangles, parts, names
@@ -108,7 +108,7 @@ class CoarseMesh:
         """A mesh that may be cut for itself."""
         return CoarseMesh(self.points, self.triangles, self.parts, self.names, dict(self.sides), self.named)
 
-    def curve(self, ends: Ends, along: np.ndarray) -> np.ndarray:
+    def curve(self, ends: _Ends, along: np.ndarray) -> np.ndarray:
         """Points of a side, shape (n, 2) [m], from -1 at the corner of the lower number to 1."""
         side = self.sides.get(ends)
         share = (along + 1) / 2
@@ -182,7 +182,7 @@ class CoarseMesh:
         self.points, self.named = np.concatenate([self.points, where[None]]), self.named | {name: new}
         self._replace(np.array([row]), [(a, b, new), (b, c, new), (c, a, new)], [int(self.parts[row])] * 3)
 
-    def part_sides(self) -> dict[Ends, list[tuple[int, bool]]]:
+    def part_sides(self) -> dict[_Ends, list[tuple[int, bool]]]:
         """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
         return _triangles_at(self.triangles, self.sides)
 
@@ -251,9 +251,9 @@ def _shapely(points: np.ndarray, triangles: np.ndarray) -> bool:
     return bool((signed_areas(points, triangles) > 0.1 * (sides**2).sum(axis=(1, 2)) / 3).all())
 
 
-def _triangles_at(triangles: np.ndarray, sides: Iterable[Ends]) -> dict[Ends, list[tuple[int, bool]]]:
+def _triangles_at(triangles: np.ndarray, sides: Iterable[_Ends]) -> dict[_Ends, list[tuple[int, bool]]]:
     """Triangles at some sides, see `CoarseMesh.part_sides`."""
-    wanted: dict[Ends, list[tuple[int, bool]]] = {ends: [] for ends in sides}
+    wanted: dict[_Ends, list[tuple[int, bool]]] = {ends: [] for ends in sides}
     corners = np.zeros(triangles.max() + 1, dtype=bool)
     corners[[end for ends in wanted for end in ends]] = True
     for i in range(3):
@@ -304,7 +304,7 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
         lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
         normal = chords[:, ::-1] * [1, -1] / np.linalg.norm(chords, axis=1)[:, None]
         sagittas = np.abs(((samples - samples[:, :1]) * normal[:, None]).sum(axis=2)).max(axis=1)
-        tree = cKDTree(samples.reshape(-1, 2))
+        tree = spatial.cKDTree(samples.reshape(-1, 2))
         refined: list[_Piece] = []
         for piece, at, length, sagitta in zip(pieces, samples, lengths, sagittas):
             # What is farther than its length does not matter.
@@ -453,7 +453,7 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     other = order[found]
     outer = codes[other] != twins
     between = ~outer & (part < part[other])
-    groups: dict[Ends, tuple[str, ...]] = {}
+    groups: dict[_Ends, tuple[str, ...]] = {}
     for name, edges in grouped.sides.items():
         for first, second in np.sort(edges, axis=1).tolist():
             groups[first, second] = (*groups.get((first, second), ()), name)
@@ -539,7 +539,7 @@ def corners_of(
     dict of int to Corner
     """
     at_sides = mesh.part_sides()
-    at_corner: dict[int, list[Ends]] = {}
+    at_corner: dict[int, list[_Ends]] = {}
     for ends in at_sides:
         for end in ends:
             at_corner.setdefault(end, []).append(ends)
@@ -547,7 +547,7 @@ def corners_of(
     for row, i in zip(*np.nonzero(np.isin(mesh.triangles, list(at_corner)))):
         inside.setdefault(int(mesh.triangles[row, i]), set()).add(int(mesh.parts[row]))
 
-    def leaving(corner: int, ends: Ends) -> np.ndarray:
+    def leaving(corner: int, ends: _Ends) -> np.ndarray:
         """Direction of a side at a corner."""
         side = mesh.sides[ends]
         if side.arc is None:

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import spatial
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
@@ -868,7 +868,7 @@ class _Level:
 
         middles = corners.mean(axis=1)
         reach = 1.001 * np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
-        near = cKDTree(points).query_ball_point(middles, reach)
+        near = spatial.cKDTree(points).query_ball_point(middles, reach)
         look(np.repeat(np.arange(len(corners)), [len(rows) for rows in near]), np.concatenate(near).astype(int))
         beside = np.flatnonzero(deepest < 0)  # of all triangles: those along arcs, and what is outside
         for rows in np.array_split(beside, max(1, len(beside) * len(corners) // 500_000)):

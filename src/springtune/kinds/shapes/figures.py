@@ -17,7 +17,7 @@ NETWORK_COLUMNS = 3
 MOST_NETWORKS = 6
 """Networks that are drawn where none are chosen."""
 
-FIRST = ("lattice", "van-gelder", "element-fit", "patch", "area", "delingette")
+FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
 """Definitions that are drawn before others."""
 
 FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
@@ -95,7 +95,8 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     cut, selection = _cut(data, shape, load, material, kinematics)
     names = _quantities(cut)
     rows = max(1, len(names))
-    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + 2.25 * rows), sharey=False)
+    tall = max(2.25, 0.72 + 0.16 * len(_definitions(cut)))  # a line of names for each
+    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows), sharey=False)
     title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
     if not all(_points(cut, name, one)[3].all() for name in names for one in _definitions(cut)):
         title += "; hollow: unstable, or beyond the linear reference"
@@ -408,7 +409,8 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
     said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
     title = labels.wrapped(", ".join(said), page - 0.2, 8.5)
-    place = {"left": 0.45, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
+    left = 0.45 + 0.07 * max(0, len(f"{1e3 * max(width, height):.0f}") - 2)
+    place = {"left": left, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
     place |= {"down": 0.3, "across": 0.1, "title": title}
     style.arrange(figure, axes, **place)
     largest = _largest_force(case, wanted)
@@ -515,6 +517,8 @@ def _bar(figure, lines, case):
         place = figure.add_axes((0.45 / width, 0.36 / height, min(3.0, 0.45 * width) / width, 0.08 / height))
         bar = figure.colorbar(lines, cax=place, orientation="horizontal", extend="both")
         bar.set_label("Spring force [N], tension positive", fontsize=style.SMALL)
+        bar.formatter.set_powerlimits((-2, 4))  # long numbers would run into each other
+        bar.update_ticks()
         bar.outline.set_linewidth(0.5)
     there = np.isfinite(case.reference_displacement_x.values).any()
     text = "black: outline of the reference, displaced\ndashed: at rest" if there else "no reference"

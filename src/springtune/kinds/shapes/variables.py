@@ -9,7 +9,7 @@ CASE_AXES = ("shape", "material", "load")
 SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 ASKED = ("shape", "load", "quantity")
 
-MIXED: dict[str, object] = {"comment": "in SI units: quantity_units says which"}
+MIXED: dict[str, object] = {"comment": "in SI units: quantity_units says which", "units_variable": "quantity_units"}
 
 SHAPES = Group(
     "/shapes",
