@@ -1,7 +1,10 @@
 """Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +17,14 @@ from springtune.campaign.plan import plan, table_files
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
 from springtune.kinds.shapes import stored
+from springtune.kinds.shapes.checks import READ_AT_ONCE
 from springtune.kinds.shapes.described import ONE_LOAD, geometry, load, named, shape_of
-from springtune.kinds.shapes.kind import READ_AT_ONCE
 from springtune.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.kinds.shapes.reference import rounds_of
 from springtune.mesh import write_mesh
 from springtune.output.dataset import STATUS
+
+REPOSITORY = Path(__file__).parents[2]
 
 COOK = """\
 title: A tapered panel
@@ -370,3 +375,15 @@ def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path):
     tree, _ = done(loaded(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
+
+
+def test_studies_of_beams_pay_nothing_for_shapes():
+    program = (
+        "import sys; from springtune.kinds import load_study; load_study('config/paper.yaml');"
+        "print(*(name for name in sys.modules if name.startswith(('springtune.kinds.shapes', 'springtune.problem'))))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
+    found = set(run.stdout.split())
+    assert "springtune.kinds.shapes.kind" in found
+    heavy = {f"springtune.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
+    assert not (heavy | {"springtune.problem.shapes", "springtune.problem.outlines"}) & found

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..mesh import GroupedMesh
-from ..mesh import mesh_shape as mesh_outlined
-from ..mesh import read_shape as read_grouped
+from ..mesh.group_files import read_shape as read_grouped
+from ..mesh.groups import GroupedMesh
+from ..mesh.outlines import mesh_shape as mesh_outlined
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from .meshes import A_SHAPE, is_a

@@ -63,7 +63,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
     problems = Problems(file, lines, beside)
     content = with_rows(content, beside, problems)
-    config = _validate(study_model(kinds), content, problems)
+    config = _validate(study_model(kinds, content if isinstance(content, dict) else ()), content, problems)
     check_names(config, problems)
     check_counts(config, content, problems)
     for kind in kinds:

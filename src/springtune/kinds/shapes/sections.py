@@ -372,3 +372,8 @@ class ShapeGridConfig(Section):
         validate_default=True,
         description="Whether there is a converged reference; else errors are those against `expected` values alone.",
     )
+
+
+NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None
+NAMED_GRIDS = Annotated[dict[str, ShapeGridConfig], Named("grid", for_files=False)] | None
+"""What a study has under ``shapes`` and ``shape_grids``."""
