@@ -98,6 +98,9 @@ def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> Stu
                     place = place[step]
             own = details["type"] == "study"
             path += [step for step in details["ctx"]["path"] if isinstance(place, list | dict)] if own else []
-            problems.add(path, details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md")
+            message = details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md"
+            if details["type"] == "dict_type":
+                message = f"{show(place)} instead of names and their values, such as {{name: value}}; give a mapping"
+            problems.add(path, message)
         problems.stop()
         raise

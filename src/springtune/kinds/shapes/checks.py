@@ -1,11 +1,12 @@
 """What is wrong with a study's shapes and their grids."""
 
+import re
 from pathlib import Path
 
 from ...mesh import MeshError
 from ...problem.quantities import nearest
 from ...springs import DEFINITIONS
-from ...study.checks import FEWER, check_for_triangles, check_known, check_particles
+from ...study.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
 from ...study.expand import file_fault
 from .expand import shape_of_config
 
@@ -26,6 +27,10 @@ def check(config, problems):
         path = "shapes", name
         for part, material in shape.parts.items():
             check_known(problems, (*path, "parts", part), "material", material, config.materials)
+            if any(any(case.gravity) for case in shape.loads.values()):
+                check_density(config, material, (*path, "parts", part), problems)
+        for load, case in shape.loads.items():
+            _check_something(case, (*path, "loads", load), problems)
         if shape.file is not None:
             fault = file_fault(problems.folder / shape.file)
             if fault:
@@ -39,9 +44,11 @@ def check(config, problems):
             try:
                 made = shape_of_config(name, shape, problems.folder)
             except ValueError as error:  # what sides do to each other
-                problems.add(path, str(error).removeprefix(f"shape '{name}': "))
+                message = str(error).removeprefix(f"shape '{name}': ")
+                problems.add((*path, *_place(message)), message)
             else:
                 _check_held(made, path, problems)
+    _check_stems(config, problems)
     for name, grid in (config.shape_grids or {}).items() if problems.nothing else ():
         _check_grid(config, grid, ("shape_grids", name), problems)
 
@@ -77,6 +84,40 @@ def _check_file(name, shape, path, problems):
             check_case(grouped, case)
         except ValueError as error:
             problems.add((*path, "loads", label), str(error).removeprefix(f"load '{label}', "))
+
+
+def _check_something(case, path, problems):
+    """Whether a load does anything."""
+    moved = any(one.x or one.y for one in case.supports.values())
+    pressed = any(one.pressure for one in case.pressures.values())
+    if not (moved or pressed or any(case.gravity) or any(map(any, case.forces.values()))):
+        problems.add(path, "nothing moves or pulls the body; give it forces, pressures, gravity, or a support that is "
+                     "moved, such as {end: {x: 1 mm}}")  # fmt: skip
+
+
+def _place(message):
+    """Keys of a shape that a message on its geometry is about."""
+    if found := re.match(r"point '([^']+)'", message):
+        return "points", found[1]
+    if found := re.match(r"hole (\d+)\b", message):
+        return "holes", int(found[1]) - 1
+    if found := re.match(r"outline, side (\d+)", message):
+        return "outline", int(found[1]) - 1
+    return ("outline",) if message.startswith("outline") else ()
+
+
+def _check_stems(config, problems):
+    """Names that are told apart once they are joined in those of files."""
+    stems = {}
+    for name, shape in config.shapes.items():
+        for load in shape.loads:
+            other = stems.setdefault(f"{name}_{load}".casefold(), (name, load))
+            if other != (name, load):
+                message = (
+                    f"figures of shape '{name}' under '{load}' and of '{other[0]}' under '{other[1]}' would have one "
+                    "name; rename a shape or a load"
+                )
+                problems.add(("shapes", name, "loads", load), message)
 
 
 def _check_held(shape, path, problems):
@@ -192,6 +233,10 @@ def _check_grid(config, grid, path, problems):
         for load in grid.load or ():
             if load not in shape.loads:
                 problems.add((*path, "load"), f"shape '{name}' has no load '{load}'; {nearest(load, shape.loads)}")
+    if any(any(shape.loads[load].gravity) for shape in shapes.values() for load in grid.load or shape.loads
+           if load in shape.loads):  # fmt: skip
+        for material in grid.material:
+            check_density(config, material, (*path, "material"), problems)
     made = {name: shape for name, shape in shapes.items() if shape.file is None}
     if made and grid.mesh_size is None:
         problems.add((*path, "mesh_size"), "'mesh_size' is missing; give a length such as '5 mm', a list, or a range")

@@ -168,7 +168,7 @@ def _mesh_products(content):
 
 def _reference_members(study, costs):
     part = study.parts["shapes"]
-    return {"_".join(one): (costs.of("shape_reference"), one) for one in (part.referred if part else ())}
+    return {"/".join(one): (costs.of("shape_reference"), one) for one in (part.referred if part else ())}
 
 
 def _references(study, folder, members):
