@@ -23,6 +23,7 @@ from springtune.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.kinds.shapes.reference import rounds_of
 from springtune.mesh import write_mesh
 from springtune.output.dataset import STATUS
+from springtune.output.export import export
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -447,3 +448,16 @@ def test_anisotropic_materials_are_told_without_their_names(loaded, tmp_path):
     tree, _ = done(loaded(text), tmp_path / "results/study")
     messages = tree["shapes"].to_dataset().message.sel(definition="lattice").values.ravel().tolist()
     assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
+
+
+def test_datasets_without_beams_say_where_their_networks_and_tables_are(loaded, tmp_path):
+    study = loaded(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
+    tree, _ = done(study, tmp_path / "results/study")
+    with pytest.raises(ValueError, match="group '/': it has no variables; give one of shapes, shape_fields"):
+        export(tree, tmp_path / "table.csv")
+    for wanted in (lambda: st.field(tree, shape="cook"), lambda: export(tree, tmp_path / "all.pvd")):
+        with pytest.raises(ValueError, match="nor has its study beams; 'shape_fields' has those of shapes: take"):
+            wanted()
+    assert "rows" in export(tree, tmp_path / "table.csv", "shapes")
+    with pytest.raises(ValueError, match="the dataset has no scenes of beams"):
+        st.plot_size(tree, beam="200x40")
