@@ -29,10 +29,10 @@ from .kinds.stability.figures import plot_stability_meshes as plot_stability_mes
 from .kinds.stability.figures import plot_stability_rest as plot_stability_rest
 from .kinds.stability.figures import plot_stability_strains as plot_stability_strains
 from .mesh import MESH_TYPES as MESH_TYPES
-from .mesh import GroupedMesh as GroupedMesh
 from .mesh import Mesh as Mesh
 from .mesh import MeshError as MeshError
 from .mesh import mesh_type as mesh_type
+from .mesh.groups import GroupedMesh as GroupedMesh
 from .output.merging import merge as merge
 from .output.reading import field as field
 from .output.reading import open as open

@@ -1,7 +1,10 @@
 """Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +17,15 @@ from springtune.campaign.plan import plan, table_files
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
 from springtune.kinds.shapes import stored
+from springtune.kinds.shapes.checks import READ_AT_ONCE
 from springtune.kinds.shapes.described import ONE_LOAD, geometry, load, named, shape_of
-from springtune.kinds.shapes.kind import READ_AT_ONCE
 from springtune.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.kinds.shapes.reference import rounds_of
 from springtune.mesh import write_mesh
 from springtune.output.dataset import STATUS
+from springtune.output.export import export
+
+REPOSITORY = Path(__file__).parents[2]
 
 COOK = """\
 title: A tapered panel
@@ -370,3 +376,88 @@ def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path):
     tree, _ = done(loaded(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
+
+
+def test_studies_of_beams_pay_nothing_for_shapes():
+    program = (
+        "import sys; from springtune.kinds import load_study; load_study('config/paper.yaml');"
+        "print(*(name for name in sys.modules if name.startswith(('springtune.kinds.shapes', 'springtune.problem'))))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
+    found = set(run.stdout.split())
+    assert "springtune.kinds.shapes.kind" in found
+    heavy = {f"springtune.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
+    assert not (heavy | {"springtune.problem.shapes", "springtune.problem.outlines"}) & found
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[0, 1 N]", "[0, 0]", "shapes.cook.loads.shear: nothing moves or pulls the body"),
+        ("forces:", "gravity: [0, -9.81 m/s^2]\n        forces:", "all.material: 'third' has no density; add one"),
+        ("    outline:", "    unit: 1 mm\n    outline:", "shapes.cook.unit: is of the coordinates in a mesh file"),
+        ("{tip: [48 mm, 52 mm]}", "{tip: [49 mm, 52 mm]}", ":10: shapes.cook.points.tip: point 'tip'"),
+        ("{right: [0, 1 N]}", "1 N", "forces: '1 N' instead of names and their values, such as {name: value}"),
+        ("at: tip", "at: [tip]", "a list instead of the name of a point"),
+    ],
+)
+def test_what_no_scene_could_be_solved_with_is_refused_as_the_study_is_read(refusal, old, new, message):
+    assert old in COOK
+    assert message in refusal(COOK.replace(old, new, 1))
+
+
+def test_figures_of_two_loads_never_share_a_name(refusal):
+    content = yaml.safe_load(COOK)
+    one = content["shapes"]["cook"]
+    content["shapes"] = {"a": one | {"loads": {"b_c": one["loads"]["shear"]}}}
+    content["shapes"]["a_B"] = one | {"loads": {"c": one["loads"]["shear"]}}
+    content["shape_grids"]["all"]["shape"] = ["a", "a_B"]
+    message = refusal(yaml.safe_dump(content))
+    assert "figures of shape 'a_B' under 'c' and of 'a' under 'b_c' would have one name" in message
+
+
+def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
+    content = yaml.safe_load(COOK)
+    one, third = content["shapes"]["cook"], content["materials"]["third"]
+    content["materials"] = {"c": third, "b_c": third | {"young_modulus": "2 MPa"}}
+    content["shapes"] = {"a": one, "a_b": one}
+    grid = content["shape_grids"]["all"]
+    content["shape_grids"] = {
+        "one": grid | {"shape": "a", "material": "b_c"},
+        "other": grid | {"shape": "a_b", "material": "c"},
+    }
+    jobs = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    tasks = [task for job in jobs if job.stage.name == "shape_reference" for task in job.content["references"]]
+    assert len({task["key"] for task in tasks}) == 2
+
+
+def test_a_scene_that_cannot_be_stated_is_a_hole(loaded, tmp_path):
+    """All its force is on what is held: known once there is a mesh."""
+    text = COOK.replace("forces: {right: [0, 1 N]}", "forces: {left: [0, 1 N]}")
+    tree, _ = done(loaded(text), tmp_path / "results/study")
+    data = tree["shapes"].to_dataset()
+    assert {STATUS[number] for number in data.status.values.ravel()} == {"failed"}
+    assert all("neither pulls what is free" in message for message in data.message.values.ravel().tolist())
+
+
+def test_anisotropic_materials_are_told_without_their_names(loaded, tmp_path):
+    text = COOK.replace(
+        "{young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}",
+        "{young_modulus_x: 2 MPa, young_modulus_y: 1 MPa, poisson_ratio_xy: 0.3, shear_modulus: 1 MPa}",
+    )
+    tree, _ = done(loaded(text), tmp_path / "results/study")
+    messages = tree["shapes"].to_dataset().message.sel(definition="lattice").values.ravel().tolist()
+    assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
+
+
+def test_datasets_without_beams_say_where_their_networks_and_tables_are(loaded, tmp_path):
+    study = loaded(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
+    tree, _ = done(study, tmp_path / "results/study")
+    with pytest.raises(ValueError, match="group '/': it has no variables; give one of shapes, shape_fields"):
+        export(tree, tmp_path / "table.csv")
+    for wanted in (lambda: st.field(tree, shape="cook"), lambda: export(tree, tmp_path / "all.pvd")):
+        with pytest.raises(ValueError, match="nor has its study beams; 'shape_fields' has those of shapes: take"):
+            wanted()
+    assert "rows" in export(tree, tmp_path / "table.csv", "shapes")
+    with pytest.raises(ValueError, match="the dataset has no scenes of beams"):
+        st.plot_size(tree, beam="200x40")

@@ -26,7 +26,8 @@ from .shape_options import SHAPE_HELP, asked_shape, check_kind
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
-    from ..mesh import GroupedMesh, Mesh
+    from ..mesh import Mesh
+    from ..mesh.groups import GroupedMesh
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from .shape_options import AskedShape

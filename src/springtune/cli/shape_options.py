@@ -13,7 +13,7 @@ from .options import asked_quantity
 
 if TYPE_CHECKING:
     from ..kinds.shapes.kind import Shapes
-    from ..mesh import GroupedMesh
+    from ..mesh.groups import GroupedMesh
     from ..problem.materials import AnyMaterial
     from ..problem.shapes import Shape
     from ..study import Study

@@ -18,9 +18,6 @@ Examples
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh
 from .free import free
-from .group_files import read_shape
-from .groups import GroupedMesh
-from .outlines import mesh_shape
 from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
 from .squares import alternating, braced, right
 from .types import MESH_TYPES, MeshType, mesh_type
@@ -28,7 +25,6 @@ from .types import MESH_TYPES, MeshType, mesh_type
 __all__ = [
     "MESH_TYPES",
     "ROW_HEIGHT",
-    "GroupedMesh",
     "Mesh",
     "MeshError",
     "MeshType",
@@ -38,12 +34,10 @@ __all__ = [
     "free",
     "isosceles",
     "lattice",
-    "mesh_shape",
     "mesh_type",
     "quality",
     "read_beam_mesh",
     "read_mesh",
-    "read_shape",
     "right",
     "row_height",
     "signed_areas",

@@ -96,7 +96,10 @@ def table(
     Traceback (most recent call last):
     springtune.output.export.RequestError: group 'curves': there is none; known: /, benchmark, block, ...
     """
-    data = _selected(_group(tree, group), selection or {})
+    data = _group(tree, group)
+    if not data.data_vars:
+        raise RequestError(f"group '{group}': it has no variables; give one of {', '.join(tree.children)}")
+    data = _selected(data, selection or {})
     for name in variables:
         if name not in data.variables or name in data.dims:
             known = nearest(name, sorted(str(known) for known in data.variables if known not in data.dims))
@@ -399,10 +402,7 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
     from ..handover.paraview import MOST_PIECES
 
     if "fields" not in tree.children:
-        raise ValueError(
-            "the dataset has no group '/fields'; add 'deformed' or 'paraview' to the outputs of the study, and run it "
-            "(networks of shapes: 'shapes')"
-        )
+        raise ValueError(reading.without_fields(tree))
     scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
     if not scenes:
         raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")

@@ -223,6 +223,15 @@ def _said(error: Exception) -> str:
     return text if len(text) <= LONGEST_REASON else f"{text[: LONGEST_REASON - 3]}..."
 
 
+def without_fields(data: "xarray.DataTree") -> str:
+    """Why a dataset has no networks of beams, and the remedy."""
+    said = "the dataset has no group '/fields'"
+    if data.variables:
+        return f"{said}; add 'deformed' or 'paraview' to the outputs of the study, and run it"
+    shown = " 'shape_fields' has those of shapes:" if "shape_fields" in data.children else ""
+    return f"{said}, nor has its study beams;{shown} take a group as it is, one of {', '.join(data.children)}"
+
+
 def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
     """Network of one beam and mesh type with its whole fields: an unstructured mesh by the conventions UGRID-1.0.
 
@@ -265,9 +274,7 @@ def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
     if not hasattr(data, "children"):
         raise ValueError(f"data: {type(data).__name__} is no dataset; give what springtune.open returns")
     if "fields" not in data.children:
-        raise ValueError(
-            "the dataset has no group '/fields'; add 'deformed' or 'paraview' to the outputs of the study, and run it"
-        )
+        raise ValueError(without_fields(data))
     with guarded("the group '/fields'"):
         return _field(data, labels)
 

@@ -40,6 +40,10 @@ def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.D
             raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
         return data
     if name == "/":
+        if not data.variables:
+            raise ValueError(
+                f"the dataset has no scenes of beams; it has {_listed(f'/{one}' for one in data.children)}"
+            )
         return data.to_dataset()
     if name not in data.children:
         raise ValueError(f"the dataset has no group '/{name}'; it has {_listed(f'/{one}' for one in data.children)}")

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.dynamics import masses
-from ..mesh import MESH_TYPES, Mesh, mesh_shape
+from ..mesh import MESH_TYPES, Mesh
 from ..mesh.groups import GroupedMesh
+from ..mesh.outlines import mesh_shape
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material

@@ -7,7 +7,8 @@ import numpy as np
 from .shapes import LoadCase
 
 if TYPE_CHECKING:
-    from ..mesh import GroupedMesh, Mesh
+    from ..mesh import Mesh
+    from ..mesh.groups import GroupedMesh
 
 
 def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:

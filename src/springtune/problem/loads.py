@@ -23,9 +23,12 @@ A new load is a row of `LOADS`, and a `LoadKind` where none of those here has it
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from .geometry import Beam
-from .shapes import LoadCase, Quantity, Support, Traction
+
+if TYPE_CHECKING:
+    from .shapes import LoadCase
 
 MIDDLE = "middle"
 """Name of the middle of a pressed side, as a group."""
@@ -154,8 +157,10 @@ class LoadKind:
         return (*((side, axes) for side, axes in self.held if side != self.cut), (self.cut, (1 - self.axis,)))
 
     @cached_property
-    def case(self) -> LoadCase:
+    def case(self) -> "LoadCase":
         """The kind as any load of a shape, whose groups are the sides of the rectangle; its force is 1 N."""
+        from .shapes import LoadCase, Quantity, Support, Traction  # here: reading a study of beams needs none
+
         supports = (
             Support(side.name, *(0.0 if axis in axes else None for axis in range(2))) for side, axes in self.held
         )

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh import GroupedMesh
-from ..mesh import mesh_shape as mesh_outlined
-from ..mesh import read_shape as read_grouped
+from ..mesh.group_files import read_shape as read_grouped
+from ..mesh.groups import GroupedMesh
+from ..mesh.outlines import mesh_shape as mesh_outlined
 from ..problem.boundary import part_names
 from ..problem.materials import AnyMaterial
 from ..problem.outlines import OutlineSide, in_mm

@@ -167,7 +167,8 @@ class Definition(Declared):
             able = [name for name, one in DEFINITIONS.items() if one.anisotropic and not one.needs]
             fitting = [name for name in able if set(mesh.cells) <= set(DEFINITIONS[name].cells)]
             raise DefinitionError(
-                f"needs an isotropic material and {material.name!r} is anisotropic; choose one of "
+                f"needs an isotropic material and {repr(material.name) if material.name else 'this one'} is "
+                "anisotropic; choose one of "
                 f"{', '.join(map(repr, fitting or able))}"
             )
         told = [("thickness", thickness), *([("stiffness", given)] if self.needs == "stiffness" else [])]

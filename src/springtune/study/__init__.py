@@ -63,7 +63,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
     problems = Problems(file, lines, beside)
     content = with_rows(content, beside, problems)
-    config = _validate(study_model(kinds), content, problems)
+    config = _validate(study_model(kinds, content if isinstance(content, dict) else ()), content, problems)
     check_names(config, problems)
     check_counts(config, content, problems)
     for kind in kinds:
@@ -100,6 +100,9 @@ def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> Stu
                     place = place[step]
             own = details["type"] == "study"
             path += [step for step in details["ctx"]["path"] if isinstance(place, list | dict)] if own else []
-            problems.add(path, details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md")
+            message = details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md"
+            if details["type"] == "dict_type":
+                message = f"{show(place)} instead of names and their values, such as {{name: value}}; give a mapping"
+            problems.add(path, message)
         problems.stop()
         raise

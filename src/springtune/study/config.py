@@ -1,8 +1,9 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
@@ -79,7 +80,7 @@ def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 class Section(BaseModel):
     """A mapping of known keys in a study."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -487,12 +488,31 @@ def _beams_or(alone: Sequence[str]) -> dict[str, Any]:
     return {"anyOf": [{"required": ["beams", "grids"]}, *({"required": [name]} for name in alone)]}
 
 
-def study_model(kinds: Sequence[StudyKind]) -> type[StudyConfig]:
+class Later(NamedTuple):
+    """Type of a field that is imported for studies that have it: sections cost milliseconds each.
+
+    Attributes
+    ----------
+    module, name : str
+        Where it is.
+    """
+
+    module: str
+    name: str
+
+    def type(self) -> Any:
+        """The type."""
+        return getattr(import_module(self.module), self.name)
+
+
+def study_model(kinds: Sequence[StudyKind], given: Container[object] | None = None) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids.
 
     Parameters
     ----------
     kinds : tuple of Kind
+    given : container of str, optional
+        Keys of the study that is to be read: what others hold is left out of the model. All without.
 
     Returns
     -------
@@ -505,7 +525,11 @@ def study_model(kinds: Sequence[StudyKind]) -> type[StudyConfig]:
     outputs: list[StudyOutput] = []
     for kind in kinds:
         grid_fields |= kind.grid_fields
-        study_fields |= kind.study_fields
+        for name, (annotation, field) in kind.study_fields.items():
+            absent = given is not None and name not in given and field.default is None
+            if isinstance(annotation, Later) and not absent:
+                annotation = annotation.type()
+            study_fields[name] = None if absent else annotation, field
         outputs += kind.outputs
     grid = create_model("GridConfig", __base__=GridConfig, **grid_fields)
     grid.__doc__ = GridConfig.__doc__

@@ -8,7 +8,6 @@ from pathlib import Path
 from ...jobs.hashing import hash_of
 from ...jobs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ..base import Stage
-from .described import geometry, load
 from .names import OWN_FILE
 from .outputs import DRAWING
 
@@ -35,6 +34,8 @@ def particles(part, one):
 
 def _source(shape):
     """What the geometry of a shape is made from."""
+    from .described import geometry  # here, as below: studies of beams read the stages as well
+
     described = geometry(shape)
     if not shape.file:
         return described
@@ -75,6 +76,8 @@ def _reader(shape):
 
 def _case(part, shape, material, name):
     """What a shape of its materials under a load is, but for its geometry; no density where nothing weighs."""
+    from .described import load
+
     case = part.shape[shape].loads[name]
     weighs = any(case.gravity)
     materials = {key: material_key(one, weighs) for key, one in part.materials_of(shape, material).items()}
@@ -166,7 +169,7 @@ def _mesh_products(content):
 
 def _reference_members(study, costs):
     part = study.parts["shapes"]
-    return {"_".join(one): (costs.of("shape_reference"), one) for one in (part.referred if part else ())}
+    return {"/".join(one): (costs.of("shape_reference"), one) for one in (part.referred if part else ())}
 
 
 def _references(study, folder, members):

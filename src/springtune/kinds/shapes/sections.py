@@ -102,6 +102,7 @@ Gravity = Annotated[tuple[float, float], Vector("acceleration")]
 Displacement = Annotated[float, Signed("length")]
 PressureValue = Annotated[float, Signed("stress")]
 GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
+PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
 ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape")]
 LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
@@ -223,7 +224,7 @@ class QuantityConfig(Section):
     reaction: Axis | None = Field(None, description="Force of the supports `of` a group along it.")
     area: Flag | None = Field(None, description="Growth of the area of the body; `area` alone says so.")
     energy: Flag | None = Field(None, description="Strain energy; `energy` alone says so.")
-    at: GroupName | None = Field(None, description="Point.")
+    at: PointName | None = Field(None, description="Point.")
     of: GroupName | None = Field(None, description="Group of sides.")
     expected: Anything | None = Field(
         None, description="Value that others give, with its unit: the dataset has errors against it, too."
@@ -338,6 +339,8 @@ class ShapeConfig(Section):
         for name in ("holes", "points", "refined") if self.file is not None else ():
             if getattr(self, name):
                 raise refuse(f"a mesh file has its own {name}; remove them here", name)
+        if self.file is None and "unit" in self.model_fields_set:
+            raise refuse("is of the coordinates in a mesh file, and there is none; remove it", "unit")
         return self
 
 
@@ -372,3 +375,8 @@ class ShapeGridConfig(Section):
         validate_default=True,
         description="Whether there is a converged reference; else errors are those against `expected` values alone.",
     )
+
+
+NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None
+NAMED_GRIDS = Annotated[dict[str, ShapeGridConfig], Named("grid", for_files=False)] | None
+"""What a study has under ``shapes`` and ``shape_grids``."""

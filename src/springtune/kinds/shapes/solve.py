@@ -99,7 +99,12 @@ def _solved(family, grouped, task, sheets):
     begin, sheet = time.perf_counter(), sheets.get(shape.thickness)
     derived = sheet.deriving if sheet else 0.0
     try:
-        scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
+        try:
+            scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
+        except DefinitionError:
+            raise
+        except ValueError as error:  # loads on what is held, quantities that the mesh has not
+            return _hole(str(error))
         sheets[shape.thickness] = scene.sheet
         found = scene.solve()
     except DefinitionError as error:
