@@ -12,7 +12,7 @@ from click.core import ParameterSource
 from .options import asked_quantity
 
 if TYPE_CHECKING:
-    from ..kinds.shapes.kind import Shapes
+    from ..kinds.shapes.expand import Shapes
     from ..mesh.groups import GroupedMesh
     from ..problem.materials import AnyMaterial
     from ..problem.shapes import Shape
