@@ -263,3 +263,12 @@ def test_a_motion_does_not_follow():
     scene = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="delingette")
     with pytest.raises(ValueError, match="load: 'push' turns with the side that it acts on, and forces of a motion"):
         scene.motion()
+
+
+def test_a_stress_where_materials_meet_is_refused_at_once():
+    points = {"core": (0.08, 0.031), "beside": (0.02, 0.01)}
+    shape = replace(PLATE, points=points)
+    meshed = st.mesh_shape(shape, "8 mm")
+    with pytest.raises(ValueError, match="quantity 'in_core': 'core' is where different materials meet"):
+        st.Scene(shape, meshed, {"": STEEL, "core": THIRD}, "pull", definition="delingette")
+    assert st.Scene(shape, meshed, STEEL, "pull", definition="delingette").solve().message == ""

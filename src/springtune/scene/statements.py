@@ -269,6 +269,17 @@ class ShapeStatement:
             reaction_weights(self.grouped, self.case, one)
         elif one.kind == "stress":
             cell_at(self.grouped, one.of)
+            particle = self.grouped.particle(one.of)
+            names = {
+                str(name)
+                for count, labels in part_names(self.grouped).items()
+                for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]
+            }
+            if particle is not None and len({self.by_part[name] for name in names}) > 1:
+                raise ValueError(
+                    f"load {self.load!r}, quantity {one.name!r}: {one.of!r} is where different materials meet, and the "
+                    "stress has a jump there; ask for it on one side"
+                )
 
     def check(self, definition: Definition | OwnDefinition) -> None:
         """Refuse a definition that is for beams alone."""
