@@ -29,7 +29,7 @@ from ..problem.cases import check_case
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
-from ..problem.quantities import nearest, positive
+from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..springs import Definition, DefinitionError, Springs
 from ..springs.identification import Case
@@ -461,7 +461,8 @@ def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: Group
         raise ValueError(f"material: {said} has none; given: {', '.join(map(repr, given)) or 'none'}")
     for name in given:
         if name not in parts:
-            raise ValueError(f"material: {name!r} is no part of the mesh; {nearest(name, sorted(parts))}")
+            known = f"is no part of the mesh; known: {', '.join(map(repr, sorted(parts)))}"
+            raise ValueError(f"material: {name!r} {grouped.unusable.get(name, known)}")
     return given
 
 
