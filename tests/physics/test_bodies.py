@@ -263,3 +263,21 @@ def test_a_motion_does_not_follow():
     scene = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="delingette")
     with pytest.raises(ValueError, match="load: 'push' turns with the side that it acts on, and forces of a motion"):
         scene.motion()
+
+
+def test_a_stress_where_materials_meet_is_refused_at_once():
+    points = {"core": (0.08, 0.031), "beside": (0.02, 0.01)}
+    shape = replace(PLATE, points=points)
+    meshed = st.mesh_shape(shape, "8 mm")
+    with pytest.raises(ValueError, match="quantity 'in_core': 'core' is where different materials meet"):
+        st.Scene(shape, meshed, {"": STEEL, "core": THIRD}, "pull", definition="delingette")
+    assert st.Scene(shape, meshed, STEEL, "pull", definition="delingette").solve().message == ""
+
+
+def test_a_material_of_no_part_is_told_why_it_is_none(grouped):
+    materials = {"": STEEL, "core": THIRD, "cores": THIRD}
+    with pytest.raises(ValueError, match="material: 'cores' is no part of the mesh; known: '', 'core'$"):
+        st.Scene(PLATE, grouped, materials, "pull", definition="delingette")
+    shared = replace(grouped, unusable={"cores": "has cells that part 'core' has, too; a cell has one material"})
+    with pytest.raises(ValueError, match="material: 'cores' has cells that part 'core' has, too"):
+        st.Scene(PLATE, shared, materials, "pull", definition="delingette")

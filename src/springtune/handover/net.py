@@ -412,6 +412,8 @@ def _parts(
 
 def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
     """An energy of some cells as one of all with as many corners, the others' moduli zero: files have all cells."""
+    if type(energy) not in (AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy):
+        return energy  # which `terms` refuses
     cells = mesh.cells[energy.corners.shape[1]]
     if len(energy.corners) == len(cells):
         return energy

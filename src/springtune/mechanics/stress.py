@@ -8,7 +8,8 @@ Energies give the forces of each cell exactly: with `springtune.springs.delinget
 triangles. A spring of force f, length l and direction n belongs to the cells on both of its sides, each of which has
 half of it, :math:`f l\, n \otimes n / 2`; an edge of the outline or a diagonal has one cell, which has all. So do
 `springtune.springs.lattice` and `springtune.springs.patch` give springs to cells, and whatever share it is the sum over
-all cells is the same.
+all cells is the same. Where two materials meet, both cells get half of a spring that is the sum of theirs: there the
+stress of springs, not that of energies, is a mean of both sides, in the cells that have such an edge.
 
 Stress at particles is that of a linear field, fitted by least squares to the cells around a particle at their middles,
 where it is better than elsewhere (superconvergent patch recovery: O. C. Zienkiewicz and J. Z. Zhu, Int. J. Numer.

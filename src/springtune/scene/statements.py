@@ -29,7 +29,7 @@ from ..problem.cases import check_case
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
-from ..problem.quantities import nearest, positive
+from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.limits import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
@@ -280,6 +280,17 @@ class ShapeStatement:
             reaction_weights(self.grouped, self.case, one)
         elif one.kind == "stress":
             cell_at(self.grouped, one.of)
+            particle = self.grouped.particle(one.of)
+            names = {
+                str(name)
+                for count, labels in part_names(self.grouped).items()
+                for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]
+            }
+            if particle is not None and len({self.by_part[name] for name in names}) > 1:
+                raise ValueError(
+                    f"load {self.load!r}, quantity {one.name!r}: {one.of!r} is where different materials meet, and the "
+                    "stress has a jump there; ask for it on one side"
+                )
 
     def check(self, definition: Definition | OwnDefinition) -> None:
         """Refuse a definition that is for beams alone."""
@@ -467,7 +478,8 @@ def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: Group
         raise ValueError(f"material: {said} has none; given: {', '.join(map(repr, given)) or 'none'}")
     for name in given:
         if name not in parts:
-            raise ValueError(f"material: {name!r} is no part of the mesh; {nearest(name, sorted(parts))}")
+            known = f"is no part of the mesh; known: {', '.join(map(repr, sorted(parts)))}"
+            raise ValueError(f"material: {name!r} {grouped.unusable.get(name, known)}")
     return given
 
 
