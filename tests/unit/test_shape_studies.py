@@ -104,7 +104,7 @@ REFUSED = {
     "expected of another kind": (("23.96 mm", "23.96 MPa"), "expected: '23.96 MPa' is a stress; give a length"),
     "source of nothing": (("expected: 23.96 mm, ", ""), "source: a source of no value; give 'expected'"),
     "reaction of what is free": (("work: energy", "work: {reaction: x, of: right}"), "unknown support 'right'"),
-    "sides that cross": (("[48 mm, 60 mm]", "[-20 mm, 10 mm]"), "shapes.cook: "),
+    "sides that cross": (("[48 mm, 60 mm]", "[-20 mm, 10 mm]"), "shapes.cook.outline: "),
     "unknown material": (("material: third", "material: thrid"), "unknown material 'thrid'; did you mean 'third'?"),
     "unknown shape": (("shape: cook", "shape: cok"), "unknown shape 'cok'; did you mean 'cook'?"),
     "unknown load": (("material: third,", "material: third, load: pull,"), "shape 'cook' has no load 'pull'"),
