@@ -28,12 +28,12 @@ from springtune.mesh import (
     MESH_TYPES,
     MeshError,
     corner_angles,
-    mesh_shape,
     read_beam_mesh,
-    read_shape,
     signed_areas,
     write_mesh,
 )
+from springtune.mesh.group_files import read_shape
+from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.output import reading
 from springtune.output.comparison import compare

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark")
+STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 STUDY = """
 title: As small as it gets
 beams:

@@ -238,8 +238,12 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
 
 
 def _law(energy: "Energy") -> tuple[object, ...]:
-    """What energies of one kind have to share to be one: numbers of all cells, and how many each cell has."""
-    values = [getattr(energy, part.name) for part in fields(energy) if part.name not in CELL_FIELDS]  # type: ignore[arg-type]
+    """What energies of one kind have to share to be one: numbers of all cells, and how many each cell has.
+
+    Not of laws of rubber, of which one may have more terms than another, and another range of data.
+    """
+    names = [part.name for part in fields(energy) if part.name not in (*CELL_FIELDS, "coefficients", "largest")]  # type: ignore[arg-type]
+    values = [getattr(energy, name) for name in names]
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 
 
