@@ -258,11 +258,11 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     for part in fields(first):  # type: ignore[arg-type]
         own = [getattr(energy, part.name) for energy, _, _ in parts]
         given = [one for one in own if one is not None]
-        if part.name in CELL_FIELDS or not given or not isinstance(given[0], np.ndarray):
-            continue
         if part.name == "largest":  # a range of data, not a modulus
             own = [np.broadcast_to(one, len(where)) for one, (_, where, _) in zip(own, parts)]
             moduli[part.name] = np.concatenate(own)[order]
+            continue
+        if part.name in CELL_FIELDS or not given or not isinstance(given[0], np.ndarray):
             continue
         if part.name == "coefficients":  # of laws with fewer terms the others are zero
             most = max(one.shape[1] for one in given)
