@@ -12,7 +12,7 @@ import xarray as xr
 import yaml
 
 import springtune as st
-from springtune.campaign import collect, page
+from springtune.campaign import collect, page, verify
 from springtune.campaign.plan import plan, table_files
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
@@ -271,6 +271,21 @@ def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
     rows = (tmp_path / "shapes.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * len(study.parts["shapes"].scenes)
     assert "Sources: cook, tip: somebody." in (tmp_path / "index.html").read_text()
+
+
+def test_scenes_of_shapes_are_made_again(cook, tmp_path):
+    """The same numbers, whichever are drawn; a number that is not what its scene gives is found."""
+    study, tree, _ = cook
+    beside = study.path.parent
+    made = list(verify.again(beside / "results/study", beside, 1, 0))
+    assert len(made) == 1 and made[0].agrees and made[0].before == "solved"
+    names = {one.name for one in study.parts["shapes"].scenes}
+    assert made[0].labels in names and "cook_free_8mm_third_shear_lattice_linear" in names
+    other = tree.copy(deep=True)
+    other["shapes"].value.loc[{"mesh_size": 8e-3, "definition": "lattice", "quantity": "tip"}] *= 1 + 1e-5
+    other.to_netcdf(tmp_path / "dataset.nc")
+    wrong = [one.labels for one in verify.again(tmp_path, beside, 9, 0) if not one.agrees]
+    assert wrong == ["cook_free_8mm_third_shear_lattice_linear"]
 
 
 def test_networks_that_are_drawn_are_stored(cook):
