@@ -22,6 +22,7 @@ from ..problem.status import Status
 from ..study.model import SceneSpec
 from . import due
 from .plan import plan
+from .summary import SCENES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,12 +31,12 @@ if TYPE_CHECKING:
     from ..output.dataset import Label
     from ..study.model import CurveSpec, Study
 
-SCENES, SHAPES = "/", "/shapes"
-"""Groups of a dataset that have scenes: of beams, and of shapes."""
+OF_SHAPES = "/shapes"
+"""Group of the scenes of shapes."""
 
 COMPARED = {
     SCENES: ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement"),
-    SHAPES: ("value", "error", "reference_value"),
+    OF_SHAPES: ("value", "error", "reference_value"),
 }
 """Numbers of a scene that are made again, by group; one of each quantity where a scene has many."""
 
@@ -197,7 +198,7 @@ def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str,
     shapes = study.parts["shapes"]
     found: dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]] = {
         SCENES: {scene: study.labels(scene) for scene in study.scenes},
-        SHAPES: {scene: asdict(scene) for scene in (shapes.scenes if shapes else ())},
+        OF_SHAPES: {scene: asdict(scene) for scene in (shapes.scenes if shapes else ())},
     }
     return {name: scenes for name, scenes in found.items() if scenes}
 

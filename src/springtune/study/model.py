@@ -6,13 +6,15 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
-from ..problem.shapes import Shape
 from .messages import Problems
+
+if TYPE_CHECKING:
+    from ..problem.shapes import Shape
 
 FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 """Reference of sheets at finite strain: networks of nonlinear kinematics are compared with it where a study has it."""
