@@ -14,6 +14,7 @@ import yaml
 import springtune as st
 from springtune.campaign import collect, page, verify
 from springtune.campaign.plan import plan, table_files
+from springtune.campaign.workload import results_of
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
 from springtune.kinds.shapes import stored
@@ -444,6 +445,18 @@ def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
     jobs = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
     tasks = [task for job in jobs if job.stage.name == "shape_reference" for task in job.content["references"]]
     assert len({task["key"] for task in tasks}) == 2
+
+
+def test_twins_are_counted_as_often_as_they_are_computed(loaded, tmp_path):
+    """Two shapes that are one body have two meshes, and one reference."""
+    content = yaml.safe_load(COOK)
+    content["shapes"]["twin"] = content["shapes"]["cook"]
+    content["shape_grids"]["all"] |= {"shape": ["cook", "twin"], "mesh_size": "16 mm"}
+    made = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    asked = dict.fromkeys((job.stage.name for job in made), 0)
+    for job in made:
+        asked[job.stage.name] += len(results_of(job.content))
+    assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
 
 
 def test_a_scene_that_cannot_be_stated_is_a_hole(loaded, tmp_path):
