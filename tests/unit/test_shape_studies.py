@@ -15,6 +15,7 @@ import springtune as st
 from springtune.campaign import collect, page, verify
 from springtune.campaign.plan import plan, table_files
 from springtune.campaign.workload import results_of
+from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
 from springtune.kinds.shapes import stored
@@ -203,8 +204,6 @@ def test_tasks_have_all_of_a_shape():
 
 
 def test_a_mesh_is_stored_with_its_groups(tmp_path):
-    from springtune.jobs import store
-
     core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
     grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
     grouped = replace(grouped, unusable={"odd one": "is not on the outline"})
@@ -457,6 +456,21 @@ def test_twins_are_counted_as_often_as_they_are_computed(loaded, tmp_path):
     for job in made:
         asked[job.stage.name] += len(results_of(job.content))
     assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
+
+
+def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(loaded, tmp_path):
+    class Limited(Spent):
+        limits = "1 s"
+
+    study = loaded(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
+    jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
+    mesh, solve = (import_module(f"springtune.{jobs[name].stage.module}") for name in ("shape_mesh", "shape_solve"))
+    mesh.lose(jobs["shape_mesh"].content, "cook_free_16mm", "not done", "1 s")
+    solve.run(jobs["shape_solve"].content, Limited())
+    (path,) = (tmp_path / "results/study/shape_solutions").iterdir()
+    assert store.stored(path, "1 s") and not store.stored(path, "1 min")
+    tree, told = done(study, tmp_path / "results/study")
+    assert "2 solved" in told
 
 
 def test_a_scene_that_cannot_be_stated_is_a_hole(loaded, tmp_path):
