@@ -12,8 +12,10 @@ import xarray as xr
 import yaml
 
 import springtune as st
-from springtune.campaign import collect, page
+from springtune.campaign import collect, page, verify
 from springtune.campaign.plan import plan, table_files
+from springtune.campaign.workload import results_of
+from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds import load_study, outputs
 from springtune.kinds.shapes import stored
@@ -202,8 +204,6 @@ def test_tasks_have_all_of_a_shape():
 
 
 def test_a_mesh_is_stored_with_its_groups(tmp_path):
-    from springtune.jobs import store
-
     core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
     grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
     grouped = replace(grouped, unusable={"odd one": "is not on the outline"})
@@ -271,6 +271,21 @@ def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
     rows = (tmp_path / "shapes.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * len(study.parts["shapes"].scenes)
     assert "Sources: cook, tip: somebody." in (tmp_path / "index.html").read_text()
+
+
+def test_scenes_of_shapes_are_made_again(cook, tmp_path):
+    """The same numbers, whichever are drawn; a number that is not what its scene gives is found."""
+    study, tree, _ = cook
+    beside = study.path.parent
+    made = list(verify.again(beside / "results/study", beside, 1, 0))
+    assert len(made) == 1 and made[0].agrees and made[0].before == "solved"
+    names = {one.name for one in study.parts["shapes"].scenes}
+    assert made[0].labels in names and "cook_free_8mm_third_shear_lattice_linear" in names
+    other = tree.copy(deep=True)
+    other["shapes"].value.loc[{"mesh_size": 8e-3, "definition": "lattice", "quantity": "tip"}] *= 1 + 1e-5
+    other.to_netcdf(tmp_path / "dataset.nc")
+    wrong = [one.labels for one in verify.again(tmp_path, beside, 9, 0) if not one.agrees]
+    assert wrong == ["cook_free_8mm_third_shear_lattice_linear"]
 
 
 def test_networks_that_are_drawn_are_stored(cook):
@@ -429,6 +444,33 @@ def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
     jobs = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
     tasks = [task for job in jobs if job.stage.name == "shape_reference" for task in job.content["references"]]
     assert len({task["key"] for task in tasks}) == 2
+
+
+def test_twins_are_counted_as_often_as_they_are_computed(loaded, tmp_path):
+    """Two shapes that are one body have two meshes, and one reference."""
+    content = yaml.safe_load(COOK)
+    content["shapes"]["twin"] = content["shapes"]["cook"]
+    content["shape_grids"]["all"] |= {"shape": ["cook", "twin"], "mesh_size": "16 mm"}
+    made = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    asked = dict.fromkeys((job.stage.name for job in made), 0)
+    for job in made:
+        asked[job.stage.name] += len(results_of(job.content))
+    assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
+
+
+def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(loaded, tmp_path):
+    class Limited(Spent):
+        limits = "1 s"
+
+    study = loaded(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
+    jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
+    mesh, solve = (import_module(f"springtune.{jobs[name].stage.module}") for name in ("shape_mesh", "shape_solve"))
+    mesh.lose(jobs["shape_mesh"].content, "cook_free_16mm", "not done", "1 s")
+    solve.run(jobs["shape_solve"].content, Limited())
+    (path,) = (tmp_path / "results/study/shape_solutions").iterdir()
+    assert store.stored(path, "1 s") and not store.stored(path, "1 min")
+    tree, told = done(study, tmp_path / "results/study")
+    assert "2 solved" in told
 
 
 def test_a_scene_that_cannot_be_stated_is_a_hole(loaded, tmp_path):

@@ -17,7 +17,7 @@ from ..kinds.scenes.lawful import of_own_law
 from ..output.text import aligned, label_text, without_numbers
 from ..problem.status import Status
 from .plan import Plan
-from .workload import clock, computed, keys_of
+from .workload import clock, computed, results_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -329,7 +329,7 @@ def _computed(plan: Plan, since: float) -> str:
         record, stage = plan.record(name), job.stage.name
         number = computed(record)
         if number is not None:
-            asked[stage] = asked.get(stage, 0) + len(set(keys_of(job.content)))
+            asked[stage] = asked.get(stage, 0) + len(results_of(job.content))
             new[stage] = new.get(stage, 0) + (number if _time(record) >= since else 0)
     told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if not told:

@@ -4,7 +4,7 @@ import json
 import random
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,17 +19,26 @@ from ..jobs.spent import Spent
 from ..kinds import kinds, load_study
 from ..output import reading
 from ..problem.status import Status
+from ..study.model import SceneSpec
 from . import due
 from .plan import plan
+from .summary import SCENES
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..kinds.shapes.expand import Shapes, ShapeScene
     from ..output.dataset import Label
-    from ..study.model import CurveSpec, SceneSpec, Study
+    from ..study.model import CurveSpec, Study
 
-COMPARED = ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement")
-"""Numbers of a scene that are made again."""
+OF_SHAPES = "/shapes"
+"""Group of the scenes of shapes."""
+
+COMPARED = {
+    SCENES: ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement"),
+    OF_SHAPES: ("value", "error", "reference_value"),
+}
+"""Numbers of a scene that are made again, by group; one of each quantity where a scene has many."""
 
 SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
 """Relative differences that are none: with the versions of the software that the dataset was made with, and with
@@ -160,28 +169,45 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
         If its config cannot be read any more, such as where a file that it names is gone.
     """
     with reading.open(folder) as tree, tempfile.TemporaryDirectory() as temporary:
-        root = tree.to_dataset().load()
+        before = {name: tree[name].to_dataset().load() for name in COMPARED if name == SCENES or name in tree.groups}
+        root = before[SCENES]
         config = Path(temporary) / f"{root.attrs['study']}.yaml"
         atomic.write_text(config, root.attrs["config"])
         study = load_study(config, beside)
         # What was lost to limits would take as much again.
-        held = [scene for scene in study.scenes if LIMITS_TOLD not in str(root.message.sel(study.labels(scene)).item())]
-        drawn = random.Random(seed).sample(held, min(number, len(held)))
-        part = _part(study, drawn)
+        held = [
+            (name, scene)
+            for name, scenes in _scenes(study).items()
+            for scene, labels in scenes.items()
+            if LIMITS_TOLD not in str(before[name].message.sel(labels).item())
+        ]
+        drawn = set(random.Random(seed).sample(held, min(number, len(held))))
+        part = _part(study, {scene for _, scene in drawn})
         made = _made(part, Path(temporary) / "results" / study.name)
     software = json.loads(root.attrs["software"])
     same = all(installed(name) == version for name, version in software.items() if name != "python")
-    for scene in part.scenes:
-        yield _compared(
-            study.name_of(scene), study.labels(scene), root, made, SAME_SOFTWARE if same else OTHER_SOFTWARE
-        )
+    for name, scenes in _scenes(part).items():
+        for scene, labels in scenes.items():
+            called = study.name_of(scene) if isinstance(scene, SceneSpec) else scene.name
+            limit = SAME_SOFTWARE if same else OTHER_SOFTWARE
+            yield _compared(called, labels, before[name], made[name], COMPARED[name], limit)
 
 
-def _part(study: "Study", scenes: "list[SceneSpec]") -> "Study":
+def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]]":
+    """Scenes of a study with the cells that are theirs, by group of its dataset."""
+    shapes = study.parts["shapes"]
+    found: dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]] = {
+        SCENES: {scene: study.labels(scene) for scene in study.scenes},
+        OF_SHAPES: {scene: asdict(scene) for scene in (shapes.scenes if shapes else ())},
+    }
+    return {name: scenes for name, scenes in found.items() if scenes}
+
+
+def _part(study: "Study", chosen: "set[SceneSpec | ShapeScene]") -> "Study":
     """A study of a few scenes of another one, and of what these need."""
-    chosen = set(scenes)
+    beams = [scene for scene in study.scenes if scene in chosen]
     groups = {
-        (scene.mesh.mesh_type, scene.material, scene.kinematics) for scene in chosen if scene.definition == "calibrated"
+        (scene.mesh.mesh_type, scene.material, scene.kinematics) for scene in beams if scene.definition == "calibrated"
     }
     curves = tuple(
         curve
@@ -189,43 +215,67 @@ def _part(study: "Study", scenes: "list[SceneSpec]") -> "Study":
         if (curve.mesh.beam.name, curve.load) == study.calibration
         and (curve.mesh.mesh_type, curve.material, curve.kinematics) in groups
     )
-    asked: list[SceneSpec | CurveSpec] = [*chosen, *curves]
+    asked: list[SceneSpec | CurveSpec] = [*beams, *curves]
     bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
     meshes = {one.mesh for one in asked}
     return replace(
         study,
-        scenes=tuple(scene for scene in study.scenes if scene in chosen),
+        scenes=tuple(beams),
         curves=curves,
         meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
         references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
         further_references=(),
         printed=(),
-        parts={name: part if name == "scenes" else () for name, part in study.parts.items()},
+        parts=dict.fromkeys(study.parts, ())
+        | {"scenes": study.parts["scenes"] if beams else (), "shapes": _part_of_shapes(study.parts["shapes"], chosen)},
     )
 
 
-def _made(study: "Study", folder: Path) -> "xr.Dataset":
-    """Root of the dataset of a study, made in this process."""
+def _part_of_shapes(part: "Shapes | tuple[()]", chosen: "set[SceneSpec | ShapeScene]") -> "Shapes | tuple[()]":
+    """The same of the shapes of a study; nothing where none of them is chosen."""
+    if not part or not (scenes := tuple(scene for scene in part.scenes if scene in chosen)):
+        return ()
+    cases = {(one.shape, one.material, one.load) for one in scenes}
+    names = {one.shape for one in scenes}
+    return replace(
+        part,
+        shapes=tuple(shape for shape in part.shapes if shape.name in names),
+        scenes=scenes,
+        referred=tuple(case for case in part.referred if case in cases),
+    )
+
+
+def _made(study: "Study", folder: Path) -> "dict[str, xr.Dataset]":
+    """Groups of the dataset of a study that have scenes, made in this process."""
     for job in plan(study, folder, 1).jobs.values():
         spent = Spent()
         import_module(f"springtune.{job.stage.module}").run(job.content, spent)
         if spent.broken:
             raise spent.broken[0]
-    (scenes,) = (kind for kind in kinds() if kind.name == "scenes")
-    found: xr.Dataset = scenes.module("collect").groups(study, folder)["/"]
+    found: dict[str, xr.Dataset] = {}
+    for kind in kinds():
+        if kind.name in ("scenes", "shapes") and study.parts[kind.name]:
+            found |= kind.module("collect").groups(study, folder)
     return found
 
 
-def _compared(name: str, labels: "dict[str, Label]", before: "xr.Dataset", after: "xr.Dataset", limit: float) -> Again:
+def _compared(
+    name: str,
+    labels: "dict[str, Label]",
+    before: "xr.Dataset",
+    after: "xr.Dataset",
+    numbers: tuple[str, ...],
+    limit: float,
+) -> Again:
     cells = [data.sel({name: label for name, label in labels.items() if name in data.dims}) for data in (before, after)]
     differences = [0.0]
-    for name in COMPARED:
-        old, new = (float(cell[name]) for cell in cells)
-        if np.isnan(old) != np.isnan(new):
-            differences.append(np.inf)
-        elif old != new and not np.isnan(old):
-            # An error that is small is a difference of large numbers.
-            size = 1.0 if name.endswith("error") else max(abs(old), abs(new))
-            differences.append(abs(new - old) / size)
+    for number in numbers:
+        for old, new in zip(*(np.ravel(cell[number]).tolist() for cell in cells), strict=True):
+            if np.isnan(old) != np.isnan(new):
+                differences.append(np.inf)
+            elif old != new and not np.isnan(old):
+                # An error that is small is a difference of large numbers.
+                size = 1.0 if number.endswith("error") else max(abs(old), abs(new))
+                differences.append(abs(new - old) / size)
     old_status, new_status = (str(Status(int(cell.status))) for cell in cells)
     return Again(name, old_status, new_status, max(differences), limit)

@@ -68,6 +68,36 @@ def keys_of(content: Any) -> list[str]:
     return [key for part in content for key in keys_of(part)] if isinstance(content, list) else []
 
 
+def results_of(content: Any, name: str = "") -> set[tuple[str, str]]:
+    """Results that a task file asks for: the name of what each is stored for, such as its mesh, and its key.
+
+    Parameters
+    ----------
+    content : object
+        Of the file.
+    name : str, optional
+        Of what it is part of.
+
+    Returns
+    -------
+    set of tuple of str
+
+    Examples
+    --------
+    Two meshes that are alike are two files:
+
+    >>> sorted(results_of({"meshes": [{"name": "one", "key": "a"}, {"name": "two", "key": "a"}]}))
+    [('one', 'a'), ('two', 'a')]
+    """
+    if isinstance(content, dict):
+        name = content["name"] if isinstance(content.get("name"), str) else name
+        if "key" in content:
+            return {(name, content["key"])}
+        content = list(content.values())
+    parts = content if isinstance(content, list) else ()
+    return {result for part in parts for result in results_of(part, name)}
+
+
 def computed(done: Path) -> int | None:
     """Number of tasks that a job computed, those left out whose results were there; None where it does not say.
 

@@ -10,6 +10,7 @@ from ...problem.materials import Material
 from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from ...springs import DEFINITIONS
 from .names import OUTLINED, OWN_FILE, OWN_SIZE
+from .plan import mesh_name
 
 if TYPE_CHECKING:
     from ...mesh.groups import GroupedMesh
@@ -44,6 +45,11 @@ class ShapeScene:
     load: str
     definition: str
     kinematics: str
+
+    @property
+    def name(self) -> str:
+        """Readable name, unique in the study, such as ``"cook_free_4mm_third_shear_lattice_linear"``."""
+        return "_".join((mesh_name(self), self.material, self.load, self.definition, self.kinematics))
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,9 @@ def run(tasks, spent):
             continue
         grouped = stored.read(tasks["meshes"], family["name"], family["mesh"])
         if isinstance(grouped, str):
-            store.add(path, {key: _hole(grouped) for scene in missing for key in _keys(scene)})
+            lost = stored.is_lost(tasks["meshes"], family["name"], family["mesh"])
+            hole = _hole(grouped) | ({store.LIMITS: spent.limits} if lost else {})
+            store.add(path, {key: hole for scene in missing for key in _keys(scene)})
             spent.add(WITHOUT_MESH, 0, 0.0, len(missing))
             continue
         sheets = {}

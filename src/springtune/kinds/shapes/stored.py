@@ -11,6 +11,9 @@ from ...mesh.groups import GroupedMesh
 
 CORNERS = {3: "triangles", 4: "quads"}
 
+NO_LIMITS = "none"
+"""Limits that no result was lost to."""
+
 
 def packed(grouped: GroupedMesh) -> dict[str, Any]:
     """A mesh and its groups as they are stored.
@@ -71,3 +74,18 @@ def read(folder: str | Path, name: str, key: str) -> GroupedMesh | str:
         },
         known["unusable"],
     )
+
+
+def is_lost(folder: str | Path, name: str, key: str) -> bool:
+    """Whether a mesh went beyond its limits, so that others may make it.
+
+    Parameters
+    ----------
+    folder, name, key
+        As of `read`.
+
+    Returns
+    -------
+    bool
+    """
+    return key not in store.stored(Path(folder) / f"{name}.h5", NO_LIMITS)
