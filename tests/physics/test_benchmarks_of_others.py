@@ -61,7 +61,14 @@ def kind(shape, load, quantity):
     return next(one.kind for one in asked if one.name == quantity)
 
 
-@pytest.mark.parametrize("row", rows("On the finest mesh"), ids=lambda row: row[0])
+@pytest.mark.parametrize(
+    "row",
+    [
+        row if row[0].startswith(("`cook", "`hole", "`arch")) else pytest.param(row, marks=pytest.mark.slow)
+        for row in rows("On the finest mesh")
+    ],
+    ids=lambda row: row[0],
+)
 def test_errors_on_the_finest_mesh_are_those_of_the_page(row):
     shape, load, quantity = place(row[0])
     sizes = [one.mesh_size for one in study().parts["shapes"].scenes if one.shape == shape]

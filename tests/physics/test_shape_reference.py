@@ -19,6 +19,7 @@ from springtune.reference.small_strain import ReferenceNotConvergedError, solve_
 STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
 EVERY = [(make, name) for make in others.ALL for name in make()[0].loads]
 IDS = [f"{make.__name__}-{name}" for make, name in EVERY]
+LONG_SOLVED = (others.l_shape, others.cook)
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,11 @@ def test_what_others_published(make, name):
             assert found.values[quantity.name] == pytest.approx(quantity.expected, rel=allowed)
 
 
-@pytest.mark.parametrize(("make", "name"), EVERY, ids=IDS)
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [pytest.param(*one, marks=pytest.mark.slow) if one[0] in LONG_SOLVED else one for one in EVERY],
+    ids=IDS,
+)
 def test_a_finer_solution_confirms_the_estimate(make, name):
     shape, material = make()
     load = shape.loads[name]

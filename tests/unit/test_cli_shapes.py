@@ -186,6 +186,7 @@ class TestError:
 
     ASKED = ("predict", "--shape", f"{SHAPES}:cook", "--material", "third", "--error", "3 %")
 
+    @pytest.mark.slow
     def test_the_mesh_that_is_found_keeps_the_error_and_finer_ones_do(self, tmp_path):
         result = run(*self.ASKED, "--springs-alone", "--json", "--write", tmp_path / "net.json")
         assert result.exit_code == 0, result.output

@@ -68,6 +68,7 @@ class TestNew:
             assert len(load_study("config/other.yaml").scenes) == 2
         assert (Path("config") / re.search(r"\$schema=(\S+)", lines[0])[1]).is_file()
 
+    @pytest.mark.slow
     def test_a_study_of_a_shape_is_explained_and_runs_as_it_is(self, checkout):
         result = run("new", "my-plate", "--shape")
         assert result.stdout.startswith("config/my-plate.yaml: 4 scenes; change it as you like")
