@@ -135,11 +135,16 @@ def test_what_is_wrong_is_refused_with_line_key_and_remedy(refusal, case):
 def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
     text = "title: nothing\nmaterials: {one: {young_modulus: 1 MPa, poisson_ratio: 0.3}}\n"
     message = refusal(text)
-    assert "'beams' is missing; give a section for each beam, by name" in message
+    assert (
+        "'beams' is missing; give a section for each beam, by name; see below, or 'shapes' and 'shape_grids'" in message
+    )
     beams = text + "beams: {small: {length: 1 m, height: 1 m}}\n"
-    assert "'grids' is missing; give a section for each grid, by name; see below, or 'shape_grids'" in refusal(beams)
+    assert (
+        "'grids' is missing; give a section for each grid, by name; see below, or 'shapes' and 'shape_grids'"
+        in refusal(beams)
+    )
     shapes = COOK.partition("shape_grids:")[0]
-    assert "'beams' is missing" in refusal(shapes)
+    assert "'shape_grids' is missing; give a section" in refusal(shapes)
     assert "'shapes' is missing; add it" in refusal(text + "shape_grids:" + COOK.partition("shape_grids:")[2])
 
 

@@ -1,6 +1,6 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
@@ -472,18 +472,24 @@ class StudyConfig(Section):
     )
     grids: dict[str, GridConfig] = Field({})
 
-    alone: ClassVar[tuple[str, ...]] = ()
-    """Keys of study kinds in the place of which a study may have neither beams nor grids."""
+    alone: ClassVar[dict[str, tuple[str, ...]]] = {}
+    """Keys of study kinds in the place of which a study may have neither beams nor grids, and what goes with each."""
 
     @classmethod
     def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
         found = super()._needed(given)
         if "grids" in given or not set(cls.alone) & set(given):
-            found |= {"beams": "", "grids": "".join(f", or '{name}'" for name in cls.alone)}
+            begun = [name for name, others in cls.alone.items() if set(others) & set(given)]
+            if begun and not {"beams", "grids"} & set(given):
+                found |= dict.fromkeys(begun, "")
+            else:
+                ways = [" and ".join(f"'{name}'" for name in (*others, key)) for key, others in cls.alone.items()]
+                instead = "".join(f", or {way}" for way in ways)
+                found |= {"beams": "" if "grids" in given else instead, "grids": instead}
         return {name: found[name] for name in cls.model_fields if name in found}
 
 
-def _beams_or(alone: Sequence[str]) -> dict[str, Any]:
+def _beams_or(alone: Iterable[str]) -> dict[str, Any]:
     """What the schema of a study says besides: which keys it has without beams and grids."""
     return {"anyOf": [{"required": ["beams", "grids"]}, *({"required": [name]} for name in alone)]}
 
@@ -549,7 +555,12 @@ def study_model(kinds: Sequence[StudyKind], given: Container[object] | None = No
         Field({}, description="Grids: what is to be computed."),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
-    model.__doc__, model.alone = StudyConfig.__doc__, tuple(name for kind in kinds for name in kind.alone)
+    model.__doc__ = StudyConfig.__doc__
+    model.alone = {
+        name: tuple(other for other in kind.study_fields if other not in kind.alone)
+        for kind in kinds
+        for name in kind.alone
+    }
     model.model_config["json_schema_extra"] = _beams_or(model.alone)
     return model
 
