@@ -70,6 +70,8 @@ def label_text(dimension: str, label: object, unit: str = "1") -> str:
     --------
     >>> label_text("mesh_size", 0.005, "m"), label_text("load", "shear"), label_text("friction", 0.2)
     ('5 mm', 'shear', 'friction 0.2')
+    >>> label_text("mesh_size", 0.0, "m")
+    'size of the file'
     >>> label_text("force", 12345.6, "N"), label_text("gap", 0.001, "m")
     ('12.3456 kN', 'gap 1 mm')
     """
@@ -77,6 +79,8 @@ def label_text(dimension: str, label: object, unit: str = "1") -> str:
         return str(label)
     if dimension in SWEPT:
         return with_unit(dimension, float(label), digits=6).replace("\u00a0", " ")
+    if dimension == "mesh_size" and not float(label):  # of a shape's own mesh
+        return "size of the file"
     said = number_text(float(label), unit)
     return said if dimension == "mesh_size" else f"{dimension.replace('_', ' ')} {said}"
 
