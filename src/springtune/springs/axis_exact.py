@@ -55,7 +55,8 @@ def _rows(mesh: Mesh, nu: float) -> np.ndarray:
     small = 1e-9 * vectors.max()
     slanted = (x > small) & (y > small)
     if ((~slanted).sum(axis=1) == 0).any():
-        raise DefinitionError("needs rows of isosceles triangles along x; use a beam's mesh type 'isosceles-...', or a file of them")
+        remedy = "use a beam's mesh type 'isosceles-...', or a file of them"
+        raise DefinitionError(f"needs rows of isosceles triangles along x; {remedy}")
     own = (x[slanted] / y[slanted]) ** 2
     far = own[np.argmax(np.abs(own - nu))]
     if abs(far - nu) > SHAPE_TOLERANCE:
