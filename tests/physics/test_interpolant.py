@@ -73,6 +73,7 @@ def test_a_beam_that_does_not_contract_is_a_bar():
     np.testing.assert_allclose(built(AXIAL).evaluate(aspects, 0.0).displacement, 2 * aspects, rtol=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_long_beams_are_as_beam_theory_has_them():
     # What the clamp adds does not grow with the length, and falls to 1/2500 of it.
     slender = Interpolant.build(AXIAL, (20, 40), (0.3, 0.3)).evaluate([20, 40], 0.3).displacement

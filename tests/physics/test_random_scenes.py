@@ -24,6 +24,7 @@ def test_scenes_that_were_wrong():
     assert wrong(1, FOUND) == {}
 
 
+@pytest.mark.slow
 def test_few():
     assert wrong(2, filter(quick, range(50))) == {}
 

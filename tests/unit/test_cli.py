@@ -309,6 +309,7 @@ class TestPredict:
         reasons = [line for line in result.stdout.splitlines() if line.startswith("patch, springs: gives ")]
         assert len(reasons) == 1 and "a negative stiffness; use a mesh with less slender" in reasons[0]
 
+    @pytest.mark.slow
     def test_large_meshes_have_bands(self):
         result = run("predict", *self.STEEL, "--size", "0.25 mm")
         assert result.exit_code == 0

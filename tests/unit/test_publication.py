@@ -326,6 +326,7 @@ def paper(folder, main=MAIN, declared=NUMBERS, figures=FIGURES):
     return folder
 
 
+@pytest.mark.slow
 def test_the_same_dataset_gives_the_same_bytes_and_another_one_others(tmp_path, path):
     pypdf = pytest.importorskip("pypdf")
     source, output = paper(tmp_path / "source"), tmp_path / "paper.pdf"

@@ -313,6 +313,7 @@ class TestOnce:
 
 
 class TestClosedForm:
+    @pytest.mark.slow
     def test_indices_of_a_product_are_within_their_bands(self, here):
         """Linear triangles at nu = 0 stretch evenly: u = F L / (E t H) on any mesh, whatever the clamp.
 
@@ -426,6 +427,7 @@ class TestFailures:
         return run(("size: 16", "size: 32"), (self.UNSTABLE[0], self.UNSTABLE[1].replace("FAILURES", policy)),
                    (SIZES, "{from: 10 mm, to: 20 mm}"))[0]  # fmt: skip
 
+    @pytest.mark.slow
     def test_base_samples_of_which_a_scene_has_no_value_are_dropped_and_counted(self, here):
         tree = self.lost("failures: drop")
         data, found = tree["samples"].to_dataset(), tree["sobol"].to_dataset().sel(load="traction", definition="area")

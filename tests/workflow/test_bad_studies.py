@@ -80,6 +80,7 @@ grids:
 """
 
 
+@pytest.mark.slow
 def test_a_bad_mesh_file_costs_its_own_scenes_alone(run):
     mesh = st.make_mesh(st.Beam("50 mm", "10 mm"), "free", "5 mm")
     write_mesh(run.folder / "good.vtu", mesh)

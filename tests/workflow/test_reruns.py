@@ -183,6 +183,7 @@ def test_bad_input_ends_a_run_with_its_message_and_nothing_written(run):
     assert not (run.folder / "results/worse").exists()
 
 
+@pytest.mark.slow
 def test_what_differs_by_a_scale_alone_has_one_reference(run):
     """Size, thickness, Young's modulus and force scale a reference; Poisson's ratio and the aspect ratio do not."""
     text = study("10 mm").replace(
@@ -208,6 +209,7 @@ def test_what_differs_by_a_scale_alone_has_one_reference(run):
         assert soft == pytest.approx(small.sel(load=load) * 210e3)
 
 
+@pytest.mark.slow
 def test_more_cores_make_more_bundles_and_solve_nothing_again(run):
     run.write("spread.yaml", study("10 mm, 5 mm, 4 mm, 2 mm, 1 mm"))
     # Bundles follow costs: as if scenes were worth two jobs, and not worth three, whatever this machine measures.
