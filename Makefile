@@ -53,10 +53,9 @@ slow: $(VENV)/.test
 	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
+# Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
 lint: $(VENV)/.test
-	ruff check
-	ruff format --check
-	mypy
+	sh tools/lint.sh
 
 # The configuration's schema and manual, from the models that validate it.
 docs: $(VENV)/.run

@@ -1,15 +1,17 @@
-"""A parameter study of mass-spring models: from config/<study>.yaml to results/<study>/dataset.nc and what is read from it.
+# A parameter study of mass-spring models: from config/<study>.yaml to results/<study>/dataset.nc and what is read from it.
+#
+#     snakemake                                          the paper's study
+#     snakemake --configfile config/quick.yaml           another one
+#     snakemake paper                                    the paper, and the studies that it reads
 
-    snakemake                                          the paper's study
-    snakemake --configfile config/quick.yaml           another one
-    snakemake paper                                    the paper, and the studies that it reads
-"""
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/stages.smk"
 include: "workflow/rules/collect.smk"
 include: "workflow/rules/outputs.smk"
 include: "workflow/rules/browse.smk"
+
+
 if "study" not in config:  # a study that is read for the paper has none of its own
 
     include: "workflow/rules/paper.smk"

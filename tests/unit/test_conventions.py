@@ -152,18 +152,6 @@ def test_a_constant_has_one_meaning():
     assert not several, "\n".join(f"{name}: {', '.join(found)}" for name, found in several.items())
 
 
-def test_one_spelling():
-    other = "factor" + "is"
-    texts = [*REPOSITORY.glob("*.md"), REPOSITORY / "Makefile", REPOSITORY / "Snakefile"]
-    for folder in ("config", "docs", "examples", "src", "tests", "tools", "workflow"):
-        texts += [path for path in (REPOSITORY / folder).rglob("*")
-                  if path.suffix in (".json", ".md", ".py", ".rst", ".sh", ".smk", ".tex", ".yaml")]  # fmt: skip
-    found = [
-        str(path.relative_to(REPOSITORY)) for path in texts if f"{other}e" in path.read_text(encoding="utf-8").lower()
-    ]
-    assert not found
-
-
 def package_names(tree):
     """Names in a test that come from the package."""
     for node in ast.walk(tree):

@@ -62,7 +62,8 @@ config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's te
 OURS.recall(RESULTS.parent / CODE_FILE)
 PLAN = plan(STUDY, RESULTS, workflow.cores or 1)
 JOBS = due.jobs(STUDY, PLAN)
-READ = workflow.__dict__.setdefault("studies_read", [])  # the one that is run; for the paper, those that it reads besides
+# The one that is run; for the paper, those that it reads besides.
+READ = workflow.__dict__.setdefault("studies_read", [])
 READ.append((STUDY, PLAN))
 SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
 CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}

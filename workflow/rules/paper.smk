@@ -28,8 +28,10 @@ if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in due.PAPER_ST
 
             module:
                 name: name
-                snakefile: "../../Snakefile"
-                config: {"study": str(beside if beside.exists() else Path("config", beside.name))}
+                snakefile:
+                    "../../Snakefile"
+                config:
+                    {"study": str(beside if beside.exists() else Path("config", beside.name))}
 
             use rule * from name exclude all as prefix*
 

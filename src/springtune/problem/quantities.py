@@ -120,7 +120,7 @@ def nearest(word: str, words: Iterable[str]) -> str:
 
     Examples
     --------
-    >>> nearest("latice", ["lattice", "uniform"])
+    >>> nearest("latticce", ["lattice", "uniform"])
     "did you mean 'lattice'? known: lattice, uniform"
     """
     words = list(words)
