@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint licences docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -56,6 +56,10 @@ slow: $(VENV)/.test
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
 lint: $(VENV)/.test
 	sh tools/lint.sh
+
+# The licences of all packages of the lock files, in docs/licences.md.
+licences: $(VENV)/.test
+	python tools/licences.py
 
 # The configuration's schema and manual, from the models that validate it.
 docs: $(VENV)/.run
