@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint licences docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -48,6 +48,10 @@ test-versions: $(VENV)/.test
 # A table of changes: which jobs run then, what they compute, and that the dataset is that of a fresh run.
 test-reruns: $(VENV)/.test
 	pytest -n 2 tests/reruns
+
+# A release without releasing: built, checked, installed where nothing else is. What it needs is installed apart.
+release-check: $(VENV)/.test
+	pytest -rs tests/release
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
@@ -88,6 +92,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.

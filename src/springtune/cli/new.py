@@ -9,7 +9,7 @@ from ..registry import NAME, NAME_RULE
 from .examples import examples
 from .folders import CONFIG_FOLDER
 from .options import WrongCall
-from .run import checkout_here, library_checkout
+from .run import checkout_here, checkout_of_run, how_to_get_one
 from .schema import SCHEMA
 
 TEMPLATE = """\
@@ -103,7 +103,11 @@ def new(study: str, shape: bool) -> None:
         ) from None
     if not path.resolve().is_relative_to(Path.cwd().resolve()):
         click.echo(f"written outside of this folder: {path.resolve()}")
-    click.echo(f"{path}: {4 if shape else 2} scenes; change it as you like, and run it:\n  springtune run {path}")
+    scenes = 4 if shape else 2
+    if checkout_of_run():
+        click.echo(f"{path}: {scenes} scenes; change it as you like, and run it:\n  springtune run {path}")
+    else:
+        click.echo(f"{path}: {scenes} scenes; change it as you like. To run it: {how_to_get_one(path)}")
 
 
 def _path(given: str) -> Path:
@@ -147,7 +151,7 @@ def template_text(path: Path, template: str = TEMPLATE) -> str:
 
 def _beside(path: Path, name: str) -> str | None:
     """A file of the checkout's config, as seen from a study; None where there is none."""
-    checkout = Path() if checkout_here() else library_checkout()
+    checkout = checkout_of_run()
     file = checkout / CONFIG_FOLDER / name if checkout else None
     if file is None or not file.is_file():
         return None

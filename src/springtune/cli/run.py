@@ -58,7 +58,9 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
     if named and second:
         raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
-    checkout = _checkout()
+    checkout = checkout_of_run()
+    if checkout is None:
+        raise click.ClickException(how_to_get_one(Path(arguments[0]) if named else None))
     path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
     shown = Path(arguments[0]) if named else path
     try:
@@ -100,18 +102,26 @@ def checkout_here() -> bool:
     return all(Path(file).is_file() for file in WORKFLOW)
 
 
-def library_checkout() -> Path | None:
+def _library_checkout() -> Path | None:
     """The checkout that the library is part of; None if it is installed without one."""
     folder = Path(__file__).parents[3]
     return folder if all((folder / file).is_file() for file in WORKFLOW) else None
 
 
-def _checkout() -> Path:
-    """Folder of the workflow: this one, or that of the library."""
-    folder = Path.cwd() if checkout_here() else library_checkout()
-    if folder is None:
-        raise click.ClickException("there is no Snakefile of springtune here; change to the folder of its checkout")
-    return folder
+def checkout_of_run() -> Path | None:
+    """Folder of the workflow: this one, or that of the library; None where there is neither."""
+    return Path.cwd() if checkout_here() else _library_checkout()
+
+
+def how_to_get_one(study: Path | None) -> str:
+    """What to do where the library is installed without the workflow."""
+    from .. import __version__
+
+    return (
+        "studies are run by springtune's workflow, which is in its source and not in the installed package; get a "
+        f"clone, or unpack springtune-{__version__}.tar.gz, change to its folder, and there\n"
+        f"  springtune run {study.absolute() if study else USUAL_STUDY}"
+    )
 
 
 def _snakemake() -> list[str]:

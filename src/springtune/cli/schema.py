@@ -35,8 +35,12 @@ def schema(write: bool, folder: Path) -> None:
         return
     try:
         manual = manual_text((folder / MANUAL).read_text())
-    except (OSError, ValueError) as error:
-        raise click.ClickException(f"{folder / MANUAL}: {getattr(error, 'strerror', None) or error}") from None
+    except ValueError as error:
+        raise click.ClickException(f"{folder / MANUAL}: {error}") from None
+    except OSError as error:
+        raise click.ClickException(
+            f"{folder / MANUAL}: {error.strerror or error}; go to a checkout, or name its config/ by --folder"
+        ) from None
     for name, text in ((SCHEMA, schema_text()), (MANUAL, manual)):
         write_text(folder / name, text)
 
