@@ -5,41 +5,47 @@
     snakemake paper                                    the paper, and the studies that it reads
 """
 
-include: "workflow/rules/common.smk"
-include: "workflow/rules/stages.smk"
-include: "workflow/rules/collect.smk"
-include: "workflow/rules/outputs.smk"
-include: "workflow/rules/browse.smk"
-if "study" not in config:  # a study that is read for the paper has none of its own
-
-    include: "workflow/rules/paper.smk"
+include: "workflow/rules/environment.smk"
+include: "workflow/rules/elsewhere.smk"
 
 
-report: "workflow/report/study.rst"
+if not TOLD:
+
+    include: "workflow/rules/common.smk"
+    include: "workflow/rules/stages.smk"
+    include: "workflow/rules/collect.smk"
+    include: "workflow/rules/outputs.smk"
+    include: "workflow/rules/browse.smk"
+    if "study" not in config:  # a study that is read for the paper has none of its own
+
+        include: "workflow/rules/paper.smk"
 
 
-rule all:
-    default_target: True
-    message:
-        f"{RESULTS} is complete"
-    input:
-        # Stages before the dataset, too: what they store is made again where it is missing.
-        DONE,
-        rules.collect.output,
-        OUTPUTS.values(),
-        str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
+    report: "workflow/report/study.rst"
 
 
-release()
+    rule all:
+        default_target: True
+        message:
+            f"{RESULTS} is complete"
+        input:
+            # Stages before the dataset, too: what they store is made again where it is missing.
+            DONE,
+            rules.collect.output,
+            OUTPUTS.values(),
+            str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
 
 
-onstart:
-    begin()
+    release()
 
 
-onsuccess:
-    tell_end("ending")
+    onstart:
+        begin()
 
 
-onerror:
-    tell_end("broken")
+    onsuccess:
+        tell_end("ending")
+
+
+    onerror:
+        tell_end("broken")
