@@ -1,7 +1,7 @@
 """A cluster of two nodes on this machine: munged, slurmctld and two slurmd of Debian's packages, without systemd.
 
-Needs root. `with cluster(folder):` leaves the machine as it was: as long as there is a slurm.conf and no slurmctld, every
-start of Snakemake in an environment with the plugin takes ten seconds.
+Needs root. `with cluster(folder):` leaves the machine as it was: as long as there is a slurm.conf and no slurmctld,
+every start of Snakemake in an environment with the plugin takes ten seconds.
 """
 
 import os

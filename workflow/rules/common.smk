@@ -150,9 +150,10 @@ def told_elsewhere(job):
     return {
         "rule": job.rule.name,
         "wildcards": dict(job.wildcards_dict),
-        "output": list(map(str, job.output)),
-        "log": list(map(str, job.log)),
-        "benchmark": str(job.benchmark),
+        # With wildcards: what the child calls in its turn is named by them.
+        "output": list(map(str, job.rule.output)),
+        "log": list(map(str, job.rule.log)),
+        "benchmark": str(job.rule.benchmark),
         "threads": job.threads,
         "command": job.shellcmd,
     }

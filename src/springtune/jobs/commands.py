@@ -23,7 +23,8 @@ def remember(folder: Path, jobs: Iterable[Mapping[str, Any]]) -> None:
     folder : Path
         Of the study that is run.
     jobs : iterable of dict
-        Each with its ``rule``, ``wildcards``, ``output``, ``log`` and ``benchmark`` (files), ``threads`` and
+        Each with its ``rule``, ``wildcards``, ``output``, ``log`` and ``benchmark`` (files of
+        the rule), ``threads`` and
         ``command``.
     """
     sealed.write(folder / COMMANDS_FILE, list(jobs))
