@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns test-slurm slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -49,8 +49,19 @@ test-versions: $(VENV)/.test
 test-reruns: $(VENV)/.test
 	pytest -n 2 tests/reruns
 
+# Studies on a Slurm of two nodes on this machine, as root: the same bytes as without, whatever becomes of jobs and nodes.
+test-slurm: $(VENV)/.test build/slurm/.done
+	pytest tests/slurm
+
+# The plugin costs every start of Snakemake half a second, so it has an environment of its own.
+build/slurm/.done: requirements/run.txt requirements/slurm.txt requirements/cholesky.txt | $(VENV)/.test
+	uv venv --quiet --clear --python $(VENV)/bin/python build/slurm
+	uv pip install --quiet --compile-bytecode --python build/slurm --require-hashes -r requirements/run.txt -r requirements/slurm.txt
+	-uv pip install --quiet --python build/slurm --only-binary :all: --require-hashes -r requirements/cholesky.txt
+	touch $@
+
 slow: $(VENV)/.test
-	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
+	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/slurm --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 lint: $(VENV)/.test
@@ -85,6 +96,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.

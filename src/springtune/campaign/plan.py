@@ -165,21 +165,22 @@ def plan(study: "Study", folder: Path, cores: int = 1, lasting: float | None = N
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
     members = {stage.name: dict(stage.members(study, costs)) for stage in stages() if stage.members}
     before = {name: known.get(name, {}) for name in members}
-    # Other machines want other bundles. What is solved stays solved, whichever bundle it is in, and what is done
-    # stays in the bundle that it is in, so that it need not be done again.
+    kept: dict[str, dict[str, list[str]]] = {name: {} for name in members}
+    # Other machines want other bundles. What is solved stays solved, whichever bundle it is in, and a bundle that is
+    # done stays as it is, so that nothing of it runs again.
     if known["cores"] < cores or lasting_before != lasting:
-        before = _done(study, folder, members, before)
+        before, kept = kept, _done(study, folder, members, before)
     found: dict[str, Any] = {}
     for stage in stages():
         if stage.name in members:
-            seconds = {name: each for name, (each, _) in members[stage.name].items()}
-            found[stage.name] = (
-                {name: [name] for name in seconds}
-                if stage.alone
-                else bundles.share_out(seconds, cores, costs.start_up, before[stage.name], lasting)
-                if seconds
-                else {}
-            )
+            held = kept[stage.name]
+            left = members[stage.name].keys() - {name for names in held.values() for name in names}
+            seconds = {name: members[stage.name][name][0] for name in left}
+            if stage.alone:
+                found[stage.name] = {name: [name] for name in members[stage.name]}
+            else:
+                shared = bundles.share_out(seconds, cores, costs.start_up, before[stage.name], lasting)
+                found[stage.name] = bundles.beside(held, shared)
     jobs = {job.name: job for stage in stages() for job in _jobs(stage, study, folder, members, found)}
     needs = {
         (stage.name, label): Needs(

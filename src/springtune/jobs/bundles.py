@@ -252,6 +252,28 @@ def share_out(
     return {label: bundles[label] for label in sorted(bundles, key=int)}
 
 
+def beside(kept: Mapping[str, list[str]], shared: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """Bundles and others, which get labels that are free.
+
+    Parameters
+    ----------
+    kept, shared : dict of str to list of str
+        Names of the tasks of each bundle by its label.
+
+    Returns
+    -------
+    dict of str to list of str
+
+    Examples
+    --------
+    >>> beside({"1": ["done"]}, {"0": ["coarse"], "1": ["fine"]})
+    {'0': ['coarse'], '1': ['done'], '2': ['fine']}
+    """
+    free = (str(number) for number in range(len(kept) + len(shared)) if str(number) not in kept)
+    found = {**kept, **({next(free): names for names in shared.values()} if kept else shared)}
+    return {label: found[label] for label in sorted(found, key=int)}
+
+
 def _number(seconds: float, size: float, start_up: float, cores: int, most: int) -> int:
     """Number of bundles for so many seconds of work: as many on each core, if there are more than cores."""
     count = round(seconds / size)
