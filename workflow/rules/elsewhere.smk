@@ -28,7 +28,8 @@ if TOLD:
         output:
             TOLD["output"],
         params:
-            command=TOLD["command"],
+            # As it is: braces in it are no wildcards.
+            command=lambda wildcards: TOLD["command"],
         threads: TOLD["threads"]
         log:
             TOLD["log"],
