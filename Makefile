@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -53,8 +53,19 @@ test-reruns: $(VENV)/.test
 release-check: $(VENV)/.test
 	pytest -rs tests/release
 
+# Studies on a Slurm of two nodes on this machine, as root: the same bytes as without, whatever becomes of jobs and nodes.
+test-slurm: $(VENV)/.test build/slurm/.done
+	pytest tests/slurm
+
+# The plugin costs every start of Snakemake half a second, so it has an environment of its own.
+build/slurm/.done: requirements/run.txt requirements/slurm.txt requirements/cholesky.txt | $(VENV)/.test
+	uv venv --quiet --clear --python $(VENV)/bin/python build/slurm
+	uv pip install --quiet --compile-bytecode --python build/slurm --require-hashes -r requirements/run.txt -r requirements/slurm.txt
+	-uv pip install --quiet --python build/slurm --only-binary :all: --require-hashes -r requirements/cholesky.txt
+	touch $@
+
 slow: $(VENV)/.test
-	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
+	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/slurm --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
@@ -93,6 +104,7 @@ lock: $(VENV)/.run
 	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
 	$(LOCK) requirements/release.in --output-file requirements/release.txt
+	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.

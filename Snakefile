@@ -4,44 +4,47 @@
 #     snakemake --configfile config/quick.yaml           another one
 #     snakemake paper                                    the paper, and the studies that it reads
 
-
-include: "workflow/rules/common.smk"
-include: "workflow/rules/stages.smk"
-include: "workflow/rules/collect.smk"
-include: "workflow/rules/outputs.smk"
-include: "workflow/rules/browse.smk"
+include: "workflow/rules/environment.smk"
+include: "workflow/rules/elsewhere.smk"
 
 
-if "study" not in config:  # a study that is read for the paper has none of its own
+if not TOLD:
 
-    include: "workflow/rules/paper.smk"
+    include: "workflow/rules/common.smk"
+    include: "workflow/rules/stages.smk"
+    include: "workflow/rules/collect.smk"
+    include: "workflow/rules/outputs.smk"
+    include: "workflow/rules/browse.smk"
+    if "study" not in config:  # a study that is read for the paper has none of its own
 
-
-report: "workflow/report/study.rst"
-
-
-rule all:
-    default_target: True
-    message:
-        f"{RESULTS} is complete"
-    input:
-        # Stages before the dataset, too: what they store is made again where it is missing.
-        DONE,
-        rules.collect.output,
-        OUTPUTS.values(),
-        str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
+        include: "workflow/rules/paper.smk"
 
 
-release()
+    report: "workflow/report/study.rst"
 
 
-onstart:
-    begin()
+    rule all:
+        default_target: True
+        message:
+            f"{RESULTS} is complete"
+        input:
+            # Stages before the dataset, too: what they store is made again where it is missing.
+            DONE,
+            rules.collect.output,
+            OUTPUTS.values(),
+            str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
 
 
-onsuccess:
-    tell_end("ending")
+    release()
 
 
-onerror:
-    tell_end("broken")
+    onstart:
+        begin()
+
+
+    onsuccess:
+        tell_end("ending")
+
+
+    onerror:
+        tell_end("broken")

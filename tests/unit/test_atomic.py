@@ -1,8 +1,10 @@
 """Files that appear whole or not at all."""
 
 import os
+import platform
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -12,7 +14,7 @@ from springtune.mesh import MESH_TYPES, write_mesh
 
 def test_two_processes_never_write_one_file(tmp_path):
     with atomic.replacing(tmp_path / "note.txt") as unfinished:
-        assert unfinished.name == f"note.txt.{os.getpid()}.unfinished"
+        assert unfinished.name == f"note.txt.{os.getpid()}@{platform.node().replace('.', '-')}.unfinished"
         unfinished.write_text("whole")
     assert [path.name for path in tmp_path.iterdir()] == ["note.txt"]
 
@@ -46,6 +48,18 @@ def test_what_the_dead_left_is_swept_and_what_the_living_write_stays(tmp_path):
         living.communicate(b"\n")
     atomic.remove_unfinished(tmp_path)
     assert [path.name for path in (tmp_path / "deep").iterdir()] == ["unfinished.txt"]
+
+
+def test_what_another_machine_writes_stays_for_an_hour(tmp_path):
+    """Its processes are not to be seen, and one of this machine may have the same number."""
+    (tmp_path / f"a.h5.{os.getpid()}@elsewhere.unfinished").write_text("half of")
+    (tmp_path / "b.h5.99999999@else-where.unfinished").write_text("half of")
+    atomic.remove_unfinished(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+    for path in tmp_path.iterdir():
+        os.utime(path, (time.time() - atomic.FORGOTTEN - 1,) * 2)
+    atomic.remove_unfinished(tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_dead_that_nobody_waits_for_write_nothing(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 
 from springtune.campaign import locks
 from springtune.jobs import sealed
+from springtune.jobs.processes import this_host
 
 STUDY = Path("results/mine")
 
@@ -26,7 +27,7 @@ def lock(tmp_path, monkeypatch):
 def note(**changed):
     """A run of this process, or another one."""
     process = psutil.Process()
-    known = {"host": locks.this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
+    known = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
              "folders": [str(STUDY)]}  # fmt: skip
     sealed.write(locks.RUNS / "of_a_test.json", known | changed)
 

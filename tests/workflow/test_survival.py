@@ -14,8 +14,8 @@ import pytest
 import xarray as xr
 
 import springtune
-from springtune.campaign.locks import this_host
 from springtune.jobs import sealed, store
+from springtune.jobs.processes import this_host
 
 STUDY = """
 title: Survival

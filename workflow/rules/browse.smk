@@ -16,6 +16,9 @@ rule browse:
         digest=JOBS["browse"].digest,
         # What the page links to; other jobs make it meanwhile.
         files=due.linked(STUDY),
+    resources:
+        runtime=minutes(due.BROWSE),
+        mem_mb=megabytes(due.BROWSE),
     log:
         RESULTS / "logs/browse.log",
     benchmark:

@@ -17,6 +17,9 @@ rule collect:
         config=str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
+    resources:
+        runtime=minutes(due.COLLECT),
+        mem_mb=megabytes(due.COLLECT),
     log:
         RESULTS / "logs/collect.log",
     benchmark:

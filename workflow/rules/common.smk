@@ -3,44 +3,20 @@
 import os
 import sys
 import time
+from math import inf
 from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 from snakemake.settings.enums import Quietness
 
-from springtune.campaign import due, locks
+from springtune.campaign import due, locks, workload
 from springtune.campaign.plan import plan, stages
+from springtune.jobs import commands
 from springtune.jobs.atomic import remove_unfinished
 from springtune.jobs.dependencies import CODE_FILE, OURS
-from springtune.jobs.run_tasks import STATE, source_state
 from springtune.kinds import load_study
 from springtune.kinds.base import FORMATS
 from springtune.study import StudyError
-
-# One thread a process: the solvers are sequential, and cores are Snakemake's to share out.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
-# Memory that a solve gives back is memory that the next one takes: glibc is not to return it to the system between
-# them, which costs a third of the seconds of a solve.
-os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(2**25))
-os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(2**29))
-os.environ.setdefault("MALLOC_TOP_PAD_", str(2**25))
-
-# Jobs run on the Python that runs Snakemake, whether its environment is activated or not.
-os.environ |= {"PATH": os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])}
-
-
-def chosen_config():
-    """The study that --configfile names, or the paper's; one that is read for the paper is told by it."""
-    if "study" in config:
-        return Path(config["study"])
-    named = [str(path) for path in workflow.configfiles]
-    if len(named) > 1:
-        raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
-    path = Path(named[0] if named else "config/paper.yaml")
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def loaded_study():
@@ -52,15 +28,26 @@ def loaded_study():
         sys.exit(1)
 
 
-# What a run begins with is what its jobs are to work by.
-os.environ.setdefault(STATE, source_state())
+def lasting():
+    """Seconds that a job is to last, by the profile of a cluster or ``--config job_minutes=5``; a child does not judge."""
+    if not workflow.is_main_process:
+        return None
+    minutes = config.get("job_minutes", 0)
+    if isinstance(minutes, bool) or not isinstance(minutes, int | float) or not 0 <= minutes < inf:
+        print(f"--config job_minutes={minutes}: no number of minutes; the profile slurm has 5, a machine of one's own 0, "
+              "for as few as pay", file=sys.stderr)  # fmt: skip
+        sys.exit(1)
+    return 60.0 * minutes
 
-CONFIG = chosen_config()
+
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
 OURS.recall(RESULTS.parent / CODE_FILE)
-PLAN = plan(STUDY, RESULTS, workflow.cores or 1)
+ON_CLUSTER = workflow.resource_settings.nodes is not None
+# A cluster has room for all jobs: only how long one lasts says how many there are. A child plans as the run did.
+CORES = 1 if ON_CLUSTER or not workflow.is_main_process else workflow.resource_settings.cores or 1
+PLAN = plan(STUDY, RESULTS, CORES, lasting())
 JOBS = due.jobs(STUDY, PLAN)
 # The one that is run; for the paper, those that it reads besides.
 READ = workflow.__dict__.setdefault("studies_read", [])
@@ -103,6 +90,24 @@ def caption(name):
     return f"../report/{name if name in CAPTIONS else 'output'}.rst"
 
 
+def minutes(name):
+    """Resource ``runtime`` of the jobs of a rule, by the name of their record."""
+    return lambda wildcards, attempt: needs(name, wildcards).minutes(attempt)
+
+
+def megabytes(name):
+    """Resource ``mem_mb`` of the jobs of a rule, by the name of their record."""
+    return lambda wildcards, attempt: needs(name, wildcards).megabytes(attempt)
+
+
+def needs(name, wildcards):
+    """What a job asks a cluster for: by what such tasks have cost, not by what it has done; no reason to run again."""
+    job = name.format(**dict(wildcards))
+    if job in PLAN.jobs:
+        return PLAN.needs[PLAN.jobs[job].stage.name, PLAN.jobs[job].label]
+    return workload.presented_needs(RESULTS, job, len(JOBS[job].products) if job in JOBS else 1)
+
+
 def looked_at(found, name):
     """Input of a job that is none: a function, which Snakemake calls when it needs the job.
 
@@ -132,11 +137,27 @@ def begin():
             remove_unfinished(one.folder.parent, below=False)  # of what studies share
             one.write()
         OURS.remember(RESULTS.parent / CODE_FILE)
+        if ON_CLUSTER:
+            commands.remember(RESULTS, map(told_elsewhere, workflow.dag.needrun_jobs()))
     except OSError as error:
         locks.end()
         remedy = "make room or give leave to write there, then call the same command again"
         raise WorkflowError(f"{error.filename or RESULTS} cannot be written: {error.strerror}; {remedy}") from None
     tell_start()
+
+
+def told_elsewhere(job):
+    """What a job needs to know where it runs."""
+    return {
+        "rule": job.rule.name,
+        "wildcards": dict(job.wildcards_dict),
+        # With wildcards: what the child calls in its turn is named by them.
+        "output": list(map(str, job.rule.output)),
+        "log": list(map(str, job.rule.log)),
+        "benchmark": str(job.rule.benchmark),
+        "threads": job.threads,
+        "command": job.shellcmd,
+    }
 
 
 LOOKING = {
@@ -174,8 +195,6 @@ def release():
 
 def tell_start():
     """Say how much there is to do; the progress display reads what each job is expected to take."""
-    from springtune.campaign import workload  # here: only a run needs it
-
     dag = workflow.dag
     jobs = [(dag.jobid(job), job.rule.name, job.threads, list(map(str, job.output))) for job in dag.needrun_jobs()]
     found, names = {}, []
@@ -188,7 +207,7 @@ def tell_start():
         ]
         names += [study.name] if own or study is STUDY else []
         found |= workload.loads(study, one, own)
-    cores = workflow.cores or min(workflow.nodes or 1, len(jobs) or 1)  # on a cluster, jobs side by side
+    cores = max(1, min(workflow.nodes, len(jobs))) if ON_CLUSTER else CORES  # on a cluster, jobs side by side
     text = f"{', '.join(names)}: {workload.told(found, cores)}"
     logger.info(text, extra={"quietness": Quietness.PROGRESS, "loads": found, "cores": cores})
 

@@ -51,6 +51,9 @@ rule paper:
         source=str(PAPER_SOURCE),
         folder=lambda wildcards, output: str(Path(output.paper).with_suffix("")),
         digest=PAPER.digest if PAPER_WANTED else "none",
+    resources:
+        runtime=minutes(due.PAPER),
+        mem_mb=megabytes(due.PAPER),
     log:
         "results/paper/logs/paper.log",
     benchmark:

@@ -21,7 +21,11 @@ for stage in stages():
             # The note is written when a run begins, so that a plan is made without.
             tasks=str(RESULTS / "tasks" / f"{stage.name}_{{bundle}}.json"),
             digest=lambda wildcards, output: JOBS[Path(output[0]).stem].digest,
-        threads: workflow.cores if stage.alone else 1
+        # On a cluster a node of its own is for the profile to ask for.
+        threads: CORES if stage.alone else 1
+        resources:
+            runtime=minutes(f"{stage.name}_{{bundle}}"),
+            mem_mb=megabytes(f"{stage.name}_{{bundle}}"),
         log:
             RESULTS / "logs" / f"{stage.name}_{{bundle}}.log",
         benchmark:

@@ -5,7 +5,7 @@ all others in its folder. So a run notes its process beside them; a lock is stal
 """
 
 import os
-import platform
+import re
 import sys
 import time
 from collections.abc import Collection, Iterable, Iterator
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..jobs import sealed
-from ..jobs.processes import lives
+from ..jobs.processes import lives, this_host
 
 LOCKS, RUNS = Path(".snakemake/locks"), Path(".snakemake/springtune")
 """Snakemake's locks, and notes of processes, from the folder on that a run is called in."""
@@ -58,21 +58,8 @@ def end() -> None:
     _note().unlink(missing_ok=True)
 
 
-def this_host() -> str:
-    """Name of the machine, or the container, in which a process's number says something.
-
-    Returns
-    -------
-    str
-    """
-    try:
-        return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
-    except OSError:
-        return platform.node()
-
-
 def _note() -> Path:
-    return RUNS / f"{platform.node()}_{os.getpid()}.json"
+    return RUNS / f"{re.sub('[^0-9A-Za-z-]+', '-', this_host())}_{os.getpid()}.json"
 
 
 def is_held(folder: Path) -> bool:

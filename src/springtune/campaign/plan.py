@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..jobs import bundles, sealed
+from ..jobs.bundles import Needs
 from ..jobs.hashing import hash_of
 from ..jobs.run_tasks import RECORDS, TASKS
 from ..kinds import kinds
@@ -23,6 +24,9 @@ COSTS_FILE = "costs.json"
 
 BUNDLES_FILE = f"{TASKS}/bundles.json"
 """File in a study's folder: what each bundle holds."""
+
+LASTING = "seconds"
+"""What that file calls the seconds that a job is to last."""
 
 
 def stages() -> "tuple[Stage, ...]":
@@ -97,15 +101,18 @@ class Plan:
     limits : dict
         Of one task, see `springtune.study.model.Study`.
     bundles : dict
-        What each bundle holds, by stage and label, and the cores that they are made for.
+        What each bundle holds, by stage and label, and the cores and the seconds of a job that they are made for.
     jobs : dict of str to Tasks
         By name, in the order of stages.
+    needs : dict of tuple to springtune.jobs.bundles.Needs
+        What a job needs, by stage and label; stages that share bundles share their seconds, too.
     """
 
     folder: Path
     limits: dict[str, float]
     bundles: dict[str, Any]
     jobs: dict[str, Tasks]
+    needs: dict[tuple[str, str], Needs]
 
     def labels(self, stage: str) -> list[str]:
         """Labels of the bundles of a stage."""
@@ -135,7 +142,7 @@ class Plan:
                 sealed.write(path, content)
 
 
-def plan(study: "Study", folder: Path, cores: int) -> Plan:
+def plan(study: "Study", folder: Path, cores: int = 1, lasting: float | None = None) -> Plan:
     """Plan the jobs of a study's stages; nothing is written.
 
     Parameters
@@ -143,39 +150,80 @@ def plan(study: "Study", folder: Path, cores: int) -> Plan:
     study : Study
     folder : Path
         Where its results go.
-    cores : int
+    cores : int, optional
         Bundles are made at least for so many cores.
+    lasting : float, optional
+        Seconds that a job is to last, 0 for as few as pay; without, what they were made for before.
 
     Returns
     -------
     Plan
     """
     known: dict[str, Any] = sealed.read(folder / BUNDLES_FILE, cores=int) or {"cores": 0}
-    # More cores want more bundles; what is solved stays solved, whichever bundle it is in.
-    before: dict[str, Any] = known if known["cores"] >= cores else {"cores": cores}
+    lasting_before = known.get(LASTING, 0.0)
+    lasting = lasting_before if lasting is None else lasting
     costs = bundles.Costs(folder.parent / COSTS_FILE, usual_costs())
+    members = {stage.name: dict(stage.members(study, costs)) for stage in stages() if stage.members}
+    before = {name: known.get(name, {}) for name in members}
+    kept: dict[str, dict[str, list[str]]] = {name: {} for name in members}
+    # Other machines want other bundles. What is solved stays solved, whichever bundle it is in, and a bundle that is
+    # done stays as it is, so that nothing of it runs again.
+    if known["cores"] < cores or lasting_before != lasting:
+        before, kept = kept, _done(study, folder, members, before)
     found: dict[str, Any] = {}
-    shared: dict[str, dict[str, list[Any]]] = {}
     for stage in stages():
-        if stage.members is None:  # it works on another one's bundles
-            continue
-        members = stage.members(study, costs)
-        if stage.alone:
-            found[stage.name] = {name: [name] for name in members}
-        else:
-            seconds = {name: each for name, (each, _) in members.items()}
-            kept = before.get(stage.name, {})
-            found[stage.name] = bundles.share_out(seconds, cores, costs.start_up, kept) if members else {}
-        shared[stage.name] = {label: [members[name][1] for name in names] for label, names in found[stage.name].items()}
-    jobs = {
-        job.name: job for stage in stages() for job in _jobs(stage, study, folder, shared[stage.like or stage.name])
+        if stage.name in members:
+            held = kept[stage.name]
+            left = members[stage.name].keys() - {name for names in held.values() for name in names}
+            seconds = {name: members[stage.name][name][0] for name in left}
+            if stage.alone:
+                found[stage.name] = {name: [name] for name in members[stage.name]}
+            else:
+                shared = bundles.share_out(seconds, cores, costs.start_up, before[stage.name], lasting)
+                found[stage.name] = bundles.beside(held, shared)
+    jobs = {job.name: job for stage in stages() for job in _jobs(stage, study, folder, members, found)}
+    needs = {
+        (stage.name, label): Needs(
+            sum(members[stage.like or stage.name][name][0] for name in names),
+            costs.memory.get(stage.name, 0.0),
+            study.limits["memory"],
+        )
+        for stage in stages()
+        for label, names in found[stage.like or stage.name].items()
     }
-    return Plan(folder, study.limits, found | {"cores": before["cores"]}, jobs)
+    known_for = {"cores": max(known["cores"], cores), LASTING: lasting}
+    return Plan(folder, study.limits, found | known_for, jobs, needs)
 
 
-def _jobs(stage: "Stage", study: "Study", folder: Path, shared: dict[str, list[Any]]) -> Iterator[Tasks]:
-    for label, one in shared.items():
-        content = stage.content(study, folder, one)
+Members = dict[str, dict[str, tuple[float, Any]]]
+"""Seconds and value of what bundles hold, by stage and name."""
+
+
+def _done(study: "Study", folder: Path, members: Members, before: dict[str, Any]) -> dict[str, Any]:
+    """Bundles whose jobs have all done what is asked for."""
+    held: dict[str, dict[str, list[str]]] = {stage: {} for stage in before}
+    for stage, labels in before.items():
+        for label, names in labels.items():
+            if asked := [name for name in names if name in members[stage]]:
+                held[stage][label] = asked
+    undone = {
+        (job.stage.like or job.stage.name, job.label)
+        for one in stages()
+        for job in _jobs(one, study, folder, members, held)
+        if (sealed.read(folder / RECORDS / f"{job.name}.json") or {}).get("digest") != job.digest
+    }
+    return {
+        stage: {label: names for label, names in labels.items() if (stage, label) not in undone}
+        for stage, labels in held.items()
+    }
+
+
+def _jobs(
+    stage: "Stage", study: "Study", folder: Path, members: Members, shared: dict[str, dict[str, list[str]]]
+) -> Iterator[Tasks]:
+    of = stage.like or stage.name
+    for label, names in shared[of].items():
+        content = stage.content(study, folder, [members[of][name][1] for name in names])
         if content:
             digest = hash_of(stage.module, content, study.limits)
             yield Tasks(stage, label, content, digest, tuple(map(str, stage.products(content))))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..jobs import bundles, sealed
 from ..springs import DEFINITIONS
-from .plan import COSTS_FILE, Plan, stages, usual_costs
+from .plan import COSTS_FILE, Plan, usual_costs
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -146,14 +146,7 @@ def loads(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[s
 
 def _of_bundles(study: "Study", plan: Plan) -> dict[str, Load]:
     """Loads of all bundles of a study, by the stem of their files."""
-    costs = bundles.Costs(plan.folder.parent / COSTS_FILE, usual_costs())
-    seconds = {
-        (stage.name, label): sum(members[name][0] for name in names if name in members)
-        for stage in stages()
-        if stage.members is not None
-        for members in [stage.members(study, costs)]
-        for label, names in plan.bundles.get(stage.name, {}).items()
-    }
+    start_up = bundles.Costs(plan.folder.parent / COSTS_FILE, usual_costs()).start_up
     found: dict[str, Load] = {}
     parts: dict[tuple[str, str], list[Load]] = {}
     for name, job in plan.jobs.items():
@@ -164,19 +157,40 @@ def _of_bundles(study: "Study", plan: Plan) -> dict[str, Load]:
     for place, sharing in parts.items():
         tasks = sum(load.tasks for load in sharing)
         for load in sharing:
-            load.seconds = seconds.get(place, 0.0) * load.tasks / tasks + costs.start_up
+            load.seconds = plan.needs[place].seconds * load.tasks / tasks + start_up
     return found
 
 
 def _presented(folder: Path, rule: str, outputs: list[str]) -> Load:
     """Load of a job after the stages: what it took before, if it ran before."""
-    always, each = PRESENTED
-    seconds = always + each * len(outputs)
+    return Load(AFTER, len(outputs), _seconds_presented(folder, rule, len(outputs)), products=list(map(Path, outputs)))
+
+
+def _seconds_presented(folder: Path, rule: str, files: int) -> float:
     try:
-        seconds = float((folder / "benchmarks" / f"{rule}.tsv").read_text().splitlines()[1].split("\t")[0])
-    except (OSError, IndexError, ValueError):
-        pass  # never run, or not to its end
-    return Load(AFTER, len(outputs), seconds, products=list(map(Path, outputs)))
+        return float((folder / "benchmarks" / f"{rule}.tsv").read_text().splitlines()[1].split("\t")[0])
+    except (OSError, IndexError, ValueError):  # never run, or not to its end
+        always, each = PRESENTED
+        return always + each * files
+
+
+def presented_needs(folder: Path, rule: str, files: int) -> bundles.Needs:
+    """What a job asks a cluster for that makes no results of scenes.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+    rule : str
+        Its name.
+    files : int
+        Number of files that it makes.
+
+    Returns
+    -------
+    springtune.jobs.bundles.Needs
+    """
+    return bundles.Needs(_seconds_presented(folder, rule, files))
 
 
 def told(found: dict[int, Load], cores: int) -> str:

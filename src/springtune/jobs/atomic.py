@@ -2,15 +2,32 @@
 
 import json
 import os
+import platform
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from .processes import lives
 
 UNFINISHED = ".unfinished"
-"""Ending of the name of a file that is being written, after its own and the number of the process that writes it."""
+"""Ending of the name of a file that is being written, after its own and who writes it, `writer`."""
+
+FORGOTTEN = 3600.0
+"""Seconds after which an unfinished file of another machine, whose processes are not to be seen, is left over: each is
+written within seconds."""
+
+
+def writer() -> str:
+    """Who writes, as names of files say it: the number of this process, at a machine, since others have it, too.
+
+    Returns
+    -------
+    str
+        Without a dot.
+    """
+    return f"{os.getpid()}@{platform.node().replace('.', '-')}"
 
 
 @contextmanager
@@ -34,7 +51,7 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}{UNFINISHED}")
+    unfinished = path.with_name(f"{path.name}.{writer()}{UNFINISHED}")
     try:
         yield unfinished
         if synced:
@@ -73,6 +90,8 @@ def check_folder(path: str | Path) -> None:
 def remove_unfinished(folder: str | Path, below: bool = True) -> None:
     """Remove what writers that were killed have left in a folder; what a process that lives is writing stays.
 
+    Of a process on another machine that is what was written to within the last hour.
+
     Parameters
     ----------
     folder : str or Path
@@ -89,13 +108,16 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
     []
     """
     for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED}"):
-        if path.is_file() and not _is_written(path.name):
-            path.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # just finished, or another run was quicker
+            if path.is_file() and not _is_written(path):
+                path.unlink()
 
 
-def _is_written(name: str) -> bool:
-    """Whether the process that writes an unfinished file lives."""
-    number = name.removesuffix(UNFINISHED).rpartition(".")[2]
+def _is_written(path: Path) -> bool:
+    """Whether the process that writes an unfinished file lives, or may live."""
+    number, _, host = path.name.removesuffix(UNFINISHED).rpartition(".")[2].partition("@")
+    if host not in ("", writer().partition("@")[2]):
+        return time.time() < path.stat().st_mtime + FORGOTTEN
     return number.isdecimal() and lives(int(number))
 
 

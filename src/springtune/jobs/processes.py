@@ -1,7 +1,23 @@
-"""Which processes live."""
+"""Which processes live, and where."""
+
+import os
+import platform
 
 SAME_START = 2.0
 """Seconds by which two readings of a process's start may differ, since the clock may be set."""
+
+
+def this_host() -> str:
+    """Name of the machine, or the container, in which a process's number says something.
+
+    Returns
+    -------
+    str
+    """
+    try:
+        return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
+    except OSError:
+        return platform.node()
 
 
 def lives(pid: int, start: float | None = None) -> bool:

@@ -1,5 +1,7 @@
 """The tasks of a job: what each costs, which limits it has, and what becomes of one that fails."""
 
+import resource
+import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -8,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .guard import Watch
 
+
+KIBI = 1024
+"""Bytes in which Linux tells the memory of a process."""
 
 LOST = "beyond limits"
 """What tasks are counted as that went beyond their limits."""
@@ -106,8 +111,15 @@ class Spent:
         Returns
         -------
         dict
-            ``start_up``, seconds spent on imports; ``work``, by kind: number of tasks, sums of their units and seconds.
+            ``start_up``, seconds spent on imports; ``work``, by kind: number of tasks, sums of their units and seconds;
+            ``memory``, the most that this process, or one that it called, had [byte].
         """
         lost = self.watch.lost if self.watch else 0
         work = dict(self.sums) | ({LOST: [lost, 0.0, 0.0]} if lost else {})
-        return {"start_up": self.start_up, "work": work}
+        return {"start_up": self.start_up, "work": work, "memory": most_memory()}
+
+
+def most_memory() -> int:
+    """Most memory that this process, or a child of it that is done, had so far [byte]."""
+    most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return most if sys.platform == "darwin" else KIBI * most

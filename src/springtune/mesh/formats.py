@@ -2,6 +2,7 @@
 
 import io
 import os
+import platform
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -93,7 +94,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
         blocks.append(("vertex", np.array([[number]]), [point]))
     points = np.concatenate([mesh.points, np.reshape(places, (-1, 2))])
     points = np.column_stack([points, np.zeros(len(points))])
-    unfinished = f"{path}.{os.getpid()}.unfinished"
+    unfinished = f"{path}.{os.getpid()}@{platform.node().replace('.', '-')}.unfinished"
     data, fields = (_vtu_marks if ending == ".vtu" else _gmsh_tags)(path, blocks)
     try:
         cells = [(kind, corners) for kind, corners, _ in blocks]

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from ..jobs.atomic import UNFINISHED, check_folder, replacing, write_bytes, write_text
+from ..jobs.atomic import UNFINISHED, check_folder, replacing, write_bytes, write_text, writer
 from ..problem.quantities import nearest
 from ..units import QUANTITY_KINDS, UnitError, parse
 from . import reading
@@ -278,7 +278,7 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
     except ImportError:
         raise ValueError(f"{path}: Zarr needs zarr; {EXTRA}") from None
     path = Path(path)
-    unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (os.getpid(), "before"))
+    unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (writer(), "before"))
     tree = tree.load()
     for node in tree.subtree:
         for variable in node.variables.values():

@@ -1,0 +1,60 @@
+"""Jobs that a cluster's nodes run: what they ask for, and what they read of a study."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from springtune.jobs import commands
+
+STUDY = """
+title: Elsewhere
+beams: {small: {length: 50 mm, height: 20 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  one: {beam: small, mesh_type: structured, mesh_size: [10 mm, 5 mm], material: steel, load: traction, force: 20 kN,
+        definition: lattice, kinematics: linear, sensitivity: false}
+"""
+
+
+def test_a_plan_for_a_cluster_has_jobs_of_the_wanted_time(run):
+    """A bundle of both meshes is what one machine does."""
+    run.write("elsewhere.yaml", STUDY)
+    code, output = run.snakemake("elsewhere.yaml", "-n", "--config", "job_minutes=1e-6")
+    assert code == 0 and re.search(r"^solve +2$", output, re.MULTILINE), output
+
+
+@pytest.mark.parametrize("minutes", ["soon", "-1", "true"])
+def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
+    run.write("elsewhere.yaml", STUDY)
+    code, output = run.snakemake("elsewhere.yaml", "-n", "--config", f"job_minutes={minutes}")
+    assert code == 1 and "Traceback" not in output
+    assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
+
+
+def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repository):
+    """As the plugin calls it; that its study is none, and grew by a million scenes, is not seen."""
+    run.write("unread.yaml", "no: study\n")
+    folder = run.folder / "results/unread"
+    told = {
+        "rule": "solve",
+        "wildcards": {"bundle": "3"},
+        "output": ["results/unread/done/solve_{bundle}.json"],
+        "log": ["results/unread/logs/solve_{bundle}.log"],
+        "benchmark": "results/unread/benchmarks/solve_{bundle}.tsv",
+        "threads": 1,
+        "command": "echo '{braces}' $HDF5_USE_FILE_LOCKING > results/unread/done/solve_3.json",
+    }
+    commands.remember(folder, [told | {"wildcards": {"bundle": "2"}, "command": "false"}, told])
+    before = (folder / commands.COMMANDS_FILE).read_bytes()
+    command = [sys.executable, "-m", "snakemake", "--snakefile", repository / "Snakefile", "--mode", "remote",
+               "--target-jobs", "solve:bundle=3", "--allowed-rules", "solve", "--cores", "all", "--force", "--nolock",
+               "--no-hooks", "--ignore-incomplete", "--configfiles", "unread.yaml",
+               "--config", "job_minutes=5"]  # fmt: skip
+    done = subprocess.run(list(map(str, command)), cwd=run.folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "done/solve_3.json").read_text() == "{braces} FALSE\n"
+    made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert made - {"logs/solve_3.log"} == {commands.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
+    assert (folder / commands.COMMANDS_FILE).read_bytes() == before
