@@ -131,7 +131,9 @@ class Filler:
         self.data = data
         # Looking an array up costs more than writing a cell of it.
         self._arrays = {name: ([str(one) for one in array.dims], array.values) for name, array in data.items()}
-        self._places = {str(name): {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords}
+        self._places = {
+            str(name): {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords
+        }
         self._texts: dict[object, object] = {}
 
     def put(self, values: Mapping[str, object], **labels: Label) -> None:
