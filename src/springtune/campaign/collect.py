@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from ..jobs import atomic, bundles, records
+from ..jobs.dependencies import CODE_FILE, OURS
 from ..jobs.run_tasks import RECORDS, mended
 from ..kinds import kinds, load_study, outputs
 from ..output import dataset
@@ -63,6 +64,7 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
         Of what is asked for.
     """
     study = load_study(config)
+    OURS.recall(Path(folder).parent / CODE_FILE)
     if due.jobs(study, plan(study, Path(folder), 1))[due.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     records.write(record, digest, _collected(study, config, Path(folder), Path(output)))

@@ -15,6 +15,9 @@ from ..output.tables import csv_text, decimals, number
 ANSWERED = ("solved", "unstable", "linear_only")
 """Statuses of networks that have a displacement."""
 
+MOST_ROWS = 1000
+"""Rows of a table that the page shows; its CSV file has all of them, and a browser stays quick."""
+
 COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa"}
 """Units at the ends of the names of columns, as they are written."""
 
@@ -83,11 +86,12 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
     marks: set[str] = set()
     swept = {name: _short([row[name] for row in rows]) for name in table["swept"]}
     lines = []
-    for place, row in enumerate(rows):
+    for place, row in enumerate(rows[:MOST_ROWS]):
         own = [texts[place] for texts in swept.values()]
         lines += [line | {"swept": own} for line in _lines(row, definitions, there, places, marks)]
     return dict(table) | {
         "lines": lines,
+        "beyond": _beyond(rows),
         "kinematics": there,
         "printed": any(row["printed_displacement_mm"] == row["printed_displacement_mm"] for row in rows),
         "heads": [_head(name) for name in table["swept"]],
@@ -96,6 +100,11 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
         "remarks": [f"{row['beam']}, {row['mesh_size_mm']:g} mm: {row['remark']}" for row in rows if row["remark"]],
         "marks": marks,
     }
+
+
+def _beyond(rows: list[Mapping[str, Any]]) -> str:
+    """Which rows are shown where not all are."""
+    return f"The first {MOST_ROWS} of {len(rows)} rows; the file has all of them: " if len(rows) > MOST_ROWS else ""
 
 
 def _short(values: list[float]) -> list[str]:
@@ -213,7 +222,8 @@ def _further(table: Mapping[str, Any]) -> dict[str, Any]:
     return dict(table) | {
         "heads": [_head(name) for name in columns],
         "words": words,
-        "lines": [[texts[name][place] for name in columns] for place in range(len(rows))],
+        "lines": [[texts[name][place] for name in columns] for place in range(len(rows[:MOST_ROWS]))],
+        "beyond": _beyond(rows),
     }
 
 

@@ -131,13 +131,40 @@ class Filler:
         self.data = data
         # Looking an array up costs more than writing a cell of it.
         self._arrays = {name: ([str(one) for one in array.dims], array.values) for name, array in data.items()}
-        self._places = {name: {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords}
+        self._places = {
+            str(name): {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords
+        }
+        self._texts: dict[object, object] = {}
 
     def put(self, values: Mapping[str, object], **labels: Label) -> None:
         """Write values of variables by name into the cells of these labels."""
         for name, value in values.items():
             dimensions, array = self._arrays[name]
             array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
+
+    def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
+        """Write values of many cells, as `put` does those of one, a variable at a time.
+
+        Parameters
+        ----------
+        values : sequence of dict
+            Of each cell, by the names of variables; not all cells need have all of them.
+        labels : sequence of dict
+            Of each cell, each with the same dimensions.
+        """
+        places = {
+            dimension: np.array([known[one[dimension]] for one in labels])
+            for dimension, known in self._places.items()
+            if labels and dimension in labels[0]
+        }
+        for name in dict.fromkeys(name for one in values for name in one):
+            dimensions, array = self._arrays[name]
+            cells = [number for number, one in enumerate(values) if name in one]
+            found: list[Any] = [values[number][name] for number in cells]
+            if array.dtype == object:  # texts that are alike are one text
+                found = [self._texts.setdefault(one, one) for one in found]
+            place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
+            array[place] = np.array(found, dtype=array.dtype)
 
     def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
         """Write rows, or tables, that may be shorter than the dimensions after those of the labels."""

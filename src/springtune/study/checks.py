@@ -255,15 +255,15 @@ def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
     """Definitions against the cells and loads of the grids that use them."""
     for grid in grids:
         found: dict[str, None] = {}
-        for scene in grid.scenes:
-            definition, mesh_type = DEFINITIONS[scene.definition], scene.mesh.mesh_type
+        for name, mesh_type, on in dict.fromkeys((one.definition, one.mesh.mesh_type, one.load) for one in grid.scenes):
+            definition = DEFINITIONS[name]
             made = MESH_TYPES.get(mesh_type)
             if made and made.corners not in definition.cells:
                 needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
                 found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
-            if definition.uniaxial and not LOADS[scene.load].kind.uniaxial:
+            if definition.uniaxial and not LOADS[on].kind.uniaxial:
                 kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
-                found[f"'{definition.name}' is for {kinds} and load '{scene.load}' is neither; {SEPARATE}"] = None
+                found[f"'{definition.name}' is for {kinds} and load '{on}' is neither; {SEPARATE}"] = None
         for message in found:
             problems.add(("grids", grid.name, "definition"), message)
 

@@ -141,28 +141,22 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
     definitions, kinematics = ranks["definition"], ranks["kinematics"]
 
     def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> tuple[float, ...]:
+        if isinstance(item, SceneSpec | CurveSpec):
+            mesh, material = item.mesh, item.material
+            beam = mesh.beam
+            place = beams[beam.name], mesh_types[mesh.mesh_type], mesh.mesh_size
+            own = materials[material.name], loads[item.load]
+            law = kinematics[item.kinematics], abs(item.force), beam.thickness
+            moduli = material.young_modulus, material.poisson_ratio
+            if isinstance(item, CurveSpec):
+                return (*place, *own, *law, *moduli, 0.0)
+            return (*place, *own, definitions[item.definition], *law, *moduli, item.stiffness_scale)
         if isinstance(item, MeshSpec):
             return beams[item.beam.name], mesh_types[item.mesh_type], item.mesh_size, item.beam.thickness
         material = item.material
-        own: tuple[int, ...] = (materials[material.name], loads[item.load])
-        if isinstance(item, Reference):
-            moduli = material.young_modulus, material.poisson_ratio
-            return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
-        mesh, last = item.mesh, 0.0
-        if isinstance(item, SceneSpec):
-            own, last = (*own, definitions[item.definition]), item.stiffness_scale
-        return (
-            beams[mesh.beam.name],
-            mesh_types[mesh.mesh_type],
-            mesh.mesh_size,
-            *own,
-            kinematics[item.kinematics],
-            abs(item.force),
-            mesh.beam.thickness,
-            material.young_modulus,
-            material.poisson_ratio,
-            last,
-        )
+        own = materials[material.name], loads[item.load]
+        moduli = material.young_modulus, material.poisson_ratio
+        return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
 
     return key
 
@@ -240,6 +234,7 @@ def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tu
         scenes: list[SceneSpec] = []
         curves: dict[CurveSpec, None] = {}
         absent = set()
+        signs = {load: (LOADS[load].sign, LOADS[load].follower) for load in grid.load}
         for one in combinations(name, grid, problems):
             beam, material, load = bodies.beam(one), bodies.material(one), one["load"]
             if isinstance(material, Rubber):
@@ -264,9 +259,10 @@ def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tu
             if mesh is None:
                 absent.add((one["mesh_type"], beam.name, f"{1e3 * one['mesh_size']:g} mm"))
                 continue
-            common = (mesh, material, load, LOADS[load].sign * magnitude)
+            sign, follows = signs[load]
+            common = (mesh, material, load, sign * magnitude)
             scenes.append(SceneSpec(*common, one["definition"], one["kinematics"], one.get("stiffness_scale", 1.0)))
-            if grid.sensitivity and not LOADS[load].follower:  # k enters as F/k only where forces stay
+            if grid.sensitivity and not follows:  # k enters as F/k only where forces stay
                 curves[CurveSpec(*common, one["kinematics"])] = None
         for mesh_type, beam_name, length in sorted(absent):
             row = f"{{file: <path>, beam: {beam_name}, mesh_size: {length}}}"

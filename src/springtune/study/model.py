@@ -97,8 +97,9 @@ class SceneSpec:
 
     @cached_property
     def _hash(self) -> int:
-        own = self.material, self.load, self.force, self.definition, self.kinematics, self.stiffness_scale
-        return hash((self.mesh, own))
+        # Of the material what tells most apart: hashing all of it takes longer than the rest.
+        body = self.mesh, self.material.name, self.material.young_modulus, self.material.poisson_ratio
+        return hash((body, self.load, self.force, self.definition, self.kinematics, self.stiffness_scale))
 
     def __hash__(self) -> int:
         # As a mesh's.
@@ -330,14 +331,20 @@ class Study:
         dict of str to str or float
             Its label of each dimension.
         """
-        found: dict[str, str | float] = {}
+        found: dict[str, str | float]
         if isinstance(one, Reference):
             beam = one.beam
-            found |= {"beam": beam.name, "material": one.material.name, "load": one.load}
+            found = {"beam": beam.name, "material": one.material.name, "load": one.load}
         else:
-            mesh, beam = one.mesh, one.mesh.beam
-            found |= {"beam": beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
-            found |= {"material": one.material.name, "load": one.load}
+            mesh = one.mesh
+            beam = mesh.beam
+            found = {
+                "beam": beam.name,
+                "mesh_type": mesh.mesh_type,
+                "mesh_size": mesh.mesh_size,
+                "material": one.material.name,
+                "load": one.load,
+            }
             if isinstance(one, SceneSpec):
                 found["definition"] = one.definition
             found["kinematics"] = one.kinematics

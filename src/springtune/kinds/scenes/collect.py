@@ -178,30 +178,40 @@ def _scenes(study, folder, root, block, fields, objections):
     arrays = ["face_profile"] * (block is not None)
     shown = plan.shown_scenes(study) if fields else ()
     for mesh, scenes in plan.by_mesh(study.scenes).items():
-        names = [plan.solved_key(study, scene, calibration) for scene in scenes]
+        names = plan.solved_keys(study, mesh, calibration)
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
         kept = {fields_key(name) for scene, name in zip(scenes, names) if scene in shown}
         of_fields = store.read(path, kept, [PACKED]) if kept else {}
+        labels = [study.labels(scene) for scene in scenes]
+        against = {}
+        for scene in scenes:
+            one = id(scene.material), scene.load, scene.force, scene.kinematics
+            if one not in against:
+                against[one] = objections[_reference_of(scene), scene.kinematics]
+        rows = []
         for scene, name in zip(scenes, names):
-            result = results[name] | unpacked(of_fields.get(fields_key(name), {}))
+            result = results[name]
             values = {"status": result["status"], "solve_seconds": result["seconds"]}
             values |= {label: result[label] for label in COPIED if label in result}
-            why = objections[_reference_of(scene), scene.kinematics]
+            why = against[id(scene.material), scene.load, scene.force, scene.kinematics]
             if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
                 values["message"] = "; ".join(filter(None, (values.get("message"), why)))
-            labels = study.labels(scene)
-            root.put(values, **labels)
+            rows.append(values)
+        root.put_each(rows, labels)
+        for scene, name, place in zip(scenes, names, labels) if block or of_fields else ():
             if LOADS[scene.load].kind.pressed:
-                block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **labels)
+                result = results[name]
+                block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **place)
+            result = unpacked(of_fields.get(fields_key(name), {}))
             if "displacements" in result:  # of one value of what is swept
                 x, y = result["displacements"].T
                 of_springs = {"stiffness": result["spring_stiffnesses"], "spring_force": result["spring_forces"]}
-                fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **labels)
-                place = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
-                if tuple(place.values()) not in compared:  # scenes differ in their definitions
-                    compared.add(tuple(place.values()))
-                    fields.put_rows(_at_particles(study, folder, scene, fields.data), **place)
+                fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **place)
+                body = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
+                if tuple(body.values()) not in compared:  # scenes differ in their definitions
+                    compared.add(tuple(body.values()))
+                    fields.put_rows(_at_particles(study, folder, scene, fields.data), **body)
 
 
 def _at_particles(study, folder, scene, fields):

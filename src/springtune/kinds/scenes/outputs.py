@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from ...problem.loads import LOADS
 from ...study.model import swept_value
 from ..base import Output, distinct
+from .remembered import once_a_study
 from .shown import shown
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def stem(selection: Mapping[str, str], number: int | None = None) -> str:
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
 
 
+@once_a_study("scenes", "printed", "further_references")
 def stems(study: "Study") -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
@@ -41,6 +43,7 @@ def stems(study: "Study") -> list[str]:
     return found
 
 
+@once_a_study("scenes")
 def pressed(study: "Study") -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)

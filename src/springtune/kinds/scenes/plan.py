@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import defaultdict
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -128,13 +128,43 @@ def curve_key(study, curve):
 
 def scene_key(study, scene):
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
+    return _scene_key(study, scene, _common(study, scene)["key"])
+
+
+def _scene_key(study, scene, common):
     return hash_of(
-        _common(study, scene)["key"],
+        common,
         scene.force,
         _given_stiffness(study, scene),
         _thickness_ratio(study, scene),
         scene.stiffness_scale,
     )
+
+
+@once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
+def scene_keys(study):
+    """Keys of a study's scenes by their mesh, in the order of `by_mesh`: tasks and the dataset both want them."""
+    found = {}
+    for mesh, scenes in by_mesh(study.scenes).items():
+        commons, keys = _Commons(study), []
+        for scene in scenes:
+            keys.append(_scene_key(study, scene, commons.of(scene)["key"]))
+        found[mesh] = keys
+    return found
+
+
+class _Commons:
+    """What scenes of one mesh share, asked for once: hashing materials for each of 100,000 scenes is no way to it."""
+
+    def __init__(self, study):
+        self.study, self.known = study, {}
+
+    def of(self, scene):
+        """As `_common`."""
+        place = id(scene.material), scene.load, scene.definition, scene.kinematics
+        if place not in self.known:
+            self.known[place] = _common(self.study, scene)
+        return self.known[place]
 
 
 @once_a_study("grids", "outputs")
@@ -172,12 +202,14 @@ def shown_scenes(study):
     return shown(study.scenes, study.swept)
 
 
-def solved_key(study, scene, calibration):
-    """Key under which a scene's result is stored, given the calibrated stiffnesses by group."""
-    name = scene_key(study, scene)
-    if scene.definition == "calibrated":
-        return calibrated_key(name, calibration[calibration_name(scene)]["stiffness"])
-    return name
+def solved_keys(study, mesh, calibration):
+    """Keys under which results of a mesh's scenes are stored, given the calibrated stiffnesses by group."""
+    return [
+        calibrated_key(key, calibration[calibration_name(scene)]["stiffness"])
+        if scene.definition == "calibrated"
+        else key
+        for scene, key in zip(by_mesh(study.scenes)[mesh], scene_keys(study)[mesh])
+    ]
 
 
 def stiffnesses(study, curve):
@@ -215,10 +247,11 @@ def _given_stiffness(study, scene):
 def _mesh_members(study, costs):
     """Meshes, and what they and all their scenes and curves cost."""
     seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
-    for scene in study.scenes:
-        count = particles(scene.mesh)
-        seconds[stem(scene.mesh)] += costs.of(scene.kinematics, count)
-        seconds[stem(scene.mesh)] += costs.of(scene.definition, count)
+    for mesh, scenes in by_mesh(study.scenes).items():
+        name, cost = stem(mesh), cache(partial(costs.of, units=particles(mesh)))
+        for scene in scenes:
+            seconds[name] += cost(scene.kinematics)
+            seconds[name] += cost(scene.definition)
     for curve in study.curves:
         seconds[stem(curve.mesh)] += costs.of("curve", particles(curve.mesh))
     members = defaultdict(list)
@@ -328,13 +361,8 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
-    scenes, kept = by_mesh(study.scenes), shown_scenes(study)
     families = [
-        {
-            "name": stem(mesh),
-            "thickness": mesh.beam.thickness,
-            "scenes": [_scene(study, scene, kept) for scene in scenes[mesh]],
-        }
+        {"name": stem(mesh), "thickness": mesh.beam.thickness, "scenes": _scenes(study, mesh)}
         for meshes in members
         for mesh in meshes
     ]
@@ -347,8 +375,15 @@ def _solve(study, folder, members):
     }
 
 
-def _scene(study, scene, kept):
-    task = _common(study, scene)["task"] | {"key": scene_key(study, scene), "force": scene.force}
+def _scenes(study, mesh):
+    """Tasks of a mesh's scenes."""
+    scenes, keys = by_mesh(study.scenes)[mesh], scene_keys(study)[mesh]
+    commons, kept = _Commons(study), shown_scenes(study)
+    return [_scene(study, scene, commons.of(scene)["task"], key, kept) for scene, key in zip(scenes, keys)]
+
+
+def _scene(study, scene, common, key, kept):
+    task = common | {"key": key, "force": scene.force}
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
@@ -367,6 +402,7 @@ def _family_products(content):
     return [Path(content["folder"]) / f"{name}.h5" for name in names]
 
 
+@once_a_study("scenes")
 def calibrated(study):
     """Scenes whose stiffness is calibrated."""
     return [scene for scene in study.scenes if scene.definition == "calibrated"]

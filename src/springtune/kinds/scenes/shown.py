@@ -43,13 +43,22 @@ def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[S
     -------
     frozenset of SceneSpec
     """
-    names = tuple(swept)
-    ranks: dict[SceneSpec, tuple[tuple[str, ...], list[float]]] = {}
-    last: dict[tuple[str, ...], list[float]] = {}
+    names, coarsest = tuple(swept), dict[tuple[str, ...], float]()
     for scene in scenes:
-        mesh = scene.mesh
-        body = mesh.beam.name, mesh.mesh_type, scene.material.name, scene.load
-        rank = [mesh.mesh_size, *(shown_order(name, swept_value(scene, mesh.beam, name)) for name in names)]
-        ranks[scene] = body, rank
+        body, size = _body(scene), scene.mesh.mesh_size
+        if size >= coarsest.get(body, size):
+            coarsest[body] = size
+    # Few are on the coarsest mesh; only they are ranked.
+    ranked = [
+        (scene, body, [shown_order(name, swept_value(scene, scene.mesh.beam, name)) for name in names])
+        for scene in scenes
+        if scene.mesh.mesh_size == coarsest[body := _body(scene)]
+    ]
+    last: dict[tuple[str, ...], list[float]] = {}
+    for _, body, rank in ranked:
         last[body] = max(last.get(body, rank), rank)
-    return frozenset(scene for scene, (body, rank) in ranks.items() if rank == last[body])
+    return frozenset(scene for scene, body, rank in ranked if rank == last[body])
+
+
+def _body(scene: "SceneSpec") -> tuple[str, ...]:
+    return scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name, scene.load
