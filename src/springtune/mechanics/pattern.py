@@ -8,12 +8,15 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ..linalg.factors import Analysis
-from ..linalg.ordering import nested_dissection
+from ..linalg.ordering import nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
 
 DISSECTED = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
+
+PINNED = (8, 32)
+"""Particles that are pinned where the matrix is indefinite: so many, and so many more where these do not hold it."""
 
 
 class Pattern:
@@ -84,7 +87,7 @@ class Pattern:
         """The same of a mesh with the same cells at other points; what depends on where these are is found anew."""
         found = copy(self)
         found.mesh = mesh
-        for name in ("order", "elimination", *(["analysis"] if self.size > DISSECTED else [])):
+        for name in ("order", "elimination", "pins", *(["analysis"] if self.size > DISSECTED else [])):
             found.__dict__.pop(name, None)
         return found
 
@@ -103,6 +106,12 @@ class Pattern:
     def analysis(self) -> Analysis:
         """Symbolic Cholesky factorization; in an order of CHOLMOD's own where ours would not gain what it costs."""
         return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
+
+    @cached_property
+    def pins(self) -> list[np.ndarray]:
+        """Unknowns to pin where the matrix is indefinite: those of particles spread over the mesh."""
+        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PINNED)
+        return [pins[pins >= 0] for pins in chosen]
 
     @cached_property
     def elimination(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
