@@ -62,6 +62,10 @@ class Factor(Protocol):
         """
         ...
 
+    def step(self, right: np.ndarray) -> np.ndarray:
+        """As `solve`, where it is a step of Newton's method that is asked for."""
+        ...
+
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, where an estimate would do."""
         ...
@@ -112,9 +116,7 @@ class SuperLUFactor:
         solution[self._order] = self._lu.solve(right[self._order])
         return solution
 
-    def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where an estimate would do."""
-        return self.solve(right)
+    step = estimate = solve
 
     @cached_property
     def negative_pivots(self) -> int:
@@ -220,9 +222,7 @@ class CholeskyFactor:
         cholmod.solve(self._factor, solution)
         return np.array(solution).reshape(right.shape)
 
-    def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where an estimate would do."""
-        return self.solve(right)
+    step = estimate = solve
 
     def lower(self, right: np.ndarray) -> np.ndarray:
         """First half of a solution, with the lower triangular factor, in the order of elimination."""

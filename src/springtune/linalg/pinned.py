@@ -91,6 +91,8 @@ class PinnedFactor:
             solution = better
         return solution
 
+    step = solve
+
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, of one right-hand side and without a correction."""
         half = self._factor.lower(right)

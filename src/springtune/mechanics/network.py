@@ -26,8 +26,11 @@ from .pattern import Pattern
 LARGE = 200_000
 """Unknowns beyond which multigrid takes the place of SuperLU: there it is as fast, and takes a third of the memory."""
 
-LARGEST = 2_500_000
-"""Unknowns beyond which it takes the place of a Cholesky factorization, which is faster but needs 2 kB an unknown."""
+LARGEST = 600_000
+"""Unknowns beyond which it takes the place of a Cholesky factorization, too: it is faster there, in half the memory."""
+
+FACTORIZED = 2_500_000
+"""Unknowns up to which a Cholesky factorization, of 2 kB an unknown, takes over where multigrid comes to no end."""
 
 PINNED = 5_000
 """Unknowns beyond which an indefinite matrix gets a Cholesky factor with pins: a small one is factorized by SuperLU
@@ -388,7 +391,7 @@ class Network:
             if factor is not None:
                 return factor
         if self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE:
-            return self._multigrid(matrix)
+            return self._multigrid(matrix, symmetric)
         order, places, indices, pointers = self._pattern.elimination
         return SuperLUFactor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
 
@@ -435,15 +438,18 @@ class Network:
         except SingularError:
             return False
 
-    def _multigrid(self, matrix: csc_array) -> Factor:
+    def _multigrid(self, matrix: csc_array, symmetric: bool) -> Factor:
         from ..linalg.multigrid import Multigrid
 
-        # About the middle and over the extent, so that all three are of one size.
-        points = (self.mesh.points - self.mesh.points.mean(axis=0)) / np.ptp(self.mesh.points, axis=0).max()
-        ones, zeros = np.ones(len(points)), np.zeros(len(points))
-        fields = ((ones, zeros), (zeros, ones), (-points[:, 1], points[:, 0]))
-        motions = np.stack([self.reduce(np.stack(field, axis=1)) for field in fields], axis=1)
-        return Multigrid(matrix, motions)
+        def otherwise() -> Factor:
+            factor = self._cholesky(matrix)
+            if factor is None:
+                raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
+            return factor
+
+        takes_over = symmetric and CHOLESKY and self.solver is None and self.unknowns <= FACTORIZED
+        rows = matrix.T if symmetric else matrix.tocsr()
+        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if takes_over else None)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""
