@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.sparse import csc_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from springtune.linalg.factors import Analysis, SingularError, SuperLUFactor, factorize
-from springtune.linalg.ordering import nested_dissection
+from springtune.linalg.ordering import nested_dissection, spread
+from springtune.linalg.pinned import factorize_pinned
+from springtune.mechanics import network as networks
+from springtune.mechanics.arc_length import follow
 from springtune.mechanics.network import Network
 from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem
@@ -126,6 +131,90 @@ def test_a_matrix_of_any_sparsity_is_factorized():
     assert np.allclose(ours[1], expected, rtol=1e-10) and np.allclose(theirs[1], expected, rtol=1e-10)
     below = (np.linalg.eigvalsh(definite.toarray()) < 12).sum()
     assert ours[2] == theirs[2] == below > 0
+
+
+# -- indefinite matrices -----------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=50, deadline=None)
+@given(size=st.integers(2, 40), below=st.integers(0, 6), pins=st.integers(1, 8), seed=st.integers(0, 2**32 - 1))
+def test_pins_count_negative_eigenvalues_and_solve(size, below, pins, seed):
+    """Inertia and solution of dense matrices of a known spectrum, as those of eigenvalues and of LAPACK's LU."""
+    generator = np.random.default_rng(seed)
+    modes, _ = np.linalg.qr(generator.standard_normal((size, size)))
+    values = np.exp(generator.uniform(-9, 0, size))
+    values[: min(below, size)] *= -1
+    dense = (modes * values) @ modes.T
+    matrix = csc_array(0.5 * (dense + dense.T))
+    places = generator.permutation(size)[:pins]
+    factor = factorize_pinned(matrix, Analysis(matrix.indices, matrix.indptr), [places])
+    if factor is None:  # pins too few to hold it, or the least eigenvalue too near to zero: never a wrong number
+        return
+    assert factor.negative_pivots == (values < 0).sum()
+    right = generator.standard_normal((size, 2))
+    missing = right - matrix @ factor.solve(right)
+    # Backward stable: a residual as rounding of the solution makes one.
+    assert np.abs(missing).max() <= 1e-13 * np.abs(factor.solve(right)).max()
+
+
+def test_pins_at_every_unknown_hold_all_that_is_no_stiffer_than_they_are():
+    matrix = csc_array(np.diag([-1.0, 2.0, -3.0, 4.0]) + 0.1)
+    factor = factorize_pinned(matrix, Analysis(matrix.indices, matrix.indptr), [np.arange(0), np.arange(4)])
+    assert factor.name == "pinned Cholesky" and factor.negative_pivots == 2
+    assert np.allclose(factor.solve(np.ones(4)), np.linalg.solve(matrix.toarray(), np.ones(4)), rtol=1e-12)
+
+
+def test_pins_count_nothing_in_a_singular_matrix():
+    singular = np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    for shift in (0.0, 1e-15, -1e-15):
+        matrix = csc_array(singular + shift * np.eye(3))
+        assert factorize_pinned(matrix, Analysis(matrix.indices, matrix.indptr), [np.array([0])]) is None
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "braced"])
+def test_an_unstable_path_is_the_same_with_pins_and_without(mesh_type, monkeypatch):
+    mesh = MESH_TYPES[mesh_type](0.2, 0.01, 2.5e-3)
+    names = set()
+
+    def path(pinned):
+        monkeypatch.setattr(networks, "PINNED", pinned)
+        problem = problem_on(mesh)
+        found = follow(problem, -2e-4, increment=2e-3 * problem.network.unknowns**0.5, most_points=8)
+        names.add(problem.network.factorize_tangent(found.displacements[-1]).name)
+        return found
+
+    ours, theirs = path(0), path(10**9)
+    assert names == {"pinned Cholesky", "SuperLU"}
+    assert ours.negative_pivots.tolist() == theirs.negative_pivots.tolist() and ours.negative_pivots.max() > 0
+    assert np.allclose(ours.loads, theirs.loads, rtol=1e-9)
+    assert np.abs(ours.displacements - theirs.displacements).max() <= 1e-9 * np.abs(theirs.displacements).max()
+
+
+def test_what_pins_do_not_hold_goes_to_superlu(monkeypatch):
+    monkeypatch.setattr(networks, "PINNED", 0)
+    mesh = MESH_TYPES["structured"](0.1, 0.02, 2.5e-3)
+    network = problem_on(mesh, -half_weight(mesh)).network
+    factor = network.factorize_tangent()
+    assert (factor.name, factor.negative_pivots) == ("SuperLU", network.unknowns)
+
+
+def test_a_stable_tangent_after_an_unstable_one_has_the_factor_that_it_always_has(monkeypatch):
+    monkeypatch.setattr(networks, "PINNED", 0)
+    mesh = MESH_TYPES["structured"](0.2, 0.01, 2.5e-3)
+    fresh, used = problem_on(mesh), problem_on(mesh)
+    bent = -5e-3 * used.slope / np.abs(used.slope).max()
+    assert used.network.factorize_tangent(bent).name == "pinned Cholesky"
+    ours, theirs = (problem.network.factorize_tangent(1e-6 * bent) for problem in (fresh, used))
+    assert ours.name == theirs.name == "Cholesky"
+    assert np.array_equal(ours.solve(fresh.load), theirs.solve(used.load))
+
+
+def test_particles_that_are_spread_are_far_from_each_other():
+    mesh = MESH_TYPES["free"](0.2, 0.04, 4e-3)
+    points = mesh.points[spread(mesh.points, 16)]
+    apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
+    assert len(points) == 16 and apart.min() > 0.5 * (mesh.area / 16) ** 0.5
+    assert len(spread(points[:3], 8)) == 2
 
 
 # -- order of elimination ----------------------------------------------------------------------------------------------

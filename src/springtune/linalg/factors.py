@@ -2,7 +2,8 @@
 
 CHOLMOD comes with the package cvxopt, an extra. Where it is not installed, or where the environment variable
 ``SPRINGTUNE_SOLVER`` is ``superlu``, SuperLU factorizes, which takes three to five times as long. What is not positive
-definite has no Cholesky factor, and SuperLU then counts its negative pivots.
+definite has no Cholesky factor but with pins (`springtune.linalg.pinned`); without these SuperLU counts its negative
+pivots.
 """
 
 import os
@@ -61,6 +62,10 @@ class Factor(Protocol):
         """
         ...
 
+    def step(self, right: np.ndarray) -> np.ndarray:
+        """As `solve`, where it is a step of Newton's method that is asked for."""
+        ...
+
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, where an estimate would do."""
         ...
@@ -111,9 +116,7 @@ class SuperLUFactor:
         solution[self._order] = self._lu.solve(right[self._order])
         return solution
 
-    def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where an estimate would do."""
-        return self.solve(right)
+    step = estimate = solve
 
     @cached_property
     def negative_pivots(self) -> int:
@@ -186,7 +189,7 @@ class Analysis:
         except ArithmeticError:
             self._spare.append(factor)
             return None
-        return CholeskyFactor(factor, self._spare)
+        return CholeskyFactor(factor, self._spare, self._matrix.size[0])
 
 
 class CholeskyFactor:
@@ -198,13 +201,15 @@ class CholeskyFactor:
         CHOLMOD's.
     spare : list
         Where it goes when nobody needs it any more.
+    size : int
+        Number of unknowns.
     """
 
     name = "Cholesky"
     negative_pivots = 0
 
-    def __init__(self, factor: object, spare: list[Any]) -> None:
-        self._factor, self._spare = factor, spare
+    def __init__(self, factor: object, spare: list[Any], size: int) -> None:
+        self._factor, self._spare, self._size = factor, spare, size
 
     def __del__(self) -> None:
         self._spare.append(self._factor)
@@ -217,9 +222,33 @@ class CholeskyFactor:
         cholmod.solve(self._factor, solution)
         return np.array(solution).reshape(right.shape)
 
-    def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where an estimate would do."""
-        return self.solve(right)
+    step = estimate = solve
+
+    def lower(self, right: np.ndarray) -> np.ndarray:
+        """First half of a solution, with the lower triangular factor, in the order of elimination."""
+        return self._halved(right, 7, 4)
+
+    def upper(self, right: np.ndarray) -> np.ndarray:
+        """The other half, with its transpose, of what `lower` gives."""
+        return self._halved(right, 5, 8)
+
+    def _halved(self, right: np.ndarray, *systems: int) -> np.ndarray:
+        from cvxopt import cholmod, matrix
+
+        solution = matrix(right)
+        for system in systems:
+            cholmod.solve(self._factor, solution, sys=system)
+        return np.array(solution).ravel()
+
+    def lower_columns(self, unknowns: np.ndarray) -> csc_array:
+        """Few entries each: what `lower` gives for a unit load at each of n unknowns, shape (unknowns, n)."""
+        from cvxopt import cholmod, matrix, spmatrix
+
+        size, count = self._size, len(unknowns)
+        units = spmatrix(1.0, matrix(unknowns), matrix(np.arange(count)), (size, count))
+        found = cholmod.spsolve(self._factor, cholmod.spsolve(self._factor, units, sys=7), sys=4)
+        pointers, indices, data = (np.array(part).ravel() for part in found.CCS)
+        return csc_array((data, indices, pointers), shape=(size, count))
 
 
 def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | CholeskyFactor:

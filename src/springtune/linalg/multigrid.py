@@ -1,20 +1,35 @@
-"""Solves of large networks: conjugate gradients with algebraic multigrid as preconditioner."""
+"""Solves of large networks: conjugate gradients with multigrid on regular grids as preconditioner."""
 
+from collections.abc import Callable
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, csr_matrix, sparray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.sparse import csr_array
 
-from .factors import SingularError
+from .factors import Factor, SingularError
 
 RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
+
+STEP = 1e-4
+"""The same of a step of Newton's method, whose tangent leaves about as much."""
 
 MAX_CG_ITERATIONS = 300
 
 CERTAIN = 1e-7
 """Residual over a random right-hand side below which every direction has been met: of a million unknowns each has a
 share of about 1e-3."""
+
+COARSENING = 3.0
+"""Spacing of the finest grid over the mesh size; of a grid of 2 the product takes longer than it saves steps."""
+
+COARSEST = 500
+"""Unknowns below which the coarsest matrix is factorized, as a dense one."""
+
+MOST_LEVELS = 16
+"""Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
 
 class NotPositiveError(SingularError):
@@ -25,33 +40,102 @@ class IndefiniteError(NotPositiveError):
     """Conjugate gradients met a direction without stiffness."""
 
 
-class Multigrid:
-    """Smoothed aggregation, whose coarse spaces hold the rigid motions of the sheet.
+class _Level(NamedTuple):
+    """A matrix, and the step from the next coarser grid to its unknowns and back, in single precision."""
 
-    It stands in the place of a factor, see `springtune.linalg.factors.Factor`.
+    matrix: csr_array
+    prolong: csr_array
+    restrict: csr_array
+
+
+class Multigrid:
+    """Conjugate gradients, preconditioned by multigrid on regular grids laid over the mesh.
+
+    It stands in the place of a factor, see `springtune.linalg.factors.Factor`. Displacements of a grid's nodes are
+    interpolated bilinearly, to the particles and from grid to grid, each twice as wide as the last: rigid motions and
+    even strains are among them whatever the mesh is. Coarse matrices are Galerkin's; a cycle smooths by one sweep of
+    Gauss and Seidel down and one up, in single precision, which loses nothing: what it gives only precondition.
     Time and memory grow in proportion to the number of unknowns, where those of a factorization grow with its power 3/2
-    and n log n. Method: Vanek, Mandel and Brezina, Computing 56:179, 1996; by the library pyamg.
+    and n log n. Method: J. Xu, The auxiliary space method and optimal multigrid preconditioning techniques for
+    unstructured grids, Computing 56:215, 1996.
 
     Parameters
     ----------
-    matrix : sparse array, shape (unknowns, unknowns)
+    matrix : csr_array, shape (unknowns, unknowns)
         Symmetric.
-    motions : ndarray of float, shape (unknowns, 3)
-        Rigid motions.
+    points : ndarray of float, shape (n_points, 2)
+        Particles [m].
+    places : ndarray of int, shape (unknowns,)
+        Direction that each unknown is of: twice the number of its particle, plus 1 for y.
+    otherwise : callable, optional
+        Makes the factor that takes over where conjugate gradients do not end, or meet a direction without stiffness;
+        that is an error without.
     """
 
-    name = "multigrid"
+    def __init__(
+        self,
+        matrix: csr_array,
+        points: np.ndarray,
+        places: np.ndarray,
+        otherwise: Callable[[], Factor] | None = None,
+    ) -> None:
+        self._matrix, self._otherwise = matrix, otherwise
+        self._direct: Factor | None = None
+        self._levels: list[_Level] = []
+        self._certain, self._coarsest = False, None
+        try:
+            self._coarsest = self._coarsened(points, places)
+        except LinAlgError:  # then the matrix is not positive definite either
+            self._levels = []
 
-    def __init__(self, matrix: sparray, motions: np.ndarray) -> None:
-        from pyamg import smoothed_aggregation_solver
+    def _coarsened(self, points: np.ndarray, places: np.ndarray) -> Any:
+        """Levels down to the coarsest one, whose dense factor is returned."""
+        matrix = self._matrix
+        spacing = COARSENING * np.sqrt(np.ptp(points, axis=0).prod() / len(points))
+        while matrix.shape[0] > COARSEST and len(self._levels) < MOST_LEVELS:
+            prolong, points = bilinear(points, places, spacing)
+            # Of a node that moves nothing there is no equation.
+            moving = np.bincount(prolong.indices, minlength=prolong.shape[1]) > 0
+            places = np.flatnonzero(moving)
+            if not moving.all():
+                prolong = prolong[:, places]
+            restrict = csr_array(prolong.T)
+            coarse = restrict @ (matrix @ prolong)
+            single = csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
+            self._levels.append(_Level(single, prolong, restrict))
+            matrix, spacing = coarse, 2.0 * spacing
+        return cho_factor(matrix.toarray())
 
-        self._matrix = csr_array(matrix)
-        sweep = ("gauss_seidel", {"sweep": "symmetric"})
-        # pyamg takes matrices of the older kind only.
-        hierarchy = smoothed_aggregation_solver(
-            csr_matrix(matrix), B=motions, presmoother=sweep, postsmoother=sweep, max_coarse=500
-        )
-        self._precondition = hierarchy.aspreconditioner(cycle="V").matvec
+    @property
+    def name(self) -> str:
+        """``"multigrid"``, or that of the factor that took over."""
+        return "multigrid" if self._direct is None else self._direct.name
+
+    def _give_up(self, error: NotPositiveError) -> Factor:
+        """The factor that takes over."""
+        if self._otherwise is None:
+            raise error
+        self._levels = []
+        self._direct = self._otherwise()
+        return self._direct
+
+    def _precondition(self, right: np.ndarray) -> np.ndarray:
+        """What a cycle makes of a right-hand side."""
+        size = np.linalg.norm(right) or 1.0
+        return size * self._cycle(0, (right / size).astype(np.float32)).astype(float)
+
+    def _cycle(self, depth: int, right: np.ndarray) -> np.ndarray:
+        from pyamg.amg_core import gauss_seidel
+
+        if depth == len(self._levels):
+            return cho_solve(self._coarsest, right.astype(float), check_finite=False).astype(np.float32)
+        matrix, prolong, restrict = self._levels[depth]
+        entries, last = (matrix.indptr, matrix.indices, matrix.data), len(right) - 1
+        solution = np.zeros_like(right)
+        gauss_seidel(*entries, solution, right, 0, last + 1, 1)
+        solution += prolong @ self._cycle(depth + 1, restrict @ (right - matrix @ solution))
+        gauss_seidel(*entries, solution, right, last, -1, -1)
+        return solution
 
     def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:
         """Solution of the system.
@@ -69,30 +153,56 @@ class Multigrid:
         Raises
         ------
         IndefiniteError
-            If a direction without stiffness is met.
+            If a direction without stiffness is met, and there is no factor that takes over.
         NotPositiveError
-            If it does not end.
+            If it does not end, likewise.
         """
-        solution, missing = np.zeros(len(right)), np.array(right, dtype=float)
-        target = tolerance * np.linalg.norm(right)
-        if target == 0.0:
+        if self._direct is None:
+            try:
+                return self._gradients(np.array(right, dtype=float), tolerance)
+            except NotPositiveError as error:
+                self._give_up(error)
+        assert self._direct is not None
+        return self._direct.solve(right)
+
+    def _gradients(self, missing: np.ndarray, tolerance: float) -> np.ndarray:
+        """Solution by conjugate gradients.
+
+        The first one begins with a random residual besides: where that is gone, too, no direction was without
+        stiffness, and the matrix is positive definite.
+        """
+        solution, scale = np.zeros(len(missing)), np.linalg.norm(missing)
+        if scale == 0.0:
             return solution
+        if self._coarsest is None:
+            raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
+        proves = not self._certain and tolerance <= CERTAIN
+        if proves:
+            random = np.random.default_rng(0).standard_normal(len(missing))
+            solution = self._precondition(scale / np.linalg.norm(random) * random)
+            missing -= self._matrix @ solution
         better = self._precondition(missing)
         direction, weight = better.copy(), missing @ better
         for _ in range(MAX_CG_ITERATIONS):
             forces = self._matrix @ direction
             stiffness = direction @ forces
-            if not stiffness > 0:
+            if not stiffness > 0 or not weight > 0:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
             length = weight / stiffness
             solution += length * direction
             missing -= length * forces
-            if np.linalg.norm(missing) <= target:
+            if np.linalg.norm(missing) <= tolerance * scale:
+                self._certain |= proves
                 return solution
             better = self._precondition(missing)
             weight, before = missing @ better, weight
-            direction = better + weight / before * direction
+            direction *= weight / before
+            direction += better
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
+
+    def step(self, right: np.ndarray) -> np.ndarray:
+        """As `solve`, so far as a step of Newton's method goes."""
+        return self.solve(right, STEP)
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, to a percent."""
@@ -100,13 +210,62 @@ class Multigrid:
 
     @cached_property
     def negative_pivots(self) -> int:
-        """0 where the matrix is positive definite, else 1: they are not counted.
+        """0 where the matrix is positive definite, else 1: they are not counted, but by a factor that takes over.
 
-        Conjugate gradients cannot end in a direction of which the right-hand side has a part without having met its
-        stiffness, and a random one has a part of every direction.
+        Conjugate gradients cannot end in a direction of which the residual they begin with has a part without having
+        met its stiffness, and a random one has a part of every direction.
         """
-        try:
-            self.solve(np.random.default_rng(0).standard_normal(self._matrix.shape[0]), CERTAIN)
-        except IndefiniteError:
-            return 1
-        return 0
+        if not self._certain and self._direct is None:
+            try:
+                self.solve(np.random.default_rng(1).standard_normal(self._matrix.shape[0]), CERTAIN)
+            except IndefiniteError:
+                return 1
+        return 0 if self._direct is None else self._direct.negative_pivots
+
+
+def bilinear(points: np.ndarray, places: np.ndarray, spacing: float) -> tuple[csr_array, np.ndarray]:
+    """Bilinear interpolation from a regular grid that is laid over particles.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        Particles [m].
+    places : ndarray of int, shape (unknowns,)
+        Direction that each unknown is of: twice the number of its particle, plus 1 for y.
+    spacing : float
+        Of the grid, about: its cells fit the particles' extent [m].
+
+    Returns
+    -------
+    prolong : csr_array of float32, shape (unknowns, 2 * n_nodes)
+        Unknowns from displacements of the nodes, x and y of each by turns.
+    nodes : ndarray of float, shape (n_nodes, 2)
+        Nodes about which there are particles [m].
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0.0], [0.25, 0.0], [1.0, 1.0]])
+    >>> prolong, nodes = bilinear(points, np.array([2, 5]), 1.0)
+    >>> prolong.toarray(), nodes.tolist()
+    (array([[0.75, 0.  , 0.  , 0.  , 0.25, 0.  , 0.  , 0.  ],
+           [0.  , 0.  , 0.  , 0.  , 0.  , 0.  , 0.  , 1.  ]], dtype=float32),
+    [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
+    """
+    lowest, extent = points.min(axis=0), np.ptp(points, axis=0)
+    cells = np.maximum(1, np.round(extent / spacing)).astype(np.int64)
+    widths = extent / cells
+    at = (points - lowest) / widths
+    corner = np.minimum(at.astype(np.int64), cells - 1)
+    (x, y), height = (at - corner).T, cells[1] + 1
+    node = (corner[:, 0] * height + corner[:, 1])[:, None] + [0, 1, height, height + 1]
+    weights = np.stack([(1 - x) * (1 - y), (1 - x) * y, x * (1 - y), x * y], axis=1).astype(np.float32)
+    used = np.zeros((cells + 1).prod(), dtype=bool)
+    used[node] = True
+    node = (np.cumsum(used, dtype=np.int32) - np.int32(1))[node]
+    particle, direction = np.divmod(places, 2)
+    columns = 2 * node[particle] + direction[:, None].astype(np.int32)
+    pointers = np.arange(0, 4 * len(places) + 1, 4, dtype=np.int32)
+    nodes = lowest + np.stack(np.divmod(np.flatnonzero(used), height), axis=1) * widths
+    prolong = csr_array((weights[particle].ravel(), columns.ravel(), pointers), shape=(len(places), 2 * len(nodes)))
+    prolong.eliminate_zeros()
+    return prolong, nodes

@@ -1,4 +1,4 @@
-"""Order of elimination: nested dissection of a mesh by coordinates."""
+"""Order of elimination: nested dissection of a mesh by coordinates; and particles spread over a mesh."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -63,3 +63,36 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
         order[start + len(part) - len(separator) : start + len(part)] = separator
         waiting += [(left, start), (right, start + len(left))]
     return order
+
+
+def spread(points: np.ndarray, count: int) -> np.ndarray:
+    """Particles spread over a mesh: those next to the middles of parts, which are halved across their longer side.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        [m]
+    count : int
+        Number of parts, a power of 2.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        At most so many, in ascending order.
+
+    Examples
+    --------
+    >>> line = np.arange(100.0)
+    >>> spread(np.stack([line, 0 * line], axis=1), 4).tolist()
+    [12, 37, 62, 87]
+    """
+    parts = [np.arange(len(points))]
+    while len(parts) < count and len(points) >= 2 * len(parts):
+        halves = []
+        for part in parts:
+            along = points[part, np.ptp(points[part], axis=0).argmax()]
+            order, middle = np.argsort(along, kind="stable"), len(part) // 2
+            halves += [part[order[:middle]], part[order[middle:]]]
+        parts = halves
+    middles = (part[((points[part] - points[part].mean(axis=0)) ** 2).sum(axis=1).argmin()] for part in parts)
+    return np.unique(list(middles))

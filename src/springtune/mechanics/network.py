@@ -26,8 +26,15 @@ from .pattern import Pattern
 LARGE = 200_000
 """Unknowns beyond which multigrid takes the place of SuperLU: there it is as fast, and takes a third of the memory."""
 
-LARGEST = 2_500_000
-"""Unknowns beyond which it takes the place of a Cholesky factorization, which is faster but needs 2 kB an unknown."""
+LARGEST = 600_000
+"""Unknowns beyond which it takes the place of a Cholesky factorization, too: it is faster there, in half the memory."""
+
+FACTORIZED = 2_500_000
+"""Unknowns up to which a Cholesky factorization, of 2 kB an unknown, takes over where multigrid comes to no end."""
+
+PINNED = 5_000
+"""Unknowns beyond which an indefinite matrix gets a Cholesky factor with pins: a small one is factorized by SuperLU
+as fast."""
 
 
 class Network:
@@ -47,7 +54,8 @@ class Network:
         A network with the same cells and the same directions held, whose numbering this one takes over.
     solver : str, optional
         One of `springtune.linalg.SOLVERS`; by what is installed and the number of unknowns without. What is not
-        positive definite has no Cholesky factor, and SuperLU takes its place.
+        positive definite has a Cholesky factor only with pins (`springtune.linalg.pinned`); where it is small, or
+        pins do not hold it, SuperLU takes its place.
 
     Attributes
     ----------
@@ -99,6 +107,7 @@ class Network:
         self.stiffness = stiffness
         self.energies = tuple(energies)
         self.has_springs = bool(np.any(stiffness)) or not self.energies
+        self._indefinite = False  # the last matrix that was factorized, a large one
         if like is not None:
             self._pattern = like._pattern if like.mesh is mesh else like._pattern.moved(mesh)
         self.first, self.second = mesh.edges.T
@@ -370,7 +379,7 @@ class Network:
         Returns
         -------
         Factor
-            Cholesky's only where the matrix is symmetric and positive definite.
+            Cholesky's only where the matrix is symmetric; with pins where it is not positive definite.
 
         Raises
         ------
@@ -378,13 +387,33 @@ class Network:
             If it is singular.
         """
         if symmetric and self._by_cholesky:
-            factor = self._pattern.analysis.factorize(matrix.data)
+            factor = self._cholesky(matrix)
             if factor is not None:
                 return factor
         if self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE:
-            return self._multigrid(matrix)
+            return self._multigrid(matrix, symmetric)
         order, places, indices, pointers = self._pattern.elimination
         return SuperLUFactor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
+
+    def _cholesky(self, matrix: csc_array) -> Factor | None:
+        """Cholesky's factor, with pins where there is none without; None where pins do not help either.
+
+        Where the last matrix was indefinite pins are tried first, which saves the attempt without: a matrix that turns
+        out to be positive definite has the factor that it always has.
+        """
+        tried = self._indefinite
+        if tried and (pinned := self._pinned(matrix)):
+            return pinned
+        factor = self._pattern.analysis.factorize(matrix.data)
+        self._indefinite = factor is None and self.unknowns > PINNED
+        return self._pinned(matrix) if self._indefinite and not tried else factor
+
+    def _pinned(self, matrix: csc_array) -> Factor | None:
+        """Cholesky's factor with pins; None where they do not hold it, and where it needs none."""
+        from ..linalg.pinned import factorize_pinned  # here: few networks are unstable
+
+        factor = factorize_pinned(matrix, self._pattern.analysis, self._pattern.pins)
+        return factor if factor is not None and factor.negative_pivots else None
 
     @property
     def _by_cholesky(self) -> bool:
@@ -409,15 +438,18 @@ class Network:
         except SingularError:
             return False
 
-    def _multigrid(self, matrix: csc_array) -> Factor:
+    def _multigrid(self, matrix: csc_array, symmetric: bool) -> Factor:
         from ..linalg.multigrid import Multigrid
 
-        # About the middle and over the extent, so that all three are of one size.
-        points = (self.mesh.points - self.mesh.points.mean(axis=0)) / np.ptp(self.mesh.points, axis=0).max()
-        ones, zeros = np.ones(len(points)), np.zeros(len(points))
-        fields = ((ones, zeros), (zeros, ones), (-points[:, 1], points[:, 0]))
-        motions = np.stack([self.reduce(np.stack(field, axis=1)) for field in fields], axis=1)
-        return Multigrid(matrix, motions)
+        def otherwise() -> Factor:
+            factor = self._cholesky(matrix)
+            if factor is None:
+                raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
+            return factor
+
+        takes_over = symmetric and CHOLESKY and self.solver is None and self.unknowns <= FACTORIZED
+        rows = matrix.T if symmetric else matrix.tocsr()
+        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if takes_over else None)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

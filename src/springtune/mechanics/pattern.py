@@ -5,15 +5,18 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import bsr_array, csc_array, csr_array
 
 from ..linalg.factors import Analysis
-from ..linalg.ordering import nested_dissection
+from ..linalg.ordering import nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
 
 DISSECTED = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
+
+PINNED = (8, 32)
+"""Particles that are pinned where the matrix is indefinite: so many, and so many more where these do not hold it."""
 
 
 class Pattern:
@@ -51,40 +54,34 @@ class Pattern:
     def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows and column pointers of the matrix; for each entry its place in what `coupling_entries` puts together.
 
-        Block by block of two directions each: sorting those is a sixth of the work of sorting entries.
+        Block by block of two directions each. Springs are sorted, so that blocks of a column, first those above its
+        diagonal, then its own, then those below, are in order once they are told apart by column.
         """
         count, joined = self.shape[0], len(self.springs)
-        first, second, own = self.first, self.second, np.arange(self.shape[0])
-        columns, rows = np.concatenate([second, first, own]), np.concatenate([first, second, own])
-        order = np.argsort(columns * count + rows)
-        columns, rows = columns[order], rows[order]
-        sizes = np.bincount(columns, minlength=count)
-        # Place of entry (0, 0) of each block in what it comes from, and the steps to the next row and column of it.
-        place = np.concatenate([np.arange(joined), np.arange(joined), 4 * joined + own])[order]
-        down = np.repeat([2 * joined, joined, 2 * count], [joined, joined, count])[order]
-        right = np.repeat([joined, 2 * joined, count], [joined, joined, count])[order]
-        before = np.cumsum(sizes) - sizes
-        # Entry (a, d) of a block stands in column d of its particle's two, each twice as high as the blocks are many.
-        corner = 4 * before[columns] + 2 * (np.arange(len(order)) - before[columns])
-        height = 2 * sizes[columns]
-        row_of, source = np.empty((2, 4 * len(order)), dtype=np.int64)
-        kept = np.empty(4 * len(order), dtype=bool)
-        for a in range(2):
-            for d in range(2):
-                at = corner + d * height + a
-                row_of[at] = row = self.number[rows, a]
-                kept[at] = (row >= 0) & (self.number[columns, d] >= 0)
-                source[at] = place + a * down + d * right
-        ends = np.repeat(2 * sizes, 2).cumsum()
-        filled = np.concatenate([[0], np.cumsum(kept)[ends - 1]])
-        pointers = filled[np.concatenate([[True], self.number.ravel() >= 0])].astype(np.int32)
-        return row_of[kept].astype(np.int32), pointers, source[kept]
+        first, second, own = self.first, self.second, np.arange(count)
+        # What a block is made of: of the springs, once as it is and once turned, and of the particles.
+        made_of = np.concatenate([np.arange(joined), np.arange(4 * joined, 4 * joined + count), np.arange(joined)])
+        columns, rows = np.concatenate([second, own, first]), np.concatenate([first, own, second])
+        blocks = csr_array((made_of.astype(np.int32), (columns, rows)), shape=(count, count))
+        rows, place = blocks.indices, blocks.data
+        columns = np.repeat(np.arange(count, dtype=np.int32), np.diff(blocks.indptr))
+        # Steps to the next row and column of it; where a spring runs the other way its block is transposed.
+        way = np.sign(columns - rows)  # 1 where it is as it is, -1 where it is turned, 0 of a particle
+        down, right = np.array([[2 * count, 2 * joined, joined], [count, joined, 2 * joined]], dtype=np.int32)[:, way]
+        made_of = np.empty((len(rows), 2, 2), dtype=np.int32)
+        made_of[:, 0, 0], made_of[:, 0, 1], made_of[:, 1, 0] = place, place + down, place + right
+        made_of[:, 1, 1] = place + down + right
+        stacked = bsr_array((made_of, rows, blocks.indptr), shape=(2 * count, 2 * count))
+        entries = stacked.tocsr()
+        if self.size < 2 * count:
+            entries = entries[self.places][:, self.places]
+        return entries.indices.astype(np.int32), entries.indptr.astype(np.int32), entries.data.astype(np.int64)
 
     def moved(self, mesh: Mesh) -> "Pattern":
         """The same of a mesh with the same cells at other points; what depends on where these are is found anew."""
         found = copy(self)
         found.mesh = mesh
-        for name in ("order", "elimination", *(["analysis"] if self.size > DISSECTED else [])):
+        for name in ("order", "elimination", "pins", *(["analysis"] if self.size > DISSECTED else [])):
             found.__dict__.pop(name, None)
         return found
 
@@ -103,6 +100,12 @@ class Pattern:
     def analysis(self) -> Analysis:
         """Symbolic Cholesky factorization; in an order of CHOLMOD's own where ours would not gain what it costs."""
         return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
+
+    @cached_property
+    def pins(self) -> list[np.ndarray]:
+        """Unknowns to pin where the matrix is indefinite: those of particles spread over the mesh."""
+        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PINNED)
+        return [pins[pins >= 0] for pins in chosen]
 
     @cached_property
     def elimination(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

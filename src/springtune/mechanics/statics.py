@@ -113,6 +113,11 @@ class StaticProblem:
         return self.network.rest_factor
 
     @cached_property
+    def _pull(self) -> np.ndarray:
+        """Load of the linear network over ``s``, less what prescribed displacements take [1], shape (unknowns,)."""
+        return self.load if self.given is None else self.load - self.network.linear_resistance(self.given)
+
+    @cached_property
     def _slope(self) -> tuple[np.ndarray, float, float]:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
 
@@ -120,11 +125,7 @@ class StaticProblem:
             missing = self.load - self.network.linear_resistance(slope)
             return missing, norm(missing) / self.load_norm
 
-        if self.given is None:
-            first = self.network.expand(self.rest_factor.solve(self.load))
-        else:
-            pull = self.load - self.network.linear_resistance(self.given)
-            first = self.given + self.network.expand(self.rest_factor.solve(pull))
+        first = self.moved(1.0, self.network.expand(self.rest_factor.solve(self._pull)))
         here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
         return here.displacements, here.residual, error
 
@@ -292,7 +293,10 @@ class StaticProblem:
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
-        if not self.network.energies and self.follower is None and self.given is None:
+        if self.rest_factor.name == "multigrid":
+            # A start needs no more than a step does; each order of the series would take as long.
+            starts.insert(0, lambda s: self.moved(s, s * self.network.expand(self.rest_factor.step(self._pull))))
+        elif not self.network.energies and self.follower is None and self.given is None:
             # The series is of springs under dead loads.
             starts.insert(0, lambda s: self.start.predict(s))
         for start in starts:

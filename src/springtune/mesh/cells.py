@@ -364,8 +364,9 @@ def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:
 def signed_areas(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Signed area of each cell [m2], shape (n_cells,); negative where it is inverted."""
     # About the first corner: coordinates far from the origin would cost digits.
-    x, y = (points[corners] - points[corners[:, :1]]).transpose(2, 0, 1)
-    return 0.5 * sum(x[:, i] * y[:, i + 1] - x[:, i + 1] * y[:, i] for i in range(1, corners.shape[1] - 1))
+    x, y = (np.ascontiguousarray(along)[corners.T] for along in points.T)
+    x, y = x[1:] - x[0], y[1:] - y[0]
+    return 0.5 * sum(x[i] * y[i + 1] - x[i + 1] * y[i] for i in range(len(x) - 1))
 
 
 def corner_angles(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
