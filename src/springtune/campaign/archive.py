@@ -367,8 +367,8 @@ def _names(study: "Study", given: set[Path], checkout: Path) -> dict[Path, str]:
     for path, name in names.items():
         if not name or os.path.relpath(name, folder) != os.path.relpath(path, config.parent):
             raise ArchiveError(
-                f"{study.path}: reads {path.name}, which could not be found in an archive from the study as it is found "
-                "here; put the study and its files into one folder, in the checkout or outside, and run it again"
+                f"{study.path}: reads {path.name}, which an archive could not hold where the study finds it; "
+                "put the study and its files into one folder, in the checkout or outside, and run it"
             )
     return names
 
@@ -452,11 +452,12 @@ def _readme(found: Contents) -> str:
     """What somebody reads who has unpacked the archive and knows nothing of it."""
     study = f"../{found.config}" if not found.config.startswith(f"{CODE}/") else found.config.removeprefix(f"{CODE}/")
     commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
+    version = found.attributes["springtune_version"]
     changed = f"; what differs from the commit is in `{DIFF}`" if found.code.diff else ""
     return f"""# {found.study.title}
 
-The study `{found.study.name}`, computed by springtune {found.attributes["springtune_version"]} ({commit}{changed}). Every
-file is described in `{METADATA}`: this is an RO-Crate.
+The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is
+described in `{METADATA}`: this is an RO-Crate.
 
 | | |
 |---|---|

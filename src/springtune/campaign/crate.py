@@ -36,8 +36,9 @@ PROFILES = {
 }
 """Profiles that an archive conforms to, with their names and versions."""
 
+WORKFLOW = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
 PARAMETER = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
-"""Profile of what the workflow is given and makes."""
+"""Profiles of the workflow, and of what it is given and makes."""
 
 DONE = "http://schema.org/CompletedActionStatus"
 
@@ -244,6 +245,7 @@ class _Crate:
         ]
         for name, text in self._described().items():
             self.files[name]["description"] = text
+        self.files[README]["about"] = root
         self._sort_into_folders()
 
     def _sort_into_folders(self) -> None:
@@ -307,6 +309,7 @@ class _Crate:
         """The Snakefile: what it is given, and what it makes."""
         workflow, found = self.files[f"{CODE}/Snakefile"], self.found
         root = self.crate.root_dataset
+        workflow["conformsTo"] = {"@id": WORKFLOW}
         workflow["license"], workflow["creator"] = root["license"], root["author"]
         for key, name, file, told in (
             ("input", "study", found.config, "the study's file, --configfile of Snakemake"),
