@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns test-archive slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -49,8 +49,12 @@ test-versions: $(VENV)/.test
 test-reruns: $(VENV)/.test
 	pytest -n 2 tests/reruns
 
+# Archives of studies: valid to a validator of others, which is installed, and reproduced in a new environment.
+test-archive: $(VENV)/.test
+	pytest -rs tests/archive
+
 slow: $(VENV)/.test
-	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
+	pytest -n 2 -m slow --ignore tests/archive --ignore tests/faults --ignore tests/reruns --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 lint: $(VENV)/.test
@@ -83,9 +87,10 @@ $(VENV)/.test: requirements/test.txt $(VENV)/.run
 LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
 lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
-	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
+	$(LOCK) pyproject.toml requirements/build.in --extra archive --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
+	$(LOCK) requirements/validator.in --output-file requirements/validator.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.
 clean:
