@@ -52,7 +52,7 @@ def validators(tmp_path_factory):
     called("uv", "venv", "--python", sys.executable, folder / "venv")
     lock = REPOSITORY / "requirements/validator.txt"
     called("uv", "pip", "install", "--python", folder / "venv", "--require-hashes", "-r", lock)
-    called(folder / "venv/bin/python", REPOSITORY / "tests/archive/offline.py", folder / "cache")
+    called(folder / "venv/bin/python", REPOSITORY / "tools/validator_cache.py", folder / "cache")
     return folder
 
 

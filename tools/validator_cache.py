@@ -1,4 +1,4 @@
-"""Give the validator of RO-Crates the one document that it would fetch: ``python offline.py CACHE``.
+"""Give the validator of RO-Crates the one document that it would fetch: ``python tools/validator_cache.py CACHE``.
 
 It reads the JSON-LD context of RO-Crate 1.1 from the network; the library rocrate has it as a file, in versions before
 0.15. What is written is the cache that ``rocrate-validator --offline --cache-path CACHE`` reads.
