@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -66,6 +66,13 @@ build/slurm/.done: requirements/run.txt requirements/slurm.txt requirements/chol
 
 slow: $(VENV)/.test
 	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/slurm --ignore tests/versions
+
+# Archives of studies: valid to a validator of others, which is installed, and reproduced in a new environment.
+test-archive: $(VENV)/.test
+	pytest -rs tests/archive
+
+slow: $(VENV)/.test
+	pytest -n 2 -m slow --ignore tests/archive --ignore tests/faults --ignore tests/reruns --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
@@ -101,11 +108,12 @@ $(VENV)/.test: requirements/test.txt $(VENV)/.run
 LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
 lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
-	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
+	$(LOCK) pyproject.toml requirements/build.in --extra archive --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
 	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
+	$(LOCK) requirements/validator.in --output-file requirements/validator.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.
 clean:

@@ -101,12 +101,25 @@ def inputs(study: Study, folder: Path) -> dict[str, str]:
         By the file's name: seen from the checkout, or from the study where there is none.
     """
     root = next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
-    files = {study.path, *(mesh.file for mesh in study.meshes if mesh.file)}
-    files |= {study.printed_path} if study.printed_path else set()
-    files |= set(study.test_files)
-    files |= {file for kind in kinds() for file in kind.files(study.parts[kind.name])}
-    files |= {root / LOCK} if root else set()
+    files = input_files(study) | ({root / LOCK} if root else set())
     return {_name(file.resolve(), root or folder): _sha256(file) for file in sorted(files)}
+
+
+def input_files(study: Study) -> set[Path]:
+    """The study's file, and all that it names: meshes, rows of parameters, tests, printed values.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    set of Path
+    """
+    files = {study.path, *study.test_files, *study.row_files}
+    files |= {mesh.file for mesh in study.mesh_files.values() if mesh.file}
+    files |= {study.printed_path} if study.printed_path else set()
+    return files | {file for kind in kinds() for file in kind.files(study.parts[kind.name])}
 
 
 def _name(file: Path, root: Path) -> str:

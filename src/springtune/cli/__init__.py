@@ -34,6 +34,9 @@ COMMANDS = {
     "accept": Row(RESULTS, "accept", "accept", "Keep values and curves as right, or say what departs from them."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
     "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
+    "archive": Row(
+        RESULTS, "archive", "archive", "Pack a finished study into one file, to be cited and computed again."
+    ),
     "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "schema", "schema", "Print the JSON schema of studies, or renew it and the manual."),
     "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from ..output.text import aligned
 from .examples import examples
@@ -16,19 +17,59 @@ TOLD = 20
 """Most jobs of a study that are told with a fault."""
 
 
-@click.command(epilog=examples("springtune verify config/paper.yaml", "springtune verify results/paper --scenes 50"))
+@click.command(
+    epilog=examples(
+        "springtune verify config/paper.yaml",
+        "springtune verify results/paper --scenes 50",
+        "springtune verify results/paper.crate.zip",
+        "springtune verify results/paper.crate.zip --reproduce",
+    )
+)
 @click.argument("study", required=False, type=click.Path(path_type=Path))
 @click.option("--scenes", type=click.IntRange(0), default=5, show_default=True, help="Scenes to compute again.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the drawing of these scenes.")
 @click.option("--set-aside", is_flag=True, help="Rename damaged files, so that the next run makes them again.")
-def verify(study: Path | None, scenes: int, seed: int, set_aside: bool) -> None:
+@click.option("--reproduce", is_flag=True, help="Compute an archive again, by the program that is in it.")
+@click.option("--fresh", is_flag=True, help="Do so in a new environment, even where this one is the same.")
+@click.pass_context
+def verify(
+    context: click.Context,
+    study: Path | None,
+    scenes: int,
+    seed: int,
+    set_aside: bool,
+    reproduce: bool,
+    fresh: bool,
+) -> None:
     """Compare all results with their checksums, and compute some scenes again.
 
     STUDY is its YAML file, or results/<study>; without it, all folders in results. Every file is read: what the stages
     stored, dataset, tables, figures, page. The scenes are drawn from the dataset and computed by the config that it
     holds. Exits with 1 if anything is not as it was made; nothing is changed without --set-aside.
+
+    STUDY may be an archive (springtune archive), of which all files are compared with their checksums. With --reproduce
+    it is unpacked into a temporary folder and the whole study is run by the program in it, in this environment where
+    that has the packages of its lock file and in a new one otherwise; the datasets are compared bit by bit, apart from
+    times. That runs what somebody packed: do it with archives whose origin you trust.
     """
     from ..study import StudyError
+
+    if study is not None and study.suffix == ".zip":
+        from .archived import verified
+
+        own = {"scenes", "seed", "set_aside"}
+        given = [name for name in own if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+        if given:
+            option = f"--{given[0].replace('_', '-')}"
+            raise click.UsageError(
+                f"{option} is for results, not for an archive, which --reproduce computes again wholly"
+            )
+        if not verified(study, reproduce or fresh, fresh):
+            raise click.exceptions.Exit(1)
+        return
+    if reproduce or fresh:
+        option = "--reproduce" if reproduce else "--fresh"
+        raise click.UsageError(f"{option} is for an archive: springtune archive results/<study> makes one")
 
     try:
         faults = sum(_verified(one, folder, scenes, seed, set_aside) for one, folder in studies(study))

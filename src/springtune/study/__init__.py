@@ -79,6 +79,7 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
     about["test_files"] = test_files
+    about["row_files"] = tuple(beside / grid.rows for grid in config.grids.values() if grid.rows)
     return build(config, grids, kinds, problems, about)
 
 

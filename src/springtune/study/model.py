@@ -233,6 +233,8 @@ class Study:
         Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
     test_files : tuple of Path
         Of the tests of rubber that materials are fitted to or compared with.
+    row_files : tuple of Path
+        Of rows of parameters that grids name.
     """
 
     name: str
@@ -258,6 +260,7 @@ class Study:
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()
     test_files: tuple[Path, ...] = ()
+    row_files: tuple[Path, ...] = ()
 
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.

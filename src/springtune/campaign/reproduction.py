@@ -1,0 +1,311 @@
+"""An archive of a study, checked, and computed again by what is in it; see `springtune.campaign.archive`."""
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
+
+from ..output import reading
+from . import due, environment
+from .crate import CODE, METADATA, SUMS
+
+if TYPE_CHECKING:
+    from ..output.comparison import Comparison
+
+MADE_BY = "https://w3id.org/ro/wfrun/provenance/0.5"
+"""Profile by which an archive is told from other zip files."""
+
+UNZIPPED = 2**20
+"""Bytes that are read at once."""
+
+
+class ReproductionError(ValueError):
+    """An archive that could not be computed again: why, and what to do about it."""
+
+
+@dataclass
+class Checked:
+    """What an archive is.
+
+    Attributes
+    ----------
+    path : Path
+    sha256 : str
+        Of the archive itself.
+    files : int
+        Files whose checksums were compared.
+    faults : dict of str to str
+        By name, what is wrong with a file.
+    title, study, config, dataset : str
+        Of the study: its title, its name, and the names of its file and of its dataset in the archive.
+    version : str
+        Of the program.
+    seconds : float
+        That all jobs took together [s].
+    machine : dict of str to str
+        That it was computed on, as far as it is told.
+    """
+
+    path: Path
+    sha256: str
+    files: int = 0
+    faults: dict[str, str] = field(default_factory=dict)
+    title: str = ""
+    study: str = ""
+    config: str = ""
+    dataset: str = ""
+    version: str = ""
+    seconds: float = 0.0
+    machine: dict[str, str] = field(default_factory=dict)
+
+
+def check(path: Path) -> Checked:
+    """Compare all files of an archive with their checksums, and with what its metadata lists.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Checked
+
+    Raises
+    ------
+    ReproductionError
+        If it is no archive of a study, or not even its list of contents can be read.
+    OSError
+    """
+    with open(path, "rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _checked(Checked(path, digest), archive)
+    except zipfile.BadZipFile as error:
+        raise ReproductionError(f"{path}: is no whole zip file ({error}); get it again") from None
+
+
+def _checked(found: Checked, archive: zipfile.ZipFile) -> Checked:
+    infos = archive.infolist()
+    for info in infos:
+        place = PurePosixPath(info.filename)
+        if place.is_absolute() or ".." in place.parts or "\\" in info.filename:
+            found.faults[info.filename] = "leads out of the archive"
+    names = [info.filename for info in infos if not info.is_dir()]
+    found.faults |= {name: "is there twice" for name, count in Counter(names).items() if count > 1}
+    if METADATA not in names:
+        raise ReproductionError(f"{found.path}: is no archive of a study, it has no {METADATA}; see springtune archive")
+    sums, listed = {}, {}
+    made = {name: _digest(archive, name) for name in dict.fromkeys(names)}
+    if made[METADATA]:
+        listed = _listed(found, archive)
+    if made.get(SUMS):
+        lines = archive.read(SUMS).decode(errors="replace").splitlines()
+        sums = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    else:
+        found.faults[SUMS] = "is damaged" if SUMS in names else "is missing"
+    for name, digest in made.items():
+        told = [given[name] for given in (sums, listed) if name in given]
+        if digest is None or any(one != digest for one in told):
+            found.faults.setdefault(name, "is damaged: its checksum is another one")
+        elif not told and name not in (SUMS, METADATA):
+            found.faults.setdefault(name, "was not packed: it is listed nowhere")
+        found.files += 1
+    for name in (sums.keys() | listed.keys()) - made.keys():
+        found.faults[name] = "is missing"
+    return found
+
+
+def _digest(archive: zipfile.ZipFile, name: str) -> str | None:
+    """SHA-256 of a file; None where it cannot be unpacked."""
+    made = hashlib.sha256()
+    try:
+        with archive.open(name) as file:
+            while part := file.read(UNZIPPED):
+                made.update(part)
+    except (zipfile.BadZipFile, OSError, EOFError, ValueError, RuntimeError, NotImplementedError, zlib.error):
+        return None
+    return made.hexdigest()
+
+
+def _listed(found: Checked, archive: zipfile.ZipFile) -> dict[str, str]:
+    """Checksums in the metadata, by file; and what it tells of the study."""
+    try:
+        graph = {one["@id"]: one for one in json.loads(archive.read(METADATA))["@graph"]}
+        root, workflow = graph["./"], graph[f"{CODE}/Snakefile"]
+        profiles = [one["@id"] for one in _several(root["conformsTo"])]
+        found.title, found.version = root["name"], root["version"]
+        found.config, found.dataset = (
+            unquote(graph[workflow[key]["@id"]]["workExample"]["@id"]) for key in ("input", "output")
+        )
+    except (ValueError, KeyError, TypeError, AttributeError):
+        profiles = []
+    if MADE_BY not in profiles:
+        raise ReproductionError(
+            f"{found.path}: is no archive of a study of springtune, or its {METADATA} is damaged; get it again"
+        )
+    found.study = PurePosixPath(found.dataset).parent.name
+    for name, one in graph.items():
+        if name.startswith("#machine-"):
+            found.machine[str(one.get("name"))] = str(one.get("value"))
+        if one.get("@type") == "PropertyValue" and name.endswith("-s"):
+            found.seconds += float(one.get("value", 0))
+    return {unquote(name): str(one["sha256"]) for name, one in graph.items() if "sha256" in one}
+
+
+def _several(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
+
+
+# -- computed again ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """What came out when an archive was computed again.
+
+    Attributes
+    ----------
+    exact, near : Comparison
+        What differs bit by bit, and beyond the usual tolerance; the archive is before.
+    others : dict of str to tuple of str
+        What the numbers depend on and what is another one: versions, processor. As it was, and as it is.
+    """
+
+    exact: "Comparison"
+    near: "Comparison"
+    others: dict[str, tuple[str, str]]
+
+    @property
+    def same(self) -> bool:
+        """Whether it came out the same: all bits, or all within the tolerance where software or machine differ."""
+        return not self.exact.different or (bool(self.others) and not self.near.different)
+
+
+def own_environment(lock: Path, python: str) -> dict[str, tuple[str, str]]:
+    """What of this program's environment is not what an archive asks for.
+
+    Parameters
+    ----------
+    lock : Path
+        Its lock file.
+    python : str
+        Version that its dataset was made with.
+
+    Returns
+    -------
+    dict of str to tuple of str
+        As it is asked for, and as it is here; empty where this environment will do.
+    """
+    found = environment.departures(lock)
+    here, wanted = (environment.minor(version) for version in (sys.version.split()[0], python))
+    return found | ({"python": (wanted, here)} if wanted != here else {})
+
+
+def reproduce(found: Checked, folder: Path, fresh: bool, say: Callable[[str], None]) -> Reproduced:
+    """Compute the study of an archive again by the program in it, and compare the datasets.
+
+    Parameters
+    ----------
+    found : Checked
+        An archive without faults.
+    folder : Path
+        Empty folder to work in.
+    fresh : bool
+        Whether to set up an environment from the lock file even where this one is the same.
+    say : callable
+        Called with a line on each step.
+
+    Returns
+    -------
+    Reproduced
+
+    Raises
+    ------
+    ReproductionError
+        If the environment cannot be set up or the study cannot be run.
+    """
+    with zipfile.ZipFile(found.path) as archive:
+        _unpack(archive, folder, without=str(PurePosixPath(found.dataset).parent) + "/", but=found.dataset)
+    kept, code = folder / found.dataset, folder / CODE
+    with reading.open(kept) as tree:
+        python = json.loads(tree.attrs["software"])["python"]
+    program = _python(code, python, fresh, say)
+    config = os.path.relpath(folder / found.config, code)
+    target = f"results/{found.study}/{due.DATASET}"
+    say(f"running: snakemake --configfile {config} {target}")
+    around = {name: value for name, value in os.environ.items() if name not in UNWANTED}
+    around |= {"PYTHONPATH": str(code / "src"), "PYTHONNOUSERSITE": "1"}
+    around["PATH"] = os.pathsep.join([str(program.parent), around.get("PATH", os.defpath)])
+    command = [str(program), "-m", "snakemake", target, "--configfile", config]
+    done = subprocess.run(command, cwd=code, env=around, stdout=sys.stderr)
+    if done.returncode or not (code / target).is_file():
+        raise ReproductionError(
+            f"the study could not be run (exit code {done.returncode}); what went wrong stands above"
+        )
+    return _compared(kept, code / target, found.machine)
+
+
+UNWANTED = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "SNAKEMAKE_PROFILE", "SPRINGTUNE_SOLVER")
+"""Of the surroundings of this process, what is not to reach the one that computes."""
+
+
+def _unpack(archive: zipfile.ZipFile, folder: Path, without: str, but: str) -> None:
+    """Unpack files with their leave to run, results apart: these are computed."""
+    for info in archive.infolist():
+        if info.is_dir() or (info.filename.startswith(without) and info.filename != but):
+            continue
+        path = folder / info.filename
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with archive.open(info) as packed, open(path, "wb") as file:
+            shutil.copyfileobj(packed, file, UNZIPPED)
+        if info.external_attr >> 16 & 0o100:
+            path.chmod(0o755)
+
+
+def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) -> Path:
+    """The Python to run a checkout by: this one where it is the same, else that of an environment of its own."""
+    others = own_environment(code / environment.LOCKS[0], python)
+    if not others and not fresh:
+        say("environment: this one, whose packages are those of the archive's lock file")
+        return Path(sys.executable)
+    why = (
+        "as asked"
+        if not others
+        else "since here "
+        + ", ".join(f"{name} is {here}, not {wanted}" for name, (wanted, here) in list(others.items())[:5])
+    )
+    say(f"environment: a new one from the archive's lock file, {why}; this downloads packages")
+    around = {name: value for name, value in os.environ.items() if name not in UNWANTED}
+    done = subprocess.run(["sh", "tools/setup.sh", "run"], cwd=code, env=around, stdout=sys.stderr)
+    if done.returncode:
+        raise ReproductionError(
+            f"the environment could not be set up (exit code {done.returncode}), see above: it needs Python "
+            f"{environment.minor(python)} as python3, and a package registry"
+        )
+    return code / ".venv/bin/python"
+
+
+def _compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
+    from ..output.comparison import Tolerance, compare
+
+    with reading.open(kept) as before, reading.open(made) as after:
+        exact = compare(before, after, Tolerance(0.0, 0.0))
+        near = compare(before, after) if exact.different else exact
+        versions = [json.loads(tree.attrs["software"]) for tree in (before, after)]
+    here = environment.machine()
+    pairs = {name: (versions[0].get(name, "none"), versions[1].get(name, "none")) for name in versions[0] | versions[1]}
+    pairs |= {
+        name: (machine.get(name, "not told"), here.get(name, "not told")) for name in ("architecture", "processor")
+    }
+    return Reproduced(exact, near, {name: pair for name, pair in pairs.items() if pair[0] != pair[1]})
