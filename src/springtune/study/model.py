@@ -184,6 +184,26 @@ class PrintedCell:
 
 
 @dataclass(frozen=True)
+class Part:
+    """Which part of a study a file asks for.
+
+    Attributes
+    ----------
+    number, of : int
+        Which one, from 1 on, of how many.
+    by : str
+        What stays together, of `springtune.study.config.DEALT_BY`.
+    study : str
+        SHA-256 of the text of the whole study.
+    """
+
+    number: int
+    of: int
+    by: str
+    study: str
+
+
+@dataclass(frozen=True)
 class Study:
     """A study, ready to run.
 
@@ -232,6 +252,9 @@ class Study:
         Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
     test_files : tuple of Path
         Of the tests of rubber that materials are fitted to or compared with.
+    part : Part or None
+        Which part of a study this is. Its scenes, curves, meshes, references and `parts` are its own; grids, axes and
+        all else are those of the whole study.
     """
 
     name: str
@@ -257,6 +280,7 @@ class Study:
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()
     test_files: tuple[Path, ...] = ()
+    part: Part | None = None
 
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.
