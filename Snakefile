@@ -33,6 +33,11 @@ rule all:
 release()
 
 
+if "storage" in config:
+
+    include: "workflow/rules/storage.smk"
+
+
 onstart:
     begin()
 

@@ -161,17 +161,42 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
     if missing and not incomplete:
         remedy = "nothing is merged; --incomplete merges what is there, and the study computes the rest"
         raise MergeError("\n".join([*missing, remedy]))
-    names = {scene_key(study, scene): study.name_of(scene) for scene in study.scenes}
-    changes = {place: made for place, paths in sorted(places.items()) if (made := _union(target / place, paths, names))}
     locks.begin([target])
     try:
-        atomic.remove_unfinished(target)
-        for make in changes.values():
-            make()
-        left = _adopted(study, target)
+        written = take_in(study, places, target)
+        left = adopt(study, target, os.cpu_count() or 1)
     finally:
         locks.end()
-    return Merged(target, len(places), len(changes), missing, left)
+    return Merged(target, len(places), written, missing, left)
+
+
+def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path) -> int:
+    """Add stored files to a study's results; nothing is written before all are compared.
+
+    Parameters
+    ----------
+    study : Study
+    places : dict of Path to sequence of Path
+        Files by their name in any folder of results; they are whole.
+    target : Path
+        Where the study's results are.
+
+    Returns
+    -------
+    int
+        Files that were written.
+
+    Raises
+    ------
+    MergeError
+        If results differ that should not.
+    """
+    names = {scene_key(study, scene): study.name_of(scene) for scene in study.scenes}
+    makes = [make for place, paths in sorted(places.items()) if (make := _union(target / place, paths, names))]
+    atomic.remove_unfinished(target)
+    for make in makes:
+        make()
+    return len(makes)
 
 
 def _site(study: "Study", folder: Path) -> Site:
@@ -254,7 +279,8 @@ def _examined(site: Site) -> tuple[list[Path], list[str]]:
                 continue
             file = site.folder / site.place(product)
             if file.is_file() and file.stat().st_size == known[0] and records.checksum(file) == known[2]:
-                found[site.place(product)] = None
+                if is_stored(site.place(product)):
+                    found[site.place(product)] = None
             else:
                 damaged.append(f"{file} is {'damaged' if file.is_file() else 'missing'}")
                 whole = False
@@ -271,6 +297,21 @@ def _examined(site: Site) -> tuple[list[Path], list[str]]:
     if damaged:
         return [*found], [f"{site.folder}: {_listed(damaged, 'files')}, and so are not whole: {what}; {again}"]
     return [*found], [f"{site.folder}: computed in another way than here, or not yet: {what}; {_otherwise(site)}"]
+
+
+def is_stored(place: Path) -> bool:
+    """Whether a job's file holds results by keys; others, such as calibrated stiffnesses, are made of these.
+
+    Parameters
+    ----------
+    place : Path
+        Its name in a folder of results.
+
+    Returns
+    -------
+    bool
+    """
+    return place.suffix == STORED or place.parent.name == MESHES
 
 
 def _otherwise(site: Site) -> str:
@@ -316,8 +357,6 @@ def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Cal
     """
     if target.parent.name == MESHES:
         return _mesh(target, paths)
-    if target.suffix != STORED:
-        return None
     before = store.contents(target) if store.stored(target) else {}
     found, origin = dict(before), dict.fromkeys(before, target)
     for path in paths:
@@ -362,9 +401,23 @@ def _as_text(value: Any) -> Any:
     return (value.dtype.str, value.shape, value.tobytes()) if isinstance(value, np.ndarray) else repr(value)
 
 
-def _adopted(study: "Study", folder: Path) -> int:
-    """Record the jobs of a study whose results are all stored as done; the number of the others."""
-    planned = plan(study, folder, os.cpu_count() or 1)
+def adopt(study: "Study", folder: Path, cores: int) -> int:
+    """Record the jobs of a study whose results are all stored as done.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where its results are.
+    cores : int
+        As of `springtune.campaign.plan.plan`.
+
+    Returns
+    -------
+    int
+        Number of the other jobs.
+    """
+    planned = plan(study, folder, cores)
     planned.write()
     left = 0
     for job in planned.jobs.values():
