@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns test-storage slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -49,8 +49,12 @@ test-versions: $(VENV)/.test
 test-reruns: $(VENV)/.test
 	pytest -n 2 tests/reruns
 
+# Results on object storage: Snakemake's plugin and a server of S3 on this machine, installed apart.
+test-storage: $(VENV)/.test
+	pytest -rs tests/storage
+
 slow: $(VENV)/.test
-	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
+	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions --ignore tests/storage
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 lint: $(VENV)/.test
@@ -85,6 +89,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+	$(LOCK) pyproject.toml requirements/build.in requirements/storage.in --extra s3 --output-file requirements/storage.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.

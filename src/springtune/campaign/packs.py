@@ -80,7 +80,7 @@ def unpack(path: Path, folder: Path) -> list[Path]:
     """
     remedy = "publish it again from where the study was run"
     try:
-        with tarfile.open(path) as archive:
+        with tarfile.open(path, "r:") as archive:
             members = {member.name: member for member in archive.getmembers()}
             files = json.loads(_content(archive, members[CONTENTS]))
             for name, checksum in files.items():

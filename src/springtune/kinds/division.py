@@ -86,7 +86,7 @@ def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, li
         seconds[least] += found[kind, name]
         held[least] += 1
         shares[least].setdefault(kind, []).append(name)
-    return [(one / (total or 1.0), share) for one, share in zip(seconds, shares)]
+    return [(one / (sum(seconds) or 1.0), share) for one, share in zip(seconds, shares)]
 
 
 def part_of(study: "Study") -> "Study":
