@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -64,15 +64,16 @@ build/slurm/.done: requirements/run.txt requirements/slurm.txt requirements/chol
 	-uv pip install --quiet --python build/slurm --only-binary :all: --require-hashes -r requirements/cholesky.txt
 	touch $@
 
-slow: $(VENV)/.test
-	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/slurm --ignore tests/versions
-
 # Archives of studies: valid to a validator of others, which is installed, and reproduced in a new environment.
 test-archive: $(VENV)/.test
 	pytest -rs tests/archive
 
+# Results on object storage: Snakemake's plugin and a server of S3 on this machine, installed apart.
+test-storage: $(VENV)/.test
+	pytest -rs tests/storage
+
 slow: $(VENV)/.test
-	pytest -n 2 -m slow --ignore tests/archive --ignore tests/faults --ignore tests/reruns --ignore tests/versions
+	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
@@ -112,6 +113,7 @@ lock: $(VENV)/.run
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
 	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
+	$(LOCK) pyproject.toml requirements/build.in requirements/storage.in --extra s3 --output-file requirements/storage.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 	$(LOCK) requirements/validator.in --output-file requirements/validator.txt
 

@@ -37,6 +37,10 @@ if not TOLD:
 
     release()
 
+    if "storage" in config:
+
+        include: "workflow/rules/storage.smk"
+
 
     onstart:
         begin()

@@ -76,7 +76,7 @@ def _groups(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     for kind in kinds():
         if study.parts[kind.name]:
             groups |= kind.module("collect").groups(study, folder)
-    for made in outputs().values():
+    for made in () if study.part else outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= import_module(f"springtune.{made.collect}").groups(study, folder)
     return groups

@@ -75,7 +75,7 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
     dict of str to list of Output
     """
     found: dict[str, list[Output]] = {}
-    for one in outputs().values():
+    for one in () if study.part else outputs().values():  # figures and tables are of whole studies
         if one.name in study.outputs and output_files(one, study):
             found.setdefault(f"{PRESENT}_{one.made_by}", []).append(one)
     return found
@@ -100,7 +100,7 @@ def output_files(output: "Output", study: "Study") -> list[str]:
 
 def linked(study: "Study") -> list[str]:
     """Files that the page to browse links to, from the study's folder on."""
-    made = (path for one in outputs().values() if one.name in study.outputs for path in output_files(one, study))
+    made = (path for members in output_jobs(study).values() for one in members for path in output_files(one, study))
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
 

@@ -17,6 +17,8 @@ from ..jobs.guard import LIMITS_TOLD
 from ..jobs.keys import installed
 from ..jobs.spent import Spent
 from ..kinds import kinds, load_study
+from ..kinds.scenes.division import of_scenes
+from ..kinds.shapes.division import of_shape_scenes
 from ..output import reading
 from ..problem.status import Status
 from ..study.model import SceneSpec
@@ -27,9 +29,9 @@ from .summary import SCENES
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..kinds.shapes.expand import Shapes, ShapeScene
+    from ..kinds.shapes.expand import ShapeScene
     from ..output.dataset import Label
-    from ..study.model import CurveSpec, Study
+    from ..study.model import Study
 
 OF_SHAPES = "/shapes"
 """Group of the scenes of shapes."""
@@ -205,44 +207,9 @@ def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str,
 
 def _part(study: "Study", chosen: "set[SceneSpec | ShapeScene]") -> "Study":
     """A study of a few scenes of another one, and of what these need."""
-    beams = [scene for scene in study.scenes if scene in chosen]
-    groups = {
-        (scene.mesh.mesh_type, scene.material, scene.kinematics) for scene in beams if scene.definition == "calibrated"
-    }
-    curves = tuple(
-        curve
-        for curve in study.curves
-        if (curve.mesh.beam.name, curve.load) == study.calibration
-        and (curve.mesh.mesh_type, curve.material, curve.kinematics) in groups
-    )
-    asked: list[SceneSpec | CurveSpec] = [*beams, *curves]
-    bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
-    meshes = {one.mesh for one in asked}
-    return replace(
-        study,
-        scenes=tuple(beams),
-        curves=curves,
-        meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
-        references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
-        further_references=(),
-        printed=(),
-        parts=dict.fromkeys(study.parts, ())
-        | {"scenes": study.parts["scenes"] if beams else (), "shapes": _part_of_shapes(study.parts["shapes"], chosen)},
-    )
-
-
-def _part_of_shapes(part: "Shapes | tuple[()]", chosen: "set[SceneSpec | ShapeScene]") -> "Shapes | tuple[()]":
-    """The same of the shapes of a study; nothing where none of them is chosen."""
-    if not part or not (scenes := tuple(scene for scene in part.scenes if scene in chosen)):
-        return ()
-    cases = {(one.shape, one.material, one.load) for one in scenes}
-    names = {one.shape for one in scenes}
-    return replace(
-        part,
-        shapes=tuple(shape for shape in part.shapes if shape.name in names),
-        scenes=scenes,
-        referred=tuple(case for case in part.referred if case in cases),
-    )
+    found = of_shape_scenes(of_scenes(replace(study, further_references=(), printed=()), chosen), chosen)
+    kept = {name: found.parts[name] for name in ("scenes", "shapes")}
+    return replace(found, parts=dict.fromkeys(study.parts, ()) | kept)
 
 
 def _made(study: "Study", folder: Path) -> "dict[str, xr.Dataset]":

@@ -25,6 +25,7 @@ COMMANDS = {
     "new": Row(STUDIES, "new", "new", "Write a small study to begin with."),
     "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
+    "split": Row(STUDIES, "split", "split", "Write the parts of a study for several sites."),
     "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
     "springs": Row(STUDIES, "springs", "springs", "Write the springs of one mesh for another program."),
@@ -33,6 +34,7 @@ COMMANDS = {
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
     "accept": Row(RESULTS, "accept", "accept", "Keep values and curves as right, or say what departs from them."),
     "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
+    "merge": Row(RESULTS, "merge", "merge", "Put the results of a study's parts together."),
     "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
     "archive": Row(
         RESULTS, "archive", "archive", "Pack a finished study into one file, to be cited and computed again."

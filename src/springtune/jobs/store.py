@@ -133,6 +133,31 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
     return results
 
 
+def contents(path: str | Path) -> dict[str, dict[str, Any]]:
+    """All results in a file, as `add` takes them: scalars, texts and all arrays.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict of str to dict
+        Results by key; those that were lost to limits say so.
+
+    Raises
+    ------
+    DamagedError
+        If the file is not there or is not what was written.
+    """
+    _checked(path)
+    with h5py.File(path) as file:
+        found = _scalars(file)
+        for name, result in found.items():
+            result |= {label: array[()] for label, array in file[name].items()} if name in file else {}
+    return found
+
+
 def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[str, Any]:
     """Read a result that has a file to itself, named by its key.
 

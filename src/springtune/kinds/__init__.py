@@ -68,4 +68,9 @@ def load_study(path: str | Path, beside: Path | None = None) -> "Study":
     """
     from ..study import load
 
-    return load(path, kinds(), beside)
+    study = load(path, kinds(), beside)
+    if study.part is None:
+        return study
+    from .division import part_of  # here: few studies are parts
+
+    return part_of(study)

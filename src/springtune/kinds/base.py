@@ -153,6 +153,10 @@ class Kind:
         Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
     costs : dict of str to tuple
         Seconds of a task by its name in records, in any case and per unit, before any was measured.
+    division : str
+        Module of its package with ``pieces(study, costs, division)``, seconds of each piece that a part of a study may
+        have of it, by name, and ``take(study, names)``, the study with these pieces alone; see
+        `springtune.kinds.division`. A kind without is in one part as a whole.
     """
 
     name: str
@@ -169,6 +173,7 @@ class Kind:
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
+    division: str = ""
 
     def module(self, name: str) -> ModuleType:
         """A module of its package."""

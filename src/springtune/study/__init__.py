@@ -15,6 +15,7 @@ from .config import StudyConfig, expected_value, json_schema, sections, study_mo
 from .expand import Declared, build, expand, files_of_meshes, files_of_tests
 from .messages import Key, Problems, StudyError, show
 from .model import CurveSpec, MeshSpec, Reference, SceneSpec, Study, StudyKind
+from .partial import declared_part
 from .rows import with_rows
 from .yaml_lines import read_study
 
@@ -78,8 +79,8 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
     problems.stop()
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    about["test_files"] = test_files
     about["row_files"] = tuple(beside / grid.rows for grid in config.grids.values() if grid.rows)
+    about |= {"test_files": test_files, "part": declared_part(config, text, problems)}
     return build(config, grids, kinds, problems, about)
 
 

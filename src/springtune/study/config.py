@@ -46,10 +46,14 @@ from .fields import (
     Stresses,
     Terms,
     Text,
+    number,
     one_of,
 )
 from .messages import refuse, show
 from .model import StudyKind, StudyOutput
+
+MOST_PARTS = 1000
+"""Most parts that a study is split into."""
 
 PLAUSIBLE = 20.0
 """A stated stiffness farther than this factor from sqrt(3)/2 E t is taken for an error of units."""
@@ -443,6 +447,35 @@ class GridConfig(Section):
     )
 
 
+DEALT_BY = ("mesh", "grid")
+"""What stays together where a study is split."""
+
+
+PartNumber = Annotated[int, number("a whole number from 1, such as 2", 1, MOST_PARTS, whole=True)]
+PartCount = Annotated[int, number("a whole number from 2, such as 3", 2, MOST_PARTS, whole=True)]
+DealtBy = Annotated[str, one_of("way to split", DEALT_BY)]
+
+
+class PartConfig(Section):
+    """Which part of a study this file asks for; `springtune split` writes it, and nobody by hand."""
+
+    number: PartNumber = Field(description="Which one of the parts.")
+    of: PartCount = Field(description="Number of parts.")
+    by: DealtBy = Field(
+        "mesh",
+        validate_default=True,
+        description="What stays together: the scenes of a `mesh`, but of one that alone is more than a part, or those "
+        "of a `grid`.",
+    )
+    study: Text = Field(description="SHA-256 of the whole study: of what stands above this section's comment.")
+
+    @model_validator(mode="after")
+    def _among_them(self) -> Self:
+        if self.number > self.of:
+            raise refuse(f"{self.number} is more than the {self.of} parts; give a number from 1 to {self.of}", "number")
+        return self
+
+
 class StudyConfig(Section):
     """A study."""
 
@@ -471,6 +504,9 @@ class StudyConfig(Section):
         None, description="CSV file of printed values to compare with, its path relative to the study's folder."
     )
     grids: dict[str, GridConfig] = Field({})
+    part: PartConfig | None = Field(
+        None, description="Which part of the study above is asked for; as `springtune split` writes it."
+    )
 
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}
     """Keys of study kinds in the place of which a study may have neither beams nor grids, and what goes with each."""

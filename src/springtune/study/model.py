@@ -185,6 +185,26 @@ class PrintedCell:
 
 
 @dataclass(frozen=True)
+class Part:
+    """Which part of a study a file asks for.
+
+    Attributes
+    ----------
+    number, of : int
+        Which one, from 1 on, of how many.
+    by : str
+        What stays together, of `springtune.study.config.DEALT_BY`.
+    study : str
+        SHA-256 of the text of the whole study.
+    """
+
+    number: int
+    of: int
+    by: str
+    study: str
+
+
+@dataclass(frozen=True)
 class Study:
     """A study, ready to run.
 
@@ -235,6 +255,9 @@ class Study:
         Of the tests of rubber that materials are fitted to or compared with.
     row_files : tuple of Path
         Of rows of parameters that grids name.
+    part : Part or None
+        Which part of a study this is. Its scenes, curves, meshes, references and `parts` are its own; grids, axes and
+        all else are those of the whole study.
     """
 
     name: str
@@ -261,6 +284,7 @@ class Study:
     swept: tuple[str, ...] = ()
     test_files: tuple[Path, ...] = ()
     row_files: tuple[Path, ...] = ()
+    part: Part | None = None
 
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.

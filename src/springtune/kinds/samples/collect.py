@@ -28,6 +28,8 @@ MOST_BINS, BIN_POINTS = 16, 16
 def groups(study, folder):
     """Groups of a dataset, see `springtune.kinds.scenes.collect.groups`."""
     sample = study.parts["samples"]
+    if sample.blocks:  # indices and effects are of all rows
+        return {}
     drawn, results = _stored(sample, folder / "samples")
     axes = study.axes | {"sample": tuple(range(sample.rows))}
     data = SAMPLES.empty(axes)

@@ -139,6 +139,8 @@ class Sample:
     best_stiffness : bool
     parameters : dict of str to dict
         Distributions in the order of `PARAMETERS`, see `springtune.kinds.samples.designs.quantile`.
+    blocks : tuple of tuple of int
+        First base sample, and that after the last, of each task that a part of a study asks for; none where it is all.
     """
 
     design: str
@@ -151,6 +153,7 @@ class Sample:
     best_stiffness: bool
     failures: str
     parameters: dict[str, dict[str, Any]]
+    blocks: tuple[tuple[int, int], ...] = ()
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -297,6 +300,7 @@ KIND = Kind(
     summary=_summary,
     stages=STAGES,
     outputs=OUTPUTS,
+    division="division",
     tables=lambda study: ["sobol"] if _has_indices(study) else [],
     costs={"sampled": (0.05, 6e-4)},
 )

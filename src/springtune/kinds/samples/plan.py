@@ -87,11 +87,21 @@ def _members(study, costs):
     sample = study.parts["samples"]
     if not sample:
         return {}
-    each = rows_each(sample.design, len(sample.varied)) * len(sample.loads) * len(definitions(sample))
     return {
-        f"{first}-{last}": (costs.of("sampled", (last - first) * each), (first, last))
-        for first, last in blocks(sample.design, sample.size)
+        f"{first}-{last}": (seconds_of(sample, (first, last), costs), (first, last))
+        for first, last in drawn_blocks(sample)
     }
+
+
+def drawn_blocks(sample):
+    """First and last base sample of each task: of the whole sample, or of the part that a study asks for."""
+    return sample.blocks or blocks(sample.design, sample.size)
+
+
+def seconds_of(sample, ends, costs):
+    """What the task of some base samples is expected to take."""
+    each = rows_each(sample.design, len(sample.varied)) * len(sample.loads) * len(definitions(sample))
+    return costs.of("sampled", (ends[1] - ends[0]) * each)
 
 
 def _content(study, folder, members):

@@ -68,7 +68,8 @@ def groups(study, folder):
     _meshes(study, folder, root)
     displacements, objections = _references(study, folder, root)
     block = _block(study, folder, axes) if pressed(study) else None
-    fields = _fields(study, folder, axes) if keeps_fields(study) else None
+    kept = keeps_fields(study) and not plan.shown_scenes(study).isdisjoint(study.scenes)  # a part may show none
+    fields = _fields(study, folder, axes) if kept else None
     _scenes(study, folder, root, block, fields, objections)
     _bodies(study, root)
     _printed(study, root)

@@ -12,6 +12,7 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
+    division="division",
     costs={
         "mesh": (4e-3, 2.5e-5),
         "linear": (5e-4, 1e-6),

@@ -4,7 +4,7 @@ import hashlib
 from collections import defaultdict
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...jobs.hashing import hash_of
 from ...jobs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
@@ -16,6 +16,9 @@ from .interpolated import expected_solves, interpolants
 from .remembered import once_a_study
 from .shown import shown
 from .stored_scene import calibrated_key
+
+if TYPE_CHECKING:
+    from ...study.model import SceneSpec, Study
 
 INTERPOLANT = "interpolant"
 """What stands in the place of a kind at finite strain."""
@@ -126,7 +129,7 @@ def curve_key(study, curve):
     return hash_of(parameters, stage_key("kinds.scenes.sensitivity"))
 
 
-def scene_key(study, scene):
+def scene_key(study: "Study", scene: "SceneSpec") -> str:
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
     return _scene_key(study, scene, _common(study, scene)["key"])
 
@@ -196,10 +199,10 @@ def _common(study, scene):
     return known[place]
 
 
-@once_a_study("scenes")
+@once_a_study("grids")
 def shown_scenes(study):
-    """Scenes whose whole fields are kept, whether or not they are drawn."""
-    return shown(study.scenes, study.swept)
+    """Scenes whose whole fields are kept, whether or not they are drawn: of a part those of the whole study."""
+    return shown({scene for grid in study.grids for scene in grid.scenes}, study.swept)
 
 
 def solved_keys(study, mesh, calibration):
@@ -365,8 +368,9 @@ def _solve(study, folder, members):
         {"name": stem(mesh), "thickness": mesh.beam.thickness, "scenes": _scenes(study, mesh)}
         for meshes in members
         for mesh in meshes
+        if mesh in scenes  # as above; a part of a study may have curves alone
     ]
-    return {
+    return families and {
         "calibration": str(calibration_path(folder)) if calibrated(study) else None,
         "folder": str(folder / "solutions"),
         "meshes": str(folder / "meshes"),

@@ -40,6 +40,8 @@ def summary(study: Study, further: list[list[object]]) -> str:
     users = len(study.scenes) + len(study.curves)
     repeated = requested - len(study.scenes)
     again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
+    if study.part:
+        again = f"part {study.part.number} of {study.part.of} of the study"
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", meshes, f"each serves {users / meshes:.3g} scenes and curves on average"],
@@ -101,12 +103,16 @@ def _contributions(study: Study) -> list[list[object]]:
     """Rows of what each grid asks for; new scenes are those that no grid above asks for."""
     rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()
+    own, traced = set(study.scenes), set(study.curves)  # of a part, some
     for grid in study.grids:
-        meshes = {scene.mesh for scene in grid.scenes}
-        references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in grid.scenes}
-        new = set(grid.scenes) - seen
+        scenes = [scene for scene in grid.scenes if scene in own]
+        meshes = {scene.mesh for scene in scenes}
+        references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
+        new = set(scenes) - seen
         seen |= new
-        rows.append([grid.name, len(grid.scenes), len(new), len(meshes), len(references), len(grid.curves)])
+        curves = traced.intersection(grid.curves)
+        if scenes or curves or not study.part:
+            rows.append([grid.name, len(scenes), len(new), len(meshes), len(references), len(curves)])
     extra = set(study.curves) - {curve for grid in study.grids for curve in grid.curves}
     if extra:
         rows.append(["(calibration)", "", "", "", "", len(extra)])

@@ -1,0 +1,99 @@
+"""Results on object storage: `publish` runs a study and uploads it, `fetch` adds what is there to what is here.
+
+What stages store is no output that Snakemake knows of, so a stage is one pack; storage is Snakemake's plugin's.
+"""
+
+from importlib.util import find_spec
+
+from springtune.campaign.packs import ENDING
+
+PLUGIN = "snakemake_storage_plugin_s3"
+STORAGE = str(config["storage"]).rstrip("/")
+
+
+def stop(why):
+    """Stop: the message says it all."""
+    print(why, file=sys.stderr)
+    sys.exit(1)
+
+
+if not re.fullmatch(r"s3://[^/{}]+(/[^{}]+)?", STORAGE):
+    stop(f"storage: '{STORAGE}' is no place for results; give one such as s3://bucket/folder")
+if find_spec(PLUGIN) is None:
+    stop("storage: Snakemake's plugin for s3:// is not installed; install the extra: pip install 'springtune[s3]'")
+
+
+def stored(name):
+    """An object of this study in the storage."""
+    return storage.s3(f"{STORAGE}/{STUDY.name}/{name}")
+
+
+PACKED = [stage.name for stage in stages() if done(stage.name)]
+SHOWN_FILES = [file for job in JOBS.values() if job.reads or job.name == due.COLLECT for file in job.products]
+
+
+if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets are not known yet
+
+    def packs_there(wildcards):
+        """Packs of this study that the storage has."""
+        packs = [stored(f"{name}{ENDING}") for name in PACKED]
+        try:
+            # Not Snakemake's exists(): it cannot be called while the graph is built.
+            there = [one for one in packs if one.flags["storage_object"].exists()]
+        except Exception as error:
+            stop(f"{STORAGE}: {error}; correct access key, secret key or endpoint, or see whether the storage is there")
+        if not there:
+            stop(f"{STORAGE}/{STUDY.name} holds no results of this study; correct the place, or publish first")
+        return there
+
+    rule fetch:
+        message:
+            f"Adding the results on {STORAGE}/{STUDY.name}"
+        input:
+            packs_there,
+        params:
+            config=str(CONFIG),
+        shell:
+            "python -m springtune.campaign.packs fetch {params.config} {input}"
+
+else:
+
+    rule publish:
+        message:
+            f"{STORAGE}/{STUDY.name} has all results of {STUDY.name}"
+        input:
+            rules.all.input,
+            [stored(f"{name}{ENDING}") for name in PACKED],
+            [stored(Path(file).relative_to(RESULTS)) for file in SHOWN_FILES],
+
+
+    for stage in PACKED:
+
+        rule:
+            name:
+                f"pack_{stage}"
+            message:
+                f"Packing what {stage} stored"
+            input:
+                done(stage),
+            output:
+                stored(f"{stage}{ENDING}"),
+            params:
+                folder=str(RESULTS),
+            log:
+                RESULTS / f"logs/pack_{stage}.log",
+            shell:
+                "python -m springtune.campaign.packs pack {params.folder} {output} {input} > {log} 2>&1"
+
+
+    rule upload:
+        message:
+            "Uploading dataset, page, tables and figures"
+        input:
+            SHOWN_FILES,
+        output:
+            [stored(Path(file).relative_to(RESULTS)) for file in SHOWN_FILES],
+        log:
+            RESULTS / "logs/upload.log",
+        shell:
+            "python -m springtune.campaign.packs copy {output} {input} > {log} 2>&1"
