@@ -13,11 +13,12 @@ particle are summed in the order of the springs, whatever the parts, so that the
 threads; a spring between two parts is computed by both.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import config, njit, types
 from numba.extending import intrinsic
 
 PATIENCE = 1000
@@ -33,6 +34,18 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
         return njit(cache=True, error_model="numpy", nogil=True)(function)
     except RuntimeError:  # no folder to keep it in
         return njit(error_model="numpy", nogil=True)(function)
+
+
+@contextmanager
+def packed() -> Iterator[None]:
+    """Context in which what numba compiles computes both coordinates at once, in less time, with the same digits."""
+    options: Any = config
+    before = options.SLP_VECTORIZE
+    options.SLP_VECTORIZE = 1
+    try:
+        yield
+    finally:
+        options.SLP_VECTORIZE = before
 
 
 _yield = types.ExternalFunction("sched_yield", types.int32())

@@ -186,6 +186,11 @@ class ExplicitSteps(Stepper):
             np.repeat(np.asarray(self._as(values), dtype=self.kind)[None], count, axis=0)
             for values, count in zip((u, v), self._states)
         )
+        if self._function is not None:
+            from .kernels import packed
+
+            with packed():  # it is compiled
+                self._calls(0)[0][0]()
 
     def _acceleration(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         motion = self.motion
@@ -197,11 +202,7 @@ class ExplicitSteps(Stepper):
         if self._function is None:
             self._advance_energies(steps)
             return
-        from .kernels import ROW
-
-        progress = np.zeros((len(self._parts) + 1, ROW), dtype=np.int64)
-        rest = *self._numbers, self._u, self._v, steps, progress
-        calls = [partial(self._function, number, *part, *rest) for number, part in enumerate(self._parts)]
+        calls, progress = self._calls(steps)
         begun: list[Future[None]] = []
 
         def take(call: Callable[[], None]) -> None:
@@ -224,6 +225,16 @@ class ExplicitSteps(Stepper):
                 one.result()
         for values in (self._u, self._v):
             values[0] = values[steps % len(values)]
+
+    def _calls(self, steps: int) -> tuple[list[Callable[[], None]], np.ndarray]:
+        """Steps of each part, and the progress by which parts wait for each other."""
+        from .kernels import ROW
+
+        progress = np.zeros((len(self._parts) + 1, ROW), dtype=np.int64)
+        rest = *self._numbers, self._u, self._v, steps, progress
+        function = self._function
+        assert function is not None
+        return [partial(function, number, *part, *rest) for number, part in enumerate(self._parts)], progress
 
     @cached_property
     def _threads(self) -> ThreadPoolExecutor:
