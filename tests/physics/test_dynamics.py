@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from springtune.mechanics import stepping
 from springtune.mechanics.arc_length import buckling_load
 from springtune.mechanics.dynamics import Motion, centre, masses, rayleigh, relax
 from springtune.mechanics.integrators import EXPLICIT, INTEGRATORS, BackwardEuler
@@ -397,6 +398,103 @@ def test_single_precision_keeps_six_digits():
     double = motion.run("central-difference", step, 3000).displacements
     single = motion.run("central-difference", step, 3000, precision="float32").displacements
     assert 0 < np.abs(single - double).max() <= 1e-4 * np.abs(double).max()
+
+
+def chain(count, **options):
+    """Particles on a line between two held ones, on springs of 1 and with masses of 1: the strip beside it is held."""
+    x = np.arange(count + 1.0)
+    points = np.concatenate([np.stack([x, 0 * x], 1), np.stack([x, 0 * x + 1], 1)])
+    i = np.arange(count)
+    cells = np.concatenate([np.stack([i, i + 1, i + count + 2], 1), np.stack([i, i + count + 2, i + count + 1], 1)])
+    directions = np.ones(points.shape, dtype=bool)
+    directions[1:count, 0] = False
+    mesh = Mesh(points, cells)
+    stiffness = (mesh.edges[:, 1] == mesh.edges[:, 0] + 1) & (mesh.edges[:, 1] <= count)
+    return Motion(Network(mesh, directions, stiffness.astype(float)), np.ones(len(points)), **options)
+
+
+@pytest.mark.parametrize("linear", [True, False])
+@pytest.mark.parametrize(("precision", "error"), [("float64", 1e-9), ("float32", 1e-4)])
+def test_a_standing_wave_on_a_chain_has_its_closed_form(linear, precision, error):
+    """Central differences swing as ``cos(m theta)``, ``sin(theta / 2) = h omega / 2``, to rounding.
+
+    Springs are of small strain, 1e-7, whose squares are within the error, and of which single precision loses no digit
+    since displacements, not positions, are kept.
+    """
+    count, mode, step, steps = 60, 3, 0.5, 2000
+    shape = np.zeros((2 * (count + 1), 2))
+    shape[: count + 1, 0] = 1e-7 * np.sin(np.pi * mode * np.arange(count + 1) / count)
+    omega = 2 * np.sin(np.pi * mode / (2 * count))
+    swing = np.cos(2 * steps * np.arcsin(0.5 * step * omega))
+    found = chain(count, linear=linear).run("central-difference", step, steps, shape, precision=precision)
+    # The longitudinal waves of springs that keep their length law are linear: the line stays one.
+    assert np.abs(found.displacements - swing * shape).max() <= error * 1e-7
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("linear", [False, True])
+def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, precision, monkeypatch):
+    monkeypatch.setattr(stepping, "FEWEST", 20)
+    motion = beam(mesh_type="free", linear=linear, mass_damping=20.0)
+    if damped:
+        motion = with_(motion, dampers=1e-7 * motion.network.stiffness)
+    step = 0.5 * motion.step_limit("symplectic-euler")
+    runs = [
+        motion.run("central-difference", step, 101, sample=33, precision=precision, threads=count)
+        for count in (1, 2, 3, 50)
+    ]
+    for run in runs[1:]:
+        assert (run.displacements == runs[0].displacements).all() and (run.velocities == runs[0].velocities).all()
+        assert (run.samples == runs[0].samples).all()
+    assert np.abs(runs[0].displacements).max() > 0
+
+
+def test_parts_of_a_network_have_all_of_it_once():
+    pointers = beam(mesh_type="free", size=1e-3).stiffness_matrix.indptr
+    for threads in (1, 2, 7):
+        parts = stepping._parts(pointers, threads)
+        assert len(parts) == threads and parts[0][0] == 0 and parts[-1][1] == len(pointers) - 1
+        assert all(one[1] == other[0] and one[0] < one[1] for one, other in zip(parts, parts[1:]))
+    assert stepping._parts(pointers, 10**6)[0][1] > 1  # not more than have enough to do
+
+
+@pytest.mark.parametrize("broken", [0, 1])
+def test_a_part_that_fails_ends_the_others(broken, monkeypatch):
+    monkeypatch.setattr(stepping, "FEWEST", 20)
+    motion = beam()
+    stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
+    stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
+    taken = stepper._function
+
+    def function(part, *arguments):
+        if part == broken:
+            raise MemoryError("no room")
+        taken(part, *arguments)
+
+    stepper._function = function
+    with pytest.raises(MemoryError, match="no room"):
+        stepper.advance(10)
+    stepper.close()
+
+
+@pytest.mark.parametrize(
+    ("integrator", "options", "message"),
+    [
+        ("central-difference", {"threads": 0}, "threads: 0 is not a whole number above zero"),
+        ("central-difference", {"precision": "float16"}, "unknown precision 'float16'; known: float64, float32"),
+        ("implicit-midpoint", {"threads": 2}, "'implicit-midpoint' takes its steps in double precision and one thread"),
+        ("backward-euler", {"precision": "float32"}, "'backward-euler' takes its steps in double precision"),
+    ],
+)
+def test_what_a_scheme_has_not_is_refused(integrator, options, message):
+    with pytest.raises(ValueError, match=message):
+        beam().run(integrator, 1e-9, 1, **options)
+
+
+def test_networks_with_energies_move_in_one_thread():
+    with pytest.raises(ValueError, match="a network with energies moves in one; give 1"):
+        beam("delingette").run("central-difference", 1e-9, 1, threads=2)
 
 
 class Counted(Network):

@@ -14,6 +14,7 @@ pivots are counted.
 """
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,7 +24,7 @@ from scipy.sparse.linalg import eigsh
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
-from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, BackwardEuler
+from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
 from .stepping import make_stepper
@@ -350,6 +351,7 @@ class Motion:
         sample: int = 0,
         watch: Callable[[float, np.ndarray, np.ndarray], None] | None = None,
         precision: str = "float64",
+        threads: int = 1,
     ) -> Run:
         """Move for a number of steps, or until rest.
 
@@ -373,6 +375,8 @@ class Motion:
             Told time [s], displacements [m] and velocities [m/s], shape (n_points, 2), with every sample.
         precision : str, optional
             ``"float64"`` or ``"float32"``, of explicit schemes.
+        threads : int, optional
+            At most so many, of explicit schemes; networks with energies move in one. The numbers are the same for any.
 
         Returns
         -------
@@ -381,36 +385,44 @@ class Motion:
         Raises
         ------
         ValueError
-            If there is no such integrator, or the step is not above zero.
+            If there is no such integrator or precision, the step is not above zero, or the scheme or the network has no
+            steps in single precision or in threads.
         """
         name = "backward-euler" if isinstance(integrator, BackwardEuler) else integrator
         if name not in INTEGRATORS:
             raise ValueError(f"unknown integrator '{name}'; known: {', '.join(INTEGRATORS)}")
         if not (step > 0 and np.isfinite(step)):
             raise ValueError(f"a step of {step} s; give one above zero")
-        stepper = make_stepper(self, integrator, step, precision)
+        if precision not in PRECISIONS:
+            raise ValueError(f"unknown precision '{precision}'; known: {', '.join(PRECISIONS)}")
+        if not (isinstance(threads, int) and threads >= 1):
+            raise ValueError(f"threads: {threads!r} is not a whole number above zero; give the number of cores to use")
+        if name in IMPLICIT and (precision, threads) != ("float64", 1):
+            raise ValueError(f"'{name}' takes its steps in double precision and one thread; give neither")
+        stepper = make_stepper(self, integrator, step, precision, threads)
         stepper.begin(*self._beginning(start, velocities))
         pace = sample or (CHECK if name in EXPLICIT else 1)
         samples: list[list[float]] = []
         done = 0
-        while True:
-            u, v = stepper.state()
-            end = self._end(stepper.failed, u, v, name, step, done)
-            if end is not None:
-                break
-            if sample:
-                samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
-                if watch is not None:
-                    watch(done * step, u, v)
-            if rest is not None and done and self._at_rest(u, v, rest):
-                end = self._rest_end(u, name, done)
-                break
-            if done >= steps:
-                end = self._moving_end(u, rest, steps)
-                break
-            count = min(pace, steps - done)
-            stepper.advance(count)
-            done += count
+        with closing(stepper):
+            while True:
+                u, v = stepper.state()
+                end = self._end(stepper.failed, u, v, name, step, done)
+                if end is not None:
+                    break
+                if sample:
+                    samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
+                    if watch is not None:
+                        watch(done * step, u, v)
+                if rest is not None and done and self._at_rest(u, v, rest):
+                    end = self._rest_end(u, name, done)
+                    break
+                if done >= steps:
+                    end = self._moving_end(u, rest, steps)
+                    break
+                count = min(pace, steps - done)
+                stepper.advance(count)
+                done += count
         sampled = np.array(samples).reshape(-1, 4)
         return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), sampled)
 

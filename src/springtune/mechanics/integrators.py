@@ -15,6 +15,9 @@ INTEGRATORS = (*EXPLICIT, *IMPLICIT)
 LAGGED = ("symplectic-euler", "central-difference-lagged")
 """Schemes in which all damping lags, and narrows the step."""
 
+PRECISIONS = ("float64", "float32")
+"""Floating-point numbers that explicit schemes compute in."""
+
 BEHAVIOURS = ("stable", "decaying", "growing", "nan")
 """Meanings of the flags of ``behaviour``: what a run makes of noise."""
 

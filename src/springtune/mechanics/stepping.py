@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Protocol
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
@@ -13,6 +16,9 @@ from scipy.sparse.linalg import cg
 from ..linalg.factors import Factor, factorize
 from .integrators import EXPLICIT, LAGGED, BackwardEuler
 from .network import Network
+
+FEWEST = 5000
+"""Springs, or entries of a matrix, of a part: with fewer, threads cost more than they save."""
 
 
 class Moving(Protocol):
@@ -44,7 +50,9 @@ class Moving(Protocol):
         """Load less resistance [m], shape (unknowns,)."""
 
 
-def make_stepper(motion: Moving, integrator: str | BackwardEuler, step: float, precision: str = "float64") -> Stepper:
+def make_stepper(
+    motion: Moving, integrator: str | BackwardEuler, step: float, precision: str = "float64", threads: int = 1
+) -> Stepper:
     """State of a run of one integrator.
 
     Parameters
@@ -56,13 +64,15 @@ def make_stepper(motion: Moving, integrator: str | BackwardEuler, step: float, p
         [s]
     precision : str, optional
         ``"float64"`` or ``"float32"``, of explicit schemes.
+    threads : int, optional
+        At most so many, of explicit schemes.
 
     Returns
     -------
     Stepper
     """
     if integrator in EXPLICIT:
-        return ExplicitSteps(motion, integrator, step, precision)
+        return ExplicitSteps(motion, integrator, step, precision, threads)
     if integrator == "implicit-midpoint":
         return MidpointSteps(motion, step)
     return BackwardEulerSteps(motion, step, integrator if isinstance(integrator, BackwardEuler) else BackwardEuler())
@@ -91,6 +101,9 @@ class Stepper(ABC):
     def advance(self, steps: int) -> None:
         """Take a number of steps."""
 
+    def close(self) -> None:  # noqa: B027  most have nothing to do
+        """End what was begun for the run, threads."""
+
 
 class ExplicitSteps(Stepper):
     """Compiled steps, of springs that keep their length law or of a linear network; others are taken in numpy.
@@ -98,53 +111,86 @@ class ExplicitSteps(Stepper):
     Parameters are those of `make_stepper`.
     """
 
-    def __init__(self, motion: Moving, integrator: str, step: float, precision: str) -> None:
+    def __init__(self, motion: Moving, integrator: str, step: float, precision: str, threads: int) -> None:
         self.motion, self.step = motion, step
         self.half = integrator != "symplectic-euler"
         self.kind = np.dtype(precision).type
         network = motion.network
         with np.errstate(divide="ignore"):
-            inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
+            self.inverse = np.where(network.held, 0.0, 1.0 / motion.inertia)
         half = 0.5 * motion.mass_damping * step
         if integrator in LAGGED:
-            keep, gain = np.full(inverse.shape, 1 - 2 * half), step * inverse
+            keep, gain = 1 - 2 * half, step * self.inverse
         else:
-            keep, gain = np.full(inverse.shape, (1 - half) / (1 + half)), step * inverse / (1 + half)
-        self.inverse = inverse
-        dampers = np.zeros(0) if motion.dampers is None else motion.dampers
-        self._function: Callable[..., None]
+            keep, gain = (1 - half) / (1 + half), step * self.inverse / (1 + half)
         self._as: Callable[..., np.ndarray]
         self._back: Callable[..., np.ndarray]
-        self._index: tuple[np.ndarray, ...]
+        self._as = self._back = np.array
+        self._numbers = self.kind(keep), self.kind(step)
+        self._function: Callable[..., None] | None = None
         if motion.linear:
-            from .kernels import advance_matrix
-
-            self._function = advance_matrix
-            matrix = motion.stiffness_matrix  # symmetric: its columns are its rows
-            damping = np.zeros(0) if motion.damper_matrix is None else motion.damper_matrix.data
-            self._as = network.reduce
-            self._back = network.expand
-            self._index = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
-            arrays = (matrix.data, damping, *map(network.reduce, (keep, gain, motion.load)))
+            self._of_matrix(motion.stiffness_matrix, gain, threads)
         elif network.energies:
-            self._function, self._index, arrays = self._advance_energies, (), (keep, gain, motion.load)
-            self._as = self._back = np.array
+            if threads > 1:
+                raise ValueError(f"threads: {threads}, and a network with energies moves in one; give 1")
+            self._states = 1, 1
+            self._keep, self._gain = self._numbers[0], np.asarray(gain, dtype=self.kind)
         else:
-            from .kernels import advance_springs
+            self._of_springs(gain, threads)
 
-            self._function = advance_springs
-            self._as = self._back = np.array
-            self._index = (network.first.astype(np.int32), network.second.astype(np.int32))
-            arrays = (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, keep, gain, motion.load)
-        self._arrays = [np.ascontiguousarray(part, dtype=self.kind) for part in arrays]
+    def _of_springs(self, gain: np.ndarray, threads: int) -> None:
+        """Prepare steps of springs that keep their length law."""
+        from .kernels import advance_springs
+
+        motion, network = self.motion, self.motion.network
+        first, second = network.first, network.second
+        dampers = np.zeros(0) if motion.dampers is None else motion.dampers
+        numbers = [
+            np.ascontiguousarray(values, dtype=self.kind)
+            for values in (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, gain, motion.load)
+        ]
+        of_springs, of_points = numbers[:4], [*numbers[4:], np.empty(gain.shape, dtype=self.kind)]
+        self._function = advance_springs
+        self._parts: list[tuple[Any, ...]] = []
+        pointers = np.searchsorted(first, np.arange(len(gain) + 1))
+        for begin, end in _parts(pointers, threads):
+            crossing = np.flatnonzero((first < begin) & (second >= begin) & (second < end))
+            ghosts, starts = np.unique(first[crossing], return_index=True)
+            springs = np.r_[crossing, pointers[begin] : pointers[end]]
+            rows = np.r_[starts, len(crossing) + pointers[begin : end + 1] - pointers[begin]]
+            index = [values.astype(np.uint32) for values in (ghosts, rows, second[springs])]
+            own = [values[springs] if len(values) else values for values in of_springs]
+            self._parts.append((begin, end, *index, *own, *of_points))
+        several = len(self._parts) > 1
+        self._states = 1 + several, 1 + (several and len(dampers) > 0)
+
+    def _of_matrix(self, matrix: csc_array, gain: np.ndarray, threads: int) -> None:
+        """Prepare steps of a linear network; the matrix is symmetric, so its columns are its rows."""
+        from .kernels import advance_matrix
+
+        motion, network = self.motion, self.motion.network
+        damping = np.zeros(0) if motion.damper_matrix is None else motion.damper_matrix.data
+        index = matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32)
+        numbers = matrix.data, damping, network.reduce(gain), network.reduce(motion.load)
+        arrays = *index, *(np.ascontiguousarray(values, dtype=self.kind) for values in numbers)
+        self._function = advance_matrix
+        self._parts = [(*part, *arrays) for part in _parts(matrix.indptr, threads)]
+        self._as, self._back = network.reduce, network.expand
+        self._states = 2, 1 + (len(damping) > 0)
 
     def begin(self, u: np.ndarray, v: np.ndarray) -> None:
         """See `Stepper`."""
         if self.half:  # the velocity half a step before the start
             v = v - 0.5 * self.step * self._acceleration(u, v)
-        self.u = np.ascontiguousarray(self._as(u), dtype=self.kind)
-        self.v = np.ascontiguousarray(self._as(v), dtype=self.kind)
-        self.force = np.zeros_like(self.u)
+        self._u, self._v = (
+            np.repeat(np.asarray(self._as(values), dtype=self.kind)[None], count, axis=0)
+            for values, count in zip((u, v), self._states)
+        )
+        if self._function is not None:
+            from .kernels import packed
+
+            with packed():  # it is compiled
+                self._calls(0)[0][0]()
 
     def _acceleration(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         motion = self.motion
@@ -153,36 +199,89 @@ class ExplicitSteps(Stepper):
 
     def advance(self, steps: int) -> None:
         """See `Stepper`."""
-        self._function(*self._index, *self._arrays, self.u, self.v, self.force, self.kind(self.step), steps)
+        if self._function is None:
+            self._advance_energies(steps)
+            return
+        calls, progress = self._calls(steps)
+        begun: list[Future[None]] = []
 
-    def _advance_energies(
-        self,
-        keep: np.ndarray,
-        gain: np.ndarray,
-        load: np.ndarray,
-        u: np.ndarray,
-        v: np.ndarray,
-        force: np.ndarray,
-        step: float,
-        steps: int,
-    ) -> None:
+        def take(call: Callable[[], None]) -> None:
+            try:
+                call()
+            except BaseException:
+                progress[-1] = 1  # the others need not wait for this part
+                raise
+
+        try:
+            for call in calls[1:]:
+                begun.append(self._threads.submit(take, call))
+        except RuntimeError:  # the system gives no more threads
+            progress[-1] = 1
+            raise
+        else:
+            take(calls[0])
+        finally:
+            for one in begun:
+                one.result()
+        for values in (self._u, self._v):
+            values[0] = values[steps % len(values)]
+
+    def _calls(self, steps: int) -> tuple[list[Callable[[], None]], np.ndarray]:
+        """Steps of each part, and the progress by which parts wait for each other."""
+        from .kernels import ROW
+
+        progress = np.zeros((len(self._parts) + 1, ROW), dtype=np.int64)
+        rest = *self._numbers, self._u, self._v, steps, progress
+        function = self._function
+        assert function is not None
+        return [partial(function, number, *part, *rest) for number, part in enumerate(self._parts)], progress
+
+    @cached_property
+    def _threads(self) -> ThreadPoolExecutor:
+        """Threads for all parts but the first; they stay on their cores from one call to the next."""
+        return ThreadPoolExecutor(max(1, len(self._parts) - 1))
+
+    def close(self) -> None:
+        """See `Stepper`."""
+        if "_threads" in self.__dict__:
+            self._threads.shutdown()
+
+    def _advance_energies(self, steps: int) -> None:
         """As the kernels, of a network whose energies are not compiled."""
-        motion = self.motion
+        motion, step, u, v = self.motion, self._numbers[1], self._u[0], self._v[0]
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(steps):
                 at, speed = u.astype(float), v.astype(float)
                 missing = motion.missing(at) - _damper_forces(motion, at, speed)
-                v *= keep
-                v += gain * motion.network.expand(missing)
+                v *= self._keep
+                v += self._gain * motion.network.expand(missing)
                 u += step * v
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """See `Stepper`."""
-        u, v = self._back(self.u).astype(float), self._back(self.v).astype(float)
+        u, v = (self._back(values[0]).astype(float) for values in (self._u, self._v))
         if self.half and np.isfinite(v).all() and np.isfinite(u).all():
             with np.errstate(over="ignore", invalid="ignore"):
                 v = v + 0.5 * self.step * self._acceleration(u, v)
         return u, v
+
+
+def _parts(pointers: np.ndarray, threads: int) -> list[tuple[int, int]]:
+    """Rows, from one to before another, of as many parts with as many entries as threads have enough to do.
+
+    Parameters
+    ----------
+    pointers : ndarray of int, shape (n_rows + 1,)
+        First entry of each row.
+    threads : int
+
+    Returns
+    -------
+    list of tuple of int
+    """
+    count = int(min(threads, max(1, pointers[-1] // FEWEST)))
+    ends = np.searchsorted(pointers, np.arange(1, count) * (pointers[-1] / count)).tolist()
+    return list(pairwise([0, *ends, len(pointers) - 1]))
 
 
 def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
