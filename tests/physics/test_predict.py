@@ -225,12 +225,18 @@ class TestRandomBeams:
         assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(200)) > 800
 
 
+@pytest.fixture(scope="module")
+def known():
+    """A beam, its material and their references, which do not depend on the mesh."""
+    beam, material = Beam(0.08, 0.03, 1e-3, "b"), Material(1e9, 0.3, name="m")
+    return beam, material, references(beam, material)
+
+
 class TestBands:
     @pytest.mark.parametrize("mesh_type", MESH_TYPES)
-    def test_hold_on_meshes_that_are_too_large(self, mesh_type):
+    def test_hold_on_meshes_that_are_too_large(self, mesh_type, known):
         """With a limit an eighth of the real one, two meshes beyond it; wide only where rows are few."""
-        beam, material = Beam(0.08, 0.03, 1e-3, "b"), Material(1e9, 0.3, name="m")
-        known = references(beam, material)
+        beam, material, known = known
         for size in (0.95e-3, 0.8e-3):
             mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
             assert len(mesh.points) > 2500
@@ -304,10 +310,10 @@ class TestWhatScenesSay:
         choices = predict(beam, mesh, material, loads=PREDICTED)
         assert compared(beam, mesh, material, choices, PREDICTED) >= 3 * len(PREDICTED)
 
-    def test_of_two_hundred_beams(self):
-        """Of twenty shapes, as a reference scales with size, thickness and modulus."""
+    def test_of_eighty_beams(self):
+        """Of eight shapes, as a reference scales with size, thickness and modulus."""
         random, count = np.random.default_rng(14), 0
-        for number in range(20):
+        for number in range(8):
             aspect, material, *_ = random_case(random)
             load = PREDICTED[number % len(PREDICTED)]
             one = references(Beam(aspect, 1.0, 1.0), Material(1.0, material.poisson_ratio), [load])[load]
@@ -318,7 +324,7 @@ class TestWhatScenesSay:
                 known = {load: one.scaled(1 / (material.young_modulus * beam.thickness), beam.height)}
                 choices = predict(beam, mesh, material, known, loads=[load])
                 count += compared(beam, mesh, material, [choices[random.integers(len(choices))]], [load])
-        assert count > 180  # some are unstable
+        assert count > 72  # some are unstable
 
     @pytest.mark.slow
     def test_of_two_hundred_fresh_beams(self):

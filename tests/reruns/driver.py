@@ -18,7 +18,6 @@ from springtune.campaign import due
 from springtune.jobs import records, run_tasks, sealed
 from springtune.jobs.dependencies import CODE_FILE, OURS
 from springtune.jobs.spent import Spent
-from springtune.kinds.scenes import plan as scenes
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 
@@ -42,8 +41,6 @@ class Run(Campaign):
     """The study of this folder, as it is to be run now."""
 
     def __init__(self, cores=1):
-        for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
-            cache.cache_clear()
         super().__init__(CONFIG, cores)
 
     def finish(self):

@@ -6,12 +6,15 @@ from springtune.campaign import browse, collect, due, present
 from springtune.campaign.plan import plan
 from springtune.jobs import run_tasks
 from springtune.kinds import load_study
+from springtune.kinds.scenes import plan as scenes
 
 
 class Campaign:
     """A study of this folder, as it is to be run now."""
 
     def __init__(self, config, cores=1):
+        for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
+            cache.cache_clear()
         self.config, self.study = str(config), load_study(config)
         self.folder = Path("results") / self.study.name
         self.plan = plan(self.study, self.folder, cores)
@@ -33,6 +36,23 @@ class Campaign:
         others = self.plan.jobs.items()
         same = {other for other, job in others if job.stage.name in stage.same and job.label == label}
         return same | {other for other, job in others if job.stage.name in stage.every}
+
+    def finish(self, last=None):
+        """Run what is to run, as far as a job.
+
+        Returns
+        -------
+        list of str
+            Names of the jobs that ran.
+        """
+        names = self.due()
+        if last is not None:
+            names = names[: names.index(last) + 1] if last in names else []
+        if names:
+            self.plan.write()
+        for name in names:
+            self.do(name)
+        return names
 
     def do(self, name):
         """A job, by the function that its rule calls."""

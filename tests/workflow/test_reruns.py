@@ -1,5 +1,7 @@
 """What runs again when a study or a file changes, and what a study that cannot be solved leaves behind."""
 
+import contextlib
+
 import meshio
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from springtune.jobs import sealed
 from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.study import StudyError
+
+from campaigns import Campaign
 
 STUDY = """
 title: Reruns
@@ -100,11 +104,11 @@ def test_a_deleted_result_is_made_again(grown):
 
 def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     run.write("heavy.yaml", study("5 mm", "compression", "100 MN"))
-    code, output = run.snakemake("heavy.yaml")
-    assert code == 0, output
-    # A run that finished with holes says so, by name, at its end.
-    assert "scenes, not converged: 2 of 2\n  small, structured, 5 mm, steel, compression, paper, nonlinear: " in output
-    assert "Not everything is solved: 2 of 2 scenes" in output and "results/heavy: index.html, dataset.nc" in output
+    with contextlib.chdir(run.folder):
+        Campaign("heavy.yaml").finish()
+    # By name, in what a run shows at its end.
+    told = (run.folder / "results/heavy/summary.txt").read_text()
+    assert "scenes, not converged: 2 of 2\n  small, structured, 5 mm, steel, compression, paper, nonlinear: " in told
     root = dataset(run, "heavy").to_dataset()
     assert (root.status == 3).all() and root.displacement.isnull().all() and root.deformation_error.isnull().all()
     assert (root.residual > 1e-10).all()
@@ -112,7 +116,9 @@ def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     assert np.isfinite(root.reference_displacement).all()
 
 
-def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
+def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run, monkeypatch):
+    """By its jobs in this process, which tests/reruns finds to be those that Snakemake runs."""
+    monkeypatch.chdir(run.folder)
     mesh = MESH_TYPES["free"](0.05, 0.02, 5e-3)
     path = run.folder / "own.inp"
 
@@ -125,8 +131,7 @@ def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
     text = text.replace("grids:", f"{files}grids:").replace("[paper, lattice]", "delingette")
     run.write("own.yaml", text)
     save(mesh)
-    code, output = run.snakemake("own.yaml", "--until", "collect")
-    assert code == 0, output
+    Campaign("own.yaml").finish("collect")
     first = dataset(run, "own").to_dataset()
     assert first.mesh_type.values.tolist() == ["own"] and (first.status == 1).all()
     assert abs(first.deformation_error.item()) < 0.02
@@ -135,16 +140,18 @@ def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run):
     inside = ((moved > 1e-9) & (moved < [0.05 - 1e-9, 0.02 - 1e-9])).all(axis=1)
     moved[inside] += 3e-4
     save(Mesh(moved, mesh.triangles))
-    assert run.snakemake("own.yaml", "--until", "collect")[0] == 0
+    again = Campaign("own.yaml").finish("collect")
+    assert {name.partition("_")[0] for name in again} == {"mesh", "sensitivity", "solve", "collect"}
     second = dataset(run, "own").to_dataset()
     assert second.displacement.item() != first.displacement.item()
     assert second.displacement.item() == pytest.approx(first.displacement.item(), rel=0.01)
 
     save(Mesh(2 * mesh.points, mesh.triangles))
-    code, output = run.snakemake("own.yaml", "--until", "collect")
-    assert code == 0 and "scenes, failed: 1 of 1" in output
-    assert "extends over 100 x 40 mm, its beam over 50 x 20 mm; correct the unit or the beam" in output
-    assert "Traceback" not in output
+    Campaign("own.yaml").finish("collect")
+    told = (run.folder / "results/own/summary.txt").read_text()
+    assert "scenes, failed: 1 of 1" in told
+    assert "extends over 100 x 40 mm, its beam over 50 x 20 mm; correct the unit or the beam" in told
+    assert "Traceback" not in told
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """A sample through Snakemake: made, and doubled."""
 
+import pytest
 import xarray as xr
 
 STUDY = """
@@ -24,6 +25,8 @@ grids:
 """
 
 
+# Its jobs are doubled in one process by tests/unit/test_samples.py; the quick study has a sample through Snakemake.
+@pytest.mark.slow
 def test_a_sample_is_made_and_doubled(run):
     run.write("sample.yaml", STUDY.format(size=8))
     code, output = run.snakemake("sample.yaml")
