@@ -4,6 +4,7 @@
 #     snakemake --configfile config/quick.yaml           another one
 #     snakemake paper                                    the paper, and the studies that it reads
 
+
 include: "workflow/rules/environment.smk"
 include: "workflow/rules/elsewhere.smk"
 
@@ -15,13 +16,12 @@ if not TOLD:
     include: "workflow/rules/collect.smk"
     include: "workflow/rules/outputs.smk"
     include: "workflow/rules/browse.smk"
+
     if "study" not in config:  # a study that is read for the paper has none of its own
 
         include: "workflow/rules/paper.smk"
 
-
     report: "workflow/report/study.rst"
-
 
     rule all:
         default_target: True
@@ -34,21 +34,16 @@ if not TOLD:
             OUTPUTS.values(),
             str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
 
-
     release()
-
     if "storage" in config:
 
         include: "workflow/rules/storage.smk"
 
-
     onstart:
         begin()
 
-
     onsuccess:
         tell_end("ending")
-
 
     onerror:
         tell_end("broken")

@@ -66,7 +66,6 @@ else:
             [stored(f"{name}{ENDING}") for name in PACKED],
             [stored(Path(file).relative_to(RESULTS)) for file in SHOWN_FILES],
 
-
     for stage in PACKED:
 
         rule:
@@ -84,7 +83,6 @@ else:
                 RESULTS / f"logs/pack_{stage}.log",
             shell:
                 "python -m springtune.campaign.packs pack {params.folder} {output} {input} > {log} 2>&1"
-
 
     rule upload:
         message:
