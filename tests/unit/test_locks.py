@@ -92,3 +92,10 @@ def test_a_run_notes_itself_until_its_end(lock):
         locks.is_held(STUDY)
     locks.end()
     assert locks.is_held(STUDY) and not list(locks.RUNS.iterdir())
+
+
+def test_processes_of_two_machines_with_one_number_have_notes_of_their_own(lock, monkeypatch):
+    locks.begin([STUDY])
+    monkeypatch.setattr(locks, "this_host", lambda: "login.cluster pid:[4026531836]")
+    locks.begin([Path("results/other")])
+    assert len(list(locks.RUNS.iterdir())) == 2

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import meshio
@@ -217,3 +218,11 @@ class TestRun:
         result = run("run", *arguments)
         assert result.exit_code == code and said in result.stderr
         assert "Traceback" not in result.stderr
+
+    @pytest.mark.parametrize("named", [["--workflow-profile", "slurm"], ["--workflow-profile=workflow/profiles/slurm"]])
+    def test_slurm_without_its_plugin_says_what_to_install(self, monkeypatch, named):
+        # By its full name: `springtune.cli.run` is the command.
+        monkeypatch.setattr(sys.modules["springtune.cli.run"], "find_spec", lambda name: None)
+        result = run("run", "config/one.yaml", *named)
+        assert result.exit_code == 2 and "which is not installed" in result.stderr
+        assert "pip install --require-hashes -r requirements/slurm.txt" in result.stderr
