@@ -18,14 +18,17 @@ pytestmark = pytest.mark.slow
 OF_THE_RUN = ("tasks", "done", "logs", "benchmarks")
 """Folders of what a run notes of its jobs: there are others on a cluster."""
 
-TIMED = re.compile("benchmark|speed|stability_limits|summary.txt")
-"""Files that show how long something took."""
+TIMED = re.compile("benchmark|definitions.csv|which_definition.md|summary.txt")
+"""Files, and the group of a dataset, that tell how fast the machine was."""
 
 
 def made(copy, study):
     """What files of a study hold, without times and without what depends on them."""
-    found = contents(copy.folder / "results" / study).items()
-    return {path: one for path, one in found if Path(path).parts[0] not in OF_THE_RUN and not TIMED.search(path)}
+    found = contents(copy.folder / "results" / study)
+    found["dataset.nc"] = {name: one for name, one in found["dataset.nc"].items() if not TIMED.search(name)}
+    return {
+        path: one for path, one in found.items() if Path(path).parts[0] not in OF_THE_RUN and not TIMED.search(path)
+    }
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Locks of runs: whose they are, and whether that process lives."""
 
 import os
+import platform
 import re
 from pathlib import Path
 
@@ -96,6 +97,6 @@ def test_a_run_notes_itself_until_its_end(lock):
 
 def test_processes_of_two_machines_with_one_number_have_notes_of_their_own(lock, monkeypatch):
     locks.begin([STUDY])
-    monkeypatch.setattr(locks, "this_host", lambda: "login.cluster pid:[4026531836]")
+    monkeypatch.setattr(platform, "node", lambda: "login.cluster")
     locks.begin([Path("results/other")])
     assert len(list(locks.RUNS.iterdir())) == 2
