@@ -12,6 +12,8 @@ import time
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import psutil
+
 CONFIG = Path("/etc/slurm/slurm.conf")
 """Where programs within jobs look for it, whatever SLURM_CONF says."""
 
@@ -46,7 +48,7 @@ SlurmdLogFile={folder}/slurmd.%n.log
 PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 """
 
-NODE = "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs={cpus} RealMemory=6000"
+NODE = "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs={cpus} RealMemory={memory}"
 
 
 class CannotError(Exception):
@@ -110,8 +112,9 @@ def cluster(folder):
         raise CannotError(f"{CONFIG} is there: this machine belongs to a cluster")
     folder.mkdir(parents=True)
     (folder / "state").mkdir()
-    host, cpus = platform.node().partition(".")[0], os.cpu_count()
-    nodes = [NODE.format(name=name, host=host, port=16900 + i, cpus=cpus) for i, name in enumerate(NODES)]
+    host = platform.node().partition(".")[0]
+    of_node = {"host": host, "cpus": os.cpu_count(), "memory": psutil.virtual_memory().total // 2**20}
+    nodes = [NODE.format(name=name, port=16900 + number, **of_node) for number, name in enumerate(NODES)]
     with ExitStack() as stack:
         stack.callback(CONFIG.unlink, missing_ok=True)
         CONFIG.write_text(TEXT.format(host=host, folder=folder, nodes="\n".join(nodes)))

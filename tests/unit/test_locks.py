@@ -1,6 +1,7 @@
 """Locks of runs: whose they are, and whether that process lives."""
 
 import os
+import platform
 import re
 from pathlib import Path
 
@@ -92,3 +93,10 @@ def test_a_run_notes_itself_until_its_end(lock):
         locks.is_held(STUDY)
     locks.end()
     assert locks.is_held(STUDY) and not list(locks.RUNS.iterdir())
+
+
+def test_processes_of_two_machines_with_one_number_have_notes_of_their_own(lock, monkeypatch):
+    locks.begin([STUDY])
+    monkeypatch.setattr(platform, "node", lambda: "login.cluster")
+    locks.begin([Path("results/other")])
+    assert len(list(locks.RUNS.iterdir())) == 2

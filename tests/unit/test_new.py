@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import meshio
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.cli.new import LOADS_BY_FORCE
+from springtune.cli.run import SLURM
 from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
@@ -217,3 +219,10 @@ class TestRun:
         result = run("run", *arguments)
         assert result.exit_code == code and said in result.stderr
         assert "Traceback" not in result.stderr
+
+    @pytest.mark.parametrize("named", [["--workflow-profile", "slurm"], ["--workflow-profile=workflow/profiles/slurm"]])
+    @pytest.mark.skipif(bool(find_spec(SLURM)), reason="the plugin is installed")
+    def test_slurm_without_its_plugin_says_what_to_install(self, named):
+        result = run("run", "config/one.yaml", *named)
+        assert result.exit_code == 2 and "which is not installed" in result.stderr
+        assert "pip install --require-hashes -r requirements/slurm.txt" in result.stderr

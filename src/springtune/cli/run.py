@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -28,6 +29,7 @@ WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
         "springtune run config/mine.yaml --cores 4",
         "springtune run config/mine.yaml -n",
         "springtune run --strict config/mine.yaml",
+        "springtune run config/mine.yaml --workflow-profile slurm",
     ),
     context_settings={"ignore_unknown_options": True},
     options_metavar="[--strict] [--max-scenes N]",
@@ -61,6 +63,9 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     checkout = checkout_of_run()
     if checkout is None:
         raise click.ClickException(how_to_get_one(Path(arguments[0]) if named else None))
+    if _wants_slurm(options) and not find_spec(SLURM):
+        why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
+        raise click.UsageError(f"{why}: python -m pip install --require-hashes -r requirements/slurm.txt")
     path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
     shown = Path(arguments[0]) if named else path
     try:
@@ -81,6 +86,17 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     if holes:
         click.echo(f"--strict: {holes} scenes are not solved", err=True)
     raise SystemExit(NOT_SOLVED if holes else code)
+
+
+SLURM = "snakemake_executor_plugin_slurm"
+"""Package of the plugin; without it Snakemake would only say that it does not know the profile's words."""
+
+
+def _wants_slurm(options: list[str]) -> bool:
+    """Whether the options name the profile for Slurm."""
+    named = [two for one, two in zip(options, options[1:]) if one == "--workflow-profile"]
+    named += [one.partition("=")[2] for one in options if one.startswith("--workflow-profile=")]
+    return any(Path(one).name == "slurm" for one in named)
 
 
 NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
