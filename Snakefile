@@ -33,7 +33,7 @@ rule all:
 release()
 
 
-if "storage" in config:
+if "storage" in config or asks_for_storage():
 
     include: "workflow/rules/storage.smk"
 

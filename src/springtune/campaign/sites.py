@@ -37,7 +37,7 @@ from .plan import plan
 if TYPE_CHECKING:
     from ..study.model import Study
 
-KEY = re.compile("[0-9a-f]{24}")
+HASH = re.compile("[0-9a-f]{24}")
 """What `springtune.jobs.hashing.hash_of` gives."""
 
 TIMES = "seconds"
@@ -46,7 +46,7 @@ TIMES = "seconds"
 NAMED = 3
 """So many scenes or tasks are named of those with the same fault."""
 
-STORED, MESH, MESHES = ".h5", ".vtu", "meshes"
+STORED, MESH_FILE, MESHES = ".h5", ".vtu", "meshes"
 """Endings of files that stages make, and the folder of meshes and notes on them."""
 
 
@@ -336,7 +336,7 @@ def _otherwise(site: Site) -> str:
 def _keys(content: Any) -> Iterator[str]:
     """Keys of results, and of what they are made from, in what a job is to do."""
     if isinstance(content, str):
-        if KEY.fullmatch(content):
+        if HASH.fullmatch(content):
             yield content
     elif isinstance(content, dict):
         for name, value in content.items():
@@ -379,7 +379,7 @@ def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Cal
 
 def _mesh(target: Path, paths: Sequence[Path]) -> Callable[[], None] | None:
     """As `_union`, of the file of a mesh, or of its notes: those of one part, since what it took is in them."""
-    if target.suffix == MESH and len({records.checksum(path) for path in paths}) > 1:
+    if target.suffix == MESH_FILE and len({records.checksum(path) for path in paths}) > 1:
         told = " and ".join(map(str, paths))
         raise MergeError(
             f"{told} differ, though all that they depend on is the same; nothing is merged: split into fewer parts, so "
