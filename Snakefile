@@ -35,7 +35,7 @@ if not TOLD:
             str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
 
     release()
-    if "storage" in config:
+    if "storage" in config or asks_for_storage():
 
         include: "workflow/rules/storage.smk"
 

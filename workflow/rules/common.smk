@@ -160,6 +160,11 @@ def told_elsewhere(job):
     }
 
 
+def asks_for_storage():
+    """Whether a target is one of `storage.smk`, whatever else was forgotten."""
+    return not {"publish", "fetch"}.isdisjoint(sys.argv[1:])
+
+
 LOOKING = {
     "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--filegraph", "--lc", "--li", "--lint", "--list",
     "--list-changes", "--list-code-changes", "--list-input-changes", "--list-params-changes", "--list-rules",

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from springtune.campaign.packs import ENDING
 
 PLUGIN = "snakemake_storage_plugin_s3"
-STORAGE = str(config["storage"]).rstrip("/")
+STORAGE = str(config.get("storage", "")).rstrip("/")
 
 
 def stop(why):
@@ -17,6 +17,8 @@ def stop(why):
     sys.exit(1)
 
 
+if not STORAGE:
+    told("publish, fetch: where? give --config storage=s3://bucket/folder")
 if not re.fullmatch(r"s3://[^/{}]+(/[^{}]+)?", STORAGE):
     stop(f"storage: '{STORAGE}' is no place for results; give one such as s3://bucket/folder")
 if find_spec(PLUGIN) is None:

@@ -37,7 +37,7 @@ from .plan import plan
 if TYPE_CHECKING:
     from ..study.model import Study
 
-KEY = re.compile("[0-9a-f]{24}")
+HASH = re.compile("[0-9a-f]{24}")
 """What `springtune.jobs.hashing.hash_of` gives."""
 
 TIMES = "seconds"
@@ -46,7 +46,7 @@ TIMES = "seconds"
 NAMED = 3
 """So many scenes or tasks are named of those with the same fault."""
 
-STORED, MESH, MESHES = ".h5", ".vtu", "meshes"
+STORED, MESH_FILE, MESHES = ".h5", ".vtu", "meshes"
 """Endings of files that stages make, and the folder of meshes and notes on them."""
 
 
@@ -284,9 +284,9 @@ def _examined(site: Site) -> tuple[list[Path], list[str]]:
             else:
                 damaged.append(f"{file} is {'damaged' if file.is_file() else 'missing'}")
                 whole = False
-        done |= set(_keys(note["content"])) if whole else set()
+        done |= set(keys_of(note["content"])) if whole else set()
     jobs = plan(site.study, Path("results", site.study.name), 1).jobs
-    lacking = {name: set(_keys(job.content)) - done for name, job in jobs.items()}
+    lacking = {name: set(keys_of(job.content)) - done for name, job in jobs.items()}
     lost = set().union(*lacking.values())
     if not lost:
         return [*found], []
@@ -333,18 +333,28 @@ def _otherwise(site: Site) -> str:
     return f"{', '.join(told)}; install the same in both places and run the part again where it was another"
 
 
-def _keys(content: Any) -> Iterator[str]:
-    """Keys of results, and of what they are made from, in what a job is to do."""
+def keys_of(content: Any) -> Iterator[str]:
+    """Keys of results, and of what they are made from, in what a job is to do.
+
+    Parameters
+    ----------
+    content : dict, list or str
+        Of a job's tasks, or a part of it.
+
+    Yields
+    ------
+    str
+    """
     if isinstance(content, str):
-        if KEY.fullmatch(content):
+        if HASH.fullmatch(content):
             yield content
     elif isinstance(content, dict):
         for name, value in content.items():
-            yield from _keys(name)
-            yield from _keys(value)
+            yield from keys_of(name)
+            yield from keys_of(value)
     elif isinstance(content, list | tuple):
         for value in content:
-            yield from _keys(value)
+            yield from keys_of(value)
 
 
 def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Callable[[], None] | None:
@@ -379,7 +389,7 @@ def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Cal
 
 def _mesh(target: Path, paths: Sequence[Path]) -> Callable[[], None] | None:
     """As `_union`, of the file of a mesh, or of its notes: those of one part, since what it took is in them."""
-    if target.suffix == MESH and len({records.checksum(path) for path in paths}) > 1:
+    if target.suffix == MESH_FILE and len({records.checksum(path) for path in paths}) > 1:
         told = " and ".join(map(str, paths))
         raise MergeError(
             f"{told} differ, though all that they depend on is the same; nothing is merged: split into fewer parts, so "

@@ -10,7 +10,9 @@ from .messages import Problems
 from .model import Part
 from .yaml_lines import read_yaml
 
-BEGIN = "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
+PART_BELOW = (
+    "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
+)
 """Comment between the whole study and the section ``part``."""
 
 LONGEST_NAME = 255
@@ -19,12 +21,12 @@ LONGEST_NAME = 255
 
 def is_part(text: str) -> bool:
     """Whether a text asks for a part of a study."""
-    return BEGIN in text
+    return PART_BELOW in text
 
 
 def whole_text(text: str) -> str:
     """Text of the study that a file asks for a part of, or that it is."""
-    return text.rpartition(BEGIN)[0] if is_part(text) else text
+    return text.rpartition(PART_BELOW)[0] if is_part(text) else text
 
 
 def digest_of(text: str) -> str:
@@ -45,7 +47,7 @@ def part_text(text: str, part: Part) -> str:
     -------
     str
     """
-    return f"{text}{BEGIN}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
+    return f"{text}{PART_BELOW}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
 
 
 def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | None:
