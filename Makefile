@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures scale lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -72,6 +72,10 @@ results/quick/dataset.nc: | $(VENV)/.run
 # The pictures of the pages, from their studies; the benchmark among them takes minutes.
 pictures: $(VENV)/.run
 	python tools/pictures.py
+
+# What studies of a thousand to a hundred thousand scenes take, into docs/scale.md; some minutes.
+scale: $(VENV)/.run
+	python tools/scale.py --write
 
 # Stamps: nothing is installed again until a requirement changes.
 $(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/cholesky.txt pyproject.toml tools/setup.sh

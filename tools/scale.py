@@ -216,12 +216,16 @@ ROWS = (
 def extrapolated(known: dict[int, float]) -> tuple[float, Callable[[int], float]]:
     """Exponent of what grows with the number of scenes, by the last two sizes, and the number at a further size.
 
-    What the smallest study takes is taken in any case: ``q(n) = q0 + (q(N) - q0) (n / N)^p``.
+    With three sizes, the smallest one the first: ``q(n) = a + b n^p``, where a is what is taken in any case.
     """
-    (_, always), *_, (before, less), (last, most) = sorted(known.items())
-    grown, grown_before = most - always, less - always
-    power = math.log(grown / grown_before) / math.log(last / before) if min(grown, grown_before) > 0 else 0.0
-    return power, lambda scenes: always + max(grown, 0.0) * (scenes / last) ** power
+    (first, least), *_, (before, less), (last, most) = sorted(known.items())
+    always, power = least, 0.0
+    if not most > less > least:
+        return power, lambda scenes: most
+    for _ in range(50):  # each a is nearer to the one that the smallest size belongs to
+        power = math.log((most - always) / (less - always)) / math.log(last / before)
+        always = least - (most - always) * (first / last) ** power
+    return power, lambda scenes: always + (most - always) * (scenes / last) ** power
 
 
 def number(value: float, unit: str) -> str:
