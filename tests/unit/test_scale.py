@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def test_the_same_cells_are_written_one_by_one_and_together():
 
 def test_a_plan_takes_as_many_calls_a_scene_whatever_their_number(study_of):
     planned(study_of(1))  # what is read once a process
-    counts = [calls(lambda config=study_of(forces): planned(config)) for forces in (4, 8, 16)]
+    counts = [calls(partial(planned, study_of(forces))) for forces in (4, 8, 16)]
     # Twice the scenes added take twice the calls; a share of a percent is that of sorting and of texts.
     assert (counts[2] - counts[1]) / (counts[1] - counts[0]) == pytest.approx(2, rel=0.05)
     assert (counts[2] - counts[1]) / (16 * 8) < 150
