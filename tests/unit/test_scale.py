@@ -90,11 +90,11 @@ def test_the_same_cells_are_written_one_by_one_and_together():
 
 
 def test_a_plan_takes_as_many_calls_a_scene_whatever_their_number(study_of):
-    planned(study_of(1))  # what is read once a process
-    counts = [calls(partial(planned, study_of(forces))) for forces in (4, 8, 16)]
-    # Twice the scenes added take twice the calls; a share of a percent is that of sorting and of texts.
-    assert (counts[2] - counts[1]) / (counts[1] - counts[0]) == pytest.approx(2, rel=0.05)
-    assert (counts[2] - counts[1]) / (16 * 8) < 150
+    planned(study_of(2))  # what is found once a process
+    counts = [calls(partial(planned, study_of(forces))) for forces in (10, 20, 40)]
+    # Twice the scenes added take twice the calls, and some more of a few further bundles.
+    assert (counts[2] - counts[1]) / (counts[1] - counts[0]) == pytest.approx(2, rel=0.1)
+    assert (counts[2] - counts[1]) / (16 * 20) < 150
 
 
 def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of):
@@ -136,7 +136,9 @@ def test_numbers_are_extrapolated_by_their_exponent(tool):
     for power in (0.5, 1.0, 1.3):
         found, further = tool.extrapolated({size: 2.0 + 1e-3 * size**power for size in (40, 1_000, 10_000, 100_000)})
         assert found == pytest.approx(power, abs=1e-9)
-        assert further(10_000_000) == pytest.approx(2.0 + 1e-3 * 10_000_000**power, rel=1e-9)
+        least, most = (2.0 + 1e-3 * size**power for size in (40, 100_000))
+        linear = least + (most - least) * 100  # what scenes shared so far they need not share further on
+        assert further(10_000_000) == pytest.approx(max(linear, 2.0 + 1e-3 * 10_000_000**power), rel=1e-9)
     assert tool.extrapolated({40: 6.0, 1_000: 6.0, 10_000: 6.0, 100_000: 6.0})[1](10_000_000) == 6.0
     steps = dict.fromkeys((step for _, step, _, _ in tool.ROWS))
     measured = {
