@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -98,6 +98,10 @@ results/quick/dataset.nc: | $(VENV)/.run
 # The pictures of the pages, from their studies; the benchmark among them takes minutes.
 pictures: $(VENV)/.run
 	python tools/pictures.py
+
+# What studies of a thousand to a hundred thousand scenes take, into docs/scale.md; some minutes.
+scale: $(VENV)/.run
+	python tools/scale.py --write
 
 # Stamps: nothing is installed again until a requirement changes.
 $(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/cholesky.txt pyproject.toml tools/setup.sh

@@ -213,15 +213,26 @@ ROWS = (
 """What is told, the step and number that it is, and its unit; memory stands below the seconds of the same step."""
 
 
+LARGEST_PAGE = "at most 5 MB"
+"""Size of a page to browse, see `springtune.browse.payload`."""
+
+
 def extrapolated(known: dict[int, float]) -> tuple[float, Callable[[int], float]]:
     """Exponent of what grows with the number of scenes, by the last two sizes, and the number at a further size.
 
-    What the smallest study takes is taken in any case: ``q(n) = q0 + (q(N) - q0) (n / N)^p``.
+    With the smallest size and the last two ``q(n) = a + b n^p``, where a is what is taken in any case. What grew by
+    less than an exponent of 1 is extrapolated by 1: what scenes shared so far they need not share further on.
     """
-    (_, always), *_, (before, less), (last, most) = sorted(known.items())
-    grown, grown_before = most - always, less - always
-    power = math.log(grown / grown_before) / math.log(last / before) if min(grown, grown_before) > 0 else 0.0
-    return power, lambda scenes: always + max(grown, 0.0) * (scenes / last) ** power
+    (first, least), *_, (before, less), (last, most) = sorted(known.items())
+    always, power = least, 0.0
+    if not most > less > least:
+        return power, lambda scenes: most + max(most - least, 0.0) * (scenes / last - 1)
+    for _ in range(50):  # each a is nearer to the one that the smallest size belongs to
+        power = math.log((most - always) / (less - always)) / math.log(last / before)
+        always = least - (most - always) * (first / last) ** power
+    if power < 1:
+        return power, lambda scenes: least + (most - least) * scenes / last
+    return power, lambda scenes: always + (most - always) * (scenes / last) ** power
 
 
 def number(value: float, unit: str) -> str:
@@ -244,7 +255,9 @@ def table(found: dict[int, dict[str, Numbers]]) -> str:
         known = {size: steps[step][name] for size, steps in found.items() if step in steps}
         power, further = extrapolated(known)
         cells = [number(known[size], unit) if size in known else f"*{number(further(size), unit)}*" for size in shown]
-        cells += [f"{power:.2f}", *(f"*{number(further(size), unit)}*" for size in FURTHER)]
+        bounded = (step, name) == ("page", "file")
+        cells += ["" if bounded else f"{power:.2f}"]
+        cells += [LARGEST_PAGE if bounded else f"*{number(further(size), unit)}*" for size in FURTHER]
         lines.append(f"| {told} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

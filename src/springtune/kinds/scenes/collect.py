@@ -1,5 +1,7 @@
 """Scenes, references and curves, gathered in the root of a dataset and its groups."""
 
+from functools import cache
+
 import numpy as np
 import xarray as xr
 
@@ -137,8 +139,9 @@ def _meshes(study, folder, root):
 def _references(study, folder, root):
     """Displacement of each reference, and by reference and kinematics objections to it."""
     displacements, objections, interpolated = {}, {}, 0
+    read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
     for one in study.references:
-        result = _reference(study, folder, one)
+        result = read(one.beam, one.material, one.load)  # for 1 N: whatever the forces, it is read once
         labels = study.labels(one)
         for kinematics in study.axes["kinematics"]:
             objections[one, kinematics] = found = objection(result, one.force, kinematics)

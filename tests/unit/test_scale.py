@@ -1,0 +1,151 @@
+"""What grows with the number of scenes, and what does not: counted, not timed."""
+
+import importlib.util
+import json
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from counting import counted
+from springtune.campaign import collect, due, page
+from springtune.campaign.plan import plan
+from springtune.jobs import store
+from springtune.kinds import load_study
+from springtune.kinds.scenes import plan as scenes
+from springtune.output.dataset import Filler
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def tool():
+    spec = importlib.util.spec_from_file_location("scale", REPOSITORY / "tools/scale.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def study_of(tool, tmp_path, monkeypatch):
+    """Study of 16 scenes for each force, on two meshes."""
+    monkeypatch.chdir(tmp_path)
+
+    def make(forces):
+        Path(f"n{forces}.yaml").write_text(tool.study(2, 1, 1, forces))
+        return f"n{forces}.yaml"
+
+    return make
+
+
+def planned(config):
+    study = load_study(config)
+    made = plan(study, Path("results") / study.name, 1)
+    return study, made, due.jobs(study, made)
+
+
+def calls(function):
+    """Calls of Python functions that a call takes."""
+    count = 0
+
+    def profile(frame, event, argument):
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(profile)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_the_same_cells_are_written_one_by_one_and_together():
+    rng = np.random.default_rng(3)
+    labels = [{"beam": str(place[0]), "size": float(place[1])} for place in np.ndindex(3, 4) if place != (1, 2)]
+    values = [{"status": 1, "error": rng.normal(), "message": "same " * 2} for _ in labels]
+    del values[2]["error"], values[4]["message"], values[5]["status"]
+    values[6]["error"] = None  # as JSON has it
+    filled = []
+    for _ in range(2):
+        data = xr.Dataset(
+            {
+                "status": (("beam", "size"), np.zeros((3, 4), "int8")),
+                "error": (("size", "beam", "point"), np.full((4, 3, 2), np.nan)),
+                "message": (("beam", "size"), np.full((3, 4), "", dtype=object)),
+            },
+            {"beam": np.array(["0", "1", "2"], dtype=object), "size": np.arange(4.0)},
+        )
+        filled.append(Filler(data.isel(point=0)))
+    for one, cell in zip(values, labels):
+        filled[0].put(one, **cell)
+    filled[1].put_each(values, labels)
+    filled[1].put_each([], [])
+    assert filled[0].data.identical(filled[1].data)
+    texts = {id(text) for text in filled[1].data.message.values.ravel() if text}
+    assert len(texts) == 1  # 100,000 texts that are alike are one text
+
+
+def test_a_plan_takes_as_many_calls_a_scene_whatever_their_number(study_of):
+    planned(study_of(2))  # what is found once a process
+    counts = [calls(partial(planned, study_of(forces))) for forces in (10, 20, 40)]
+    # Twice the scenes added take twice the calls, and some more of a few further bundles.
+    assert (counts[2] - counts[1]) / (counts[1] - counts[0]) == pytest.approx(2, rel=0.1)
+    assert (counts[2] - counts[1]) / (16 * 20) < 150
+
+
+def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of):
+    opened = {}
+    for forces in (2, 6):
+        config = study_of(forces)
+        study, made, _ = planned(config)
+        made.write()
+        noted = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}
+        Path("plan.json").write_text(json.dumps({"stages": noted}))
+        tool.do_stages(config, "invent")
+        with counted(scenes._scene_key, store.read, Filler.put) as count:
+            study = planned(config)[0]
+            groups = collect._groups(study, made.folder)
+        assert count["_scene_key"] == len(study.scenes) == 16 * forces
+        assert int((groups["/"].status == 1).sum()) == len(study.scenes)
+        opened[forces] = count["read"]
+        # Of a reference its values, and for each kinematics whether it applies; of a mesh its size.
+        assert count["Filler.put"] <= 3 * len(study.references) + 2 * len(study.meshes) + 5
+    assert len(study.meshes) == 2 and opened[2] == opened[6] <= 6
+
+
+def test_keys_made_together_are_those_made_one_by_one():
+    study = load_study(REPOSITORY / "config/quick.yaml")
+    together = scenes.scene_keys(study)
+    for mesh, members in scenes.by_mesh(study.scenes).items():
+        assert together[mesh] == [scenes.scene_key(study, scene) for scene in members]
+
+
+def test_the_page_of_tables_shows_so_many_rows_and_says_so():
+    rows = [{"name": f"row {number}", "error_percent": 0.5} for number in range(page.MOST_ROWS + 1)]
+    table = page._further({"stem": "many", "title": "Many", "note": "", "rows": rows})
+    assert len(table["lines"]) == page.MOST_ROWS
+    assert table["beyond"] == "The first 1000 of 1001 rows; the file has all of them: "
+    assert page._further({"stem": "few", "title": "Few", "note": "", "rows": rows[:-1]})["beyond"] == ""
+
+
+def test_numbers_are_extrapolated_by_their_exponent(tool):
+    for power in (0.5, 1.0, 1.3):
+        found, further = tool.extrapolated({size: 2.0 + 1e-3 * size**power for size in (40, 1_000, 10_000, 100_000)})
+        assert found == pytest.approx(power, abs=1e-9)
+        least, most = (2.0 + 1e-3 * size**power for size in (40, 100_000))
+        linear = least + (most - least) * 100  # what scenes shared so far they need not share further on
+        assert further(10_000_000) == pytest.approx(max(linear, 2.0 + 1e-3 * 10_000_000**power), rel=1e-9)
+    assert tool.extrapolated({40: 6.0, 1_000: 6.0, 10_000: 6.0, 100_000: 6.0})[1](10_000_000) == 6.0
+    steps = dict.fromkeys((step for _, step, _, _ in tool.ROWS))
+    measured = {
+        size: {step: dict.fromkeys(("s", "MB", "jobs", "files", "file"), 1e-3 * size) for step in steps}
+        for size in tool.SIZES
+    }
+    del measured[100_000]["solve"]
+    lines = tool.table(measured).splitlines()
+    assert len({line.count("|") for line in lines}) == 1
+    assert "| solving, meshes of 100 to 1,000 particles | 1 s | 10 s | *100 s* | 1.00 |" in lines[5]
