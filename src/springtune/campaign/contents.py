@@ -241,14 +241,14 @@ def _checkout(folder: Path) -> Path:
     other = _other_library(checkout / "src/springtune")
     if other:
         raise ArchiveError(
-            f"src/springtune/{other} of this folder is not that of the library that runs and that made the results; set "
-            "up the environment of this folder: make study"
+            f"src/springtune/{other} of this folder is not that of the library that runs and that made the results; "
+            "set up the environment of this folder: make study"
         )
     return checkout
 
 
 def _other_library(packed: Path) -> str:
-    """Name of a file of the library that runs which is another one, or none, in a folder; empty where all are the same."""
+    """Name of a file that is another one in a folder than in the library that runs; empty where there is none."""
     if packed.resolve() == PACKAGE.resolve():
         return ""
     names = {
