@@ -259,7 +259,9 @@ def _other_library(packed: Path) -> str:
     }
     pairs = {name: [folder / name for folder in (packed, PACKAGE)] for name in sorted(names)}
     others = (
-        name for name, pair in pairs.items() if not (all(one.is_file() for one in pair) and cmp(*pair, shallow=False))
+        name
+        for name, pair in pairs.items()
+        if not (all(one.is_file() for one in pair) and cmp(pair[0], pair[1], False))
     )
     return next(others, "")
 
