@@ -20,6 +20,7 @@ class FromFile(BaseAdapter):
     """Answers every request with a file."""
 
     def send(self, request, **options):
+        """Response to a request, whatever it asks for."""
         content = (Path(rocrate.__file__).parent / "data/ro-crate.jsonld").read_bytes()
         assert f'"@id": "{CONTEXT}"'.encode() in content, "this version of rocrate has the context of another RO-Crate"
         headers = {"Content-Type": "application/ld+json"}
@@ -27,7 +28,7 @@ class FromFile(BaseAdapter):
         return HTTPAdapter().build_response(request, answer)
 
     def close(self):
-        pass
+        """Nothing is open."""
 
 
 if __name__ == "__main__":

@@ -11,19 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..jobs import sealed
 from . import due, environment
+from .contents import CODE, DIFF, INPUTS, METADATA, README
 from .plan import stages
 
 if TYPE_CHECKING:
     from rocrate.model import Entity
     from rocrate.rocrate import ROCrate
 
-    from .archive import Contents
-
-METADATA, SUMS, README, DIFF = "ro-crate-metadata.json", "SHA256SUMS", "README.md", "code.diff"
-"""Files at the top of an archive."""
-
-CODE, INPUTS = "code", "inputs"
-"""Folders of an archive besides that of the results: of the checkout, and of files from outside of it."""
+    from .contents import Contents
 
 TERMS = "https://w3id.org/ro/terms/workflow-run#"
 """Where the terms are defined that RO-Crate 1.1 has not."""
@@ -36,8 +31,8 @@ PROFILES = {
 }
 """Profiles that an archive conforms to, with their names and versions."""
 
-WORKFLOW = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
-PARAMETER = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
+WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
+PARAMETER_PROFILE = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
 """Profiles of the workflow, and of what it is given and makes."""
 
 DONE = "http://schema.org/CompletedActionStatus"
@@ -212,8 +207,8 @@ class _Crate:
             found.dataset: "the dataset: NetCDF-4, every parameter a dimension",
             f"{found.folder}/{due.PAGE}": "a page to browse the dataset, which needs no network",
             f"{found.folder}/{due.SUMMARY}": "what is solved, what is not and why",
-            f"{CODE}/{environment.LOCKS[0]}": "versions and hashes of all packages",
-            f"{CODE}/{environment.LOCKS[1]}": "version and hashes of the package that factorizes by CHOLMOD",
+            f"{CODE}/{environment.LOCK_FILES[0]}": "versions and hashes of all packages",
+            f"{CODE}/{environment.LOCK_FILES[1]}": "version and hashes of the package that factorizes by CHOLMOD",
         }
         original = found.files[found.dataset].original
         if original != found.files[found.dataset].sha256:
@@ -309,7 +304,7 @@ class _Crate:
         """The Snakefile: what it is given, and what it makes."""
         workflow, found = self.files[f"{CODE}/Snakefile"], self.found
         root = self.crate.root_dataset
-        workflow["conformsTo"] = {"@id": WORKFLOW}
+        workflow["conformsTo"] = {"@id": WORKFLOW_PROFILE}
         workflow["license"], workflow["creator"] = root["license"], root["author"]
         for key, name, file, told in (
             ("input", "study", found.config, "the study's file, --configfile of Snakemake"),
@@ -323,7 +318,7 @@ class _Crate:
                 encodingFormat=self.files[file]["encodingFormat"],
                 description=told,
                 workExample=self.files[file],
-                conformsTo={"@id": PARAMETER},
+                conformsTo={"@id": PARAMETER_PROFILE},
             )
             workflow[key] = self.files[file]["exampleOfWork"] = parameter
 

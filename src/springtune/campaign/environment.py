@@ -4,7 +4,7 @@ import os
 import platform
 from pathlib import Path
 
-LOCKS = ("requirements/run.txt", "requirements/cholesky.txt")
+LOCK_FILES = ("requirements/run.txt", "requirements/cholesky.txt")
 """Lock files of what a study runs on, from the checkout on; the second is an extra that a machine may lack."""
 
 

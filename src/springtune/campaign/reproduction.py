@@ -17,7 +17,7 @@ from urllib.parse import unquote
 
 from ..output import reading
 from . import due, environment
-from .crate import CODE, METADATA, SUMS
+from .contents import CODE, METADATA, SUMS
 
 if TYPE_CHECKING:
     from ..output.comparison import Comparison
@@ -253,7 +253,7 @@ def reproduce(found: Checked, folder: Path, fresh: bool, say: Callable[[str], No
         raise ReproductionError(
             f"the study could not be run (exit code {done.returncode}); what went wrong stands above"
         )
-    return _compared(kept, code / target, found.machine)
+    return compared(kept, code / target, found.machine)
 
 
 UNWANTED = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "SNAKEMAKE_PROFILE", "SPRINGTUNE_SOLVER")
@@ -275,7 +275,7 @@ def _unpack(archive: zipfile.ZipFile, folder: Path, without: str, but: str) -> N
 
 def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) -> Path:
     """The Python to run a checkout by: this one where it is the same, else that of an environment of its own."""
-    others = own_environment(code / environment.LOCKS[0], python)
+    others = own_environment(code / environment.LOCK_FILES[0], python)
     if not others and not fresh:
         say("environment: this one, whose packages are those of the archive's lock file")
         return Path(sys.executable)
@@ -296,7 +296,19 @@ def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) ->
     return code / ".venv/bin/python"
 
 
-def _compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
+def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
+    """Compare the dataset of an archive with one that was computed here.
+
+    Parameters
+    ----------
+    kept, made : Path
+    machine : dict of str to str
+        That the first was computed on, as far as it is told.
+
+    Returns
+    -------
+    Reproduced
+    """
     from ..output.comparison import Tolerance, compare
 
     with reading.open(kept) as before, reading.open(made) as after:

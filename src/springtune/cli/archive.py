@@ -9,7 +9,7 @@ from .examples import examples
 from .folders import studies
 
 if TYPE_CHECKING:
-    from ..campaign.archive import Contents
+    from ..campaign.contents import Contents
 
 
 @click.command(
@@ -44,7 +44,8 @@ def archive(study: Path, out: Path | None, with_store: bool, force: bool) -> Non
         raise click.ClickException(
             "the library rocrate is missing; install the extra: pip install 'springtune[archive]'"
         ) from None
-    from ..campaign.archive import ArchiveError, stored_size, write
+    from ..campaign.archive import write
+    from ..campaign.contents import ArchiveError, stored_size
     from ..campaign.crate import CitationError
 
     target = out or folder.with_name(f"{folder.name}.crate.zip")

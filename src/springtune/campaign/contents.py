@@ -1,0 +1,501 @@
+"""What an archive of a study consists of: checked, found, and named; `springtune.campaign.archive` writes it."""
+
+import hashlib
+import json
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from filecmp import cmp
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from ..jobs import records
+from ..jobs.dependencies import PACKAGE
+from ..output.reading import CHANGED
+from . import due, environment, provenance
+from .plan import plan
+from .verify import files as verified
+
+if TYPE_CHECKING:
+    from ..study.model import Study
+    from .due import Job
+    from .plan import Plan
+
+METADATA, SUMS, README, DIFF = "ro-crate-metadata.json", "SHA256SUMS", "README.md", "code.diff"
+"""Files at the top of an archive."""
+
+CODE, INPUTS = "code", "inputs"
+"""Folders of an archive besides that of the results: of the checkout, and of files from outside of it."""
+
+CITATION = "CITATION.cff"
+OF_RESULTS = "results"
+
+CHECKOUT_FILES = (
+    "Snakefile",
+    "Makefile",
+    "pyproject.toml",
+    "LICENSE",
+    CITATION,
+    "tools/setup.sh",
+    *environment.LOCK_FILES,
+)
+"""Files of a checkout without which nobody could run an archive."""
+
+TREE = (
+    ".gitignore", "CHANGELOG.md", CITATION, "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "Snakefile",
+    "config", "docs", "examples", "profiles", "pyproject.toml", "requirements", "src", "tests", "tools", "workflow",
+)  # fmt: skip
+"""What a checkout consists of, where there is no git to ask."""
+
+NEW = ("src", "workflow", "tools", "requirements")
+"""Folders whose files are packed although git does not know them: what runs may import them."""
+
+NOT_PACKED = ("__pycache__", ".egg-info", ".pyc", ".DS_Store")
+"""Endings of names of files and folders that are made of others."""
+
+MOST_TOLD = 5
+"""Most jobs that are told in a refusal."""
+
+
+class ArchiveError(ValueError):
+    """A study that cannot be archived as it is: what is missing, and what to do about it."""
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A file of an archive.
+
+    Attributes
+    ----------
+    name : str
+        In the archive.
+    source : Path or bytes
+        Where it is, or what it is.
+    sha256 : str
+    size : int
+        [B]
+    original : str
+        SHA-256 of the file that it was made from, where it is another one.
+    """
+
+    name: str
+    source: Path | bytes
+    sha256: str
+    size: int
+    original: str = ""
+
+    @property
+    def runs(self) -> bool:
+        """Whether it is to be executable."""
+        return isinstance(self.source, Path) and os.access(self.source, os.X_OK)
+
+
+@dataclass(frozen=True)
+class Code:
+    """The program of a checkout.
+
+    Attributes
+    ----------
+    files : dict of str to Path
+        By their names from the checkout on.
+    commit : str
+        Empty where there is no git.
+    diff : str
+        What differs from it.
+    new : tuple of str
+        Files that are packed and that git does not know.
+    """
+
+    files: dict[str, Path]
+    commit: str
+    diff: str
+    new: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What an archive of a study consists of, its metadata apart.
+
+    Attributes
+    ----------
+    study : Study
+    plan : Plan
+    jobs : dict of str to Job
+    files : dict of str to Packed
+        By name.
+    config : str
+        Name of the study's file.
+    inputs : tuple of str
+        Names of the files that it is made from besides.
+    code : Code
+    attributes : dict of str to str
+        Of the dataset, without the machine's name.
+    machine : dict of str to str
+        On which it was computed; empty where that is not this one.
+    departures : dict of str to tuple of str
+        Versions that are locked, and others that the dataset was made with.
+    """
+
+    study: "Study"
+    plan: "Plan"
+    jobs: "dict[str, Job]"
+    files: dict[str, Packed]
+    config: str
+    inputs: tuple[str, ...]
+    code: Code
+    attributes: dict[str, str]
+    machine: dict[str, str]
+    departures: dict[str, tuple[str, str]]
+
+    @property
+    def folder(self) -> str:
+        """Folder of its results."""
+        return f"{OF_RESULTS}/{self.study.name}"
+
+    @property
+    def dataset(self) -> str:
+        """Name of the dataset."""
+        return f"{self.folder}/{due.DATASET}"
+
+    @property
+    def software(self) -> dict[str, str]:
+        """Versions that the dataset was made with."""
+        return dict(json.loads(self.attributes["software"]))
+
+    @property
+    def size(self) -> int:
+        """Of all files, uncompressed [B]."""
+        return sum(one.size for one in self.files.values())
+
+
+def gather(study: "Study", folder: Path, scratch: Path, store: bool = False) -> Contents:
+    """What an archive of a study is to consist of.
+
+    Parameters
+    ----------
+    study, folder, store
+        As of `springtune.campaign.archive.write`.
+    scratch : Path
+        Folder for files that are made to be packed.
+
+    Returns
+    -------
+    Contents
+
+    Raises
+    ------
+    ArchiveError
+        As there.
+    """
+    checkout = _checkout(folder)
+    checked = verified(study, folder)
+    if checked.faults or checked.stale:
+        raise ArchiveError(_unfinished(study, folder, checked.faults, checked.stale))
+    made = plan(study, folder, 1)
+    jobs = due.jobs(study, made)
+    code = _code(checkout)
+    names = archived_names(study, provenance.input_files(study), checkout)
+    paths = {name: path for path, name in names.items()}
+    paths |= {f"{CODE}/{name}": path for name, path in code.files.items()}
+    paths |= {f"{OF_RESULTS}/{study.name}/{name}": path for name, path in _made(folder, jobs, made, store)}
+    packed = {name: _of_file(name, path) for name, path in paths.items()}
+    dataset = f"{OF_RESULTS}/{study.name}/{due.DATASET}"
+    packed[dataset], attributes, host = _without_host(packed[dataset], scratch)
+    if code.diff:
+        packed[DIFF] = of_text(DIFF, code.diff)
+    own = names[study.path.resolve()]
+    found = Contents(
+        study=study,
+        plan=made,
+        jobs=jobs,
+        files=packed,
+        config=own,
+        inputs=tuple(sorted(set(names.values()) - {own})),
+        code=code,
+        attributes=attributes,
+        machine=environment.machine() if host == platform.node() else {},
+        departures=_departures(checkout, attributes),
+    )
+    packed[README] = of_text(README, _readme(found))
+    return found
+
+
+# -- the checkout ------------------------------------------------------------------------------------------------------
+
+
+def _checkout(folder: Path) -> Path:
+    """Folder of the checkout, which is this one; refused where it could not be run elsewhere."""
+    checkout = Path.cwd()
+    if folder.resolve().parent.parent != checkout:
+        place = folder.parent.parent
+        raise ArchiveError(f"{folder}: an archive holds the checkout that it was run in; call it there: cd {place}")
+    missing = [name for name in CHECKOUT_FILES if not Path(name).is_file()]
+    if missing:
+        raise ArchiveError(
+            f"{', '.join(missing)}: missing in this folder, and nobody could run the archive without; go to a checkout "
+            "of springtune, or unpack its source distribution, and run the study there"
+        )
+    other = _other_library(checkout / "src/springtune")
+    if other:
+        raise ArchiveError(
+            f"src/springtune/{other} of this folder is not that of the library that runs and that made the results; "
+            "set up the environment of this folder: make study"
+        )
+    return checkout
+
+
+def _other_library(packed: Path) -> str:
+    """Name of a file that is another one in a folder than in the library that runs; empty where there is none."""
+    if packed.resolve() == PACKAGE.resolve():
+        return ""
+    names = {
+        path.relative_to(folder).as_posix()
+        for folder in (packed, PACKAGE)
+        for path in folder.rglob("*")
+        if path.is_file() and not _is_made(path.relative_to(folder).as_posix())
+    }
+    pairs = {name: [folder / name for folder in (packed, PACKAGE)] for name in sorted(names)}
+    others = (
+        name
+        for name, pair in pairs.items()
+        if not (all(one.is_file() for one in pair) and cmp(pair[0], pair[1], False))
+    )
+    return next(others, "")
+
+
+def _unfinished(study: "Study", folder: Path, faults: dict[str, str], stale: Iterable[str]) -> str:
+    said = [f"{name}: {why}" for name, why in faults.items()]
+    said += [f"{name}: the study or the program changed since" for name in stale]
+    shown = said[:MOST_TOLD] + ([f"and {len(said) - MOST_TOLD} more"] if len(said) > MOST_TOLD else [])
+    remedy = f"snakemake --configfile {study.path}"
+    if any(why.endswith(records.DAMAGED) for why in faults.values()):
+        remedy = f"springtune verify {study.path} --set-aside, then {remedy}"
+    lines = [f"{folder}: is not what the study asks for now, and is not archived", *shown, f"make it: {remedy}"]
+    return "\n  ".join(lines)
+
+
+def _code(checkout: Path) -> Code:
+    """The program: what git knows of it and what may be imported besides; or all of it where there is no git."""
+    commit = provenance.git_commit(checkout)
+    known = _listed(checkout, "--cached") if commit else []
+    if not known:  # a source distribution, or a checkout inside of another one's ignored folder
+        return Code(dict(_unknown(checkout)), "", "")
+    new = [name for name in _listed(checkout, "--others", "--exclude-standard") if name.partition("/")[0] in NEW]
+    new = [name for name in new if not _is_made(name)]
+    files = dict(_followed(checkout, [*known, *new]))
+    diff = _git(checkout, "diff", "--no-color", "--no-ext-diff", "--binary", "--relative", "HEAD")
+    return Code(files, commit.removesuffix(CHANGED), diff, tuple(sorted(new)))
+
+
+def _listed(checkout: Path, *which: str) -> list[str]:
+    return [name for name in _git(checkout, "ls-files", "-z", *which).split("\0") if name]
+
+
+def _git(checkout: Path, *arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=checkout, capture_output=True)
+    return done.stdout.decode(errors="surrogateescape") if not done.returncode else ""
+
+
+def _followed(checkout: Path, names: Iterable[str]) -> Iterator[tuple[str, Path]]:
+    """Files by name; what a link to a folder of the checkout leads to under the link's name, as zip has no links."""
+    names = sorted(set(names))
+    for name in names:
+        path = checkout / name
+        if path.is_file():
+            yield name, path
+        elif path.is_dir() and path.resolve().is_relative_to(checkout):
+            below = path.resolve().relative_to(checkout).as_posix() + "/"
+            for other in names:
+                if other.startswith(below) and (checkout / other).is_file():
+                    yield f"{name}/{other.removeprefix(below)}", checkout / other
+
+
+def _unknown(checkout: Path) -> Iterator[tuple[str, Path]]:
+    for top in TREE:
+        path = checkout / top
+        if path.is_file():
+            yield top, path
+        for file in sorted(path.rglob("*")) if path.is_dir() else ():
+            # rglob does not follow a link to a folder below; one that stands here is followed by its name.
+            name = file.relative_to(checkout).as_posix()
+            if file.is_file() and not _is_made(name):
+                yield name, file
+    if (checkout / "profiles").is_symlink():
+        for file in sorted((checkout / "profiles").resolve().rglob("*")):
+            if file.is_file():
+                yield f"profiles/{file.relative_to((checkout / 'profiles').resolve()).as_posix()}", file
+
+
+def _is_made(name: str) -> bool:
+    return any(part.endswith(NOT_PACKED) for part in PurePosixPath(name).parts)
+
+
+# -- the study's files -------------------------------------------------------------------------------------------------
+
+
+def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Path, str]:
+    """Names in the archive of the files that a study is made from, which see each other as before.
+
+    Parameters
+    ----------
+    study : Study
+    given : set of Path
+        Its own file among them.
+    checkout : Path
+
+    Returns
+    -------
+    dict of Path to str
+        By the whole path.
+
+    Raises
+    ------
+    ArchiveError
+        If the study names a file by a path of this machine, or one that is too far away.
+    """
+    config, files = study.path.resolve(), {file.resolve() for file in given}
+    for path in files - {config}:
+        if str(path) in study.text:
+            raise ArchiveError(
+                f"{study.path}: names {path}, which is this machine's own; name the file as seen from the study's "
+                f"folder, such as {path.name} beside it, and run the study again"
+            )
+    outside = [path.parent for path in files if not path.is_relative_to(checkout)]
+    base = Path(os.path.commonpath(outside)) if config.parent in outside else None
+    names = {}
+    for path in sorted(files):
+        if path.is_relative_to(checkout):
+            names[path] = f"{CODE}/{path.relative_to(checkout).as_posix()}"
+        else:
+            names[path] = f"{INPUTS}/{path.relative_to(base).as_posix()}" if base else _beside(path, checkout)
+    folder = PurePosixPath(names[config]).parent
+    for path, name in names.items():
+        if not name or os.path.relpath(name, folder) != os.path.relpath(path, config.parent):
+            raise ArchiveError(
+                f"{study.path}: reads {path.name}, which an archive could not hold where the study finds it; "
+                "put the study and its files into one folder, in the checkout or outside, and run it"
+            )
+    return names
+
+
+def _beside(path: Path, checkout: Path) -> str:
+    """Name of a file in a folder beside the checkout; empty for any other."""
+    parts = Path(os.path.relpath(path, checkout)).parts
+    kept = (
+        parts[:1] == ("..",) and parts[1:2] != ("..",) and len(parts) > 2 and parts[1] not in (CODE, OF_RESULTS, INPUTS)
+    )
+    return "/".join(parts[1:]) if kept else ""
+
+
+# -- results -----------------------------------------------------------------------------------------------------------
+
+
+def _made(folder: Path, jobs: "dict[str, Job]", made: "Plan", store: bool) -> Iterator[tuple[str, Path]]:
+    """Files of a study's results by their names from its folder on."""
+    from ..jobs import sealed
+
+    for name, job in jobs.items():
+        paths = [job.record, folder / f"benchmarks/{name}.tsv"]
+        if name not in made.jobs:
+            paths += map(Path, job.products)
+        elif store:
+            paths += map(Path, sealed.demand(job.record)["products"])
+            paths.append(made.tasks(name))
+        for path in paths:
+            if path.is_file():
+                yield path.relative_to(folder).as_posix(), path
+
+
+def stored_size(study: "Study", folder: Path) -> int:
+    """Bytes of what the stages of a study stored [B]."""
+    made = plan(study, folder, 1)
+    every = dict(_made(folder, due.jobs(study, made), made, True))
+    few = dict(_made(folder, due.jobs(study, made), made, False))
+    return sum(every[name].stat().st_size for name in every.keys() - few.keys())
+
+
+def _without_host(dataset: Packed, scratch: Path) -> tuple[Packed, dict[str, str], str]:
+    """The dataset without the name of the machine, its attributes, and that name.
+
+    The text of the attribute is overwritten in its place: all else stays as it was, to the byte.
+    """
+    import h5py
+    import numpy as np
+
+    assert isinstance(dataset.source, Path)
+    copy = scratch / due.DATASET
+    shutil.copyfile(dataset.source, copy)
+    with h5py.File(copy, "a") as file:
+        attributes = {
+            str(name): value.decode() if isinstance(value, bytes) else str(value) for name, value in file.attrs.items()
+        }
+        host = attributes.pop("host", "")
+        if host:
+            if file.attrs.get_id("host").dtype.kind != "S":
+                raise ArchiveError(
+                    f"{dataset.source}: its attribute 'host' has letters besides ASCII, and cannot be blanked in its "
+                    "place; give the machine another name and collect the study again"
+                )
+            file.attrs.modify("host", np.bytes_(b"-" * len(host)))
+    packed = _of_file(dataset.name, copy)
+    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), attributes, host
+
+
+def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
+    """Versions that the dataset was made with and that are not the locked ones."""
+    locked: dict[str, str] = {}
+    for lock in environment.LOCK_FILES:
+        locked |= environment.locked(checkout / lock)
+    used = json.loads(attributes.get("software", "{}"))
+    return {
+        name: (locked[name], version) for name, version in sorted(used.items()) if locked.get(name, version) != version
+    }
+
+
+# -- the archive -------------------------------------------------------------------------------------------------------
+
+
+def _readme(found: Contents) -> str:
+    """What somebody reads who has unpacked the archive and knows nothing of it."""
+    study = f"../{found.config}" if not found.config.startswith(f"{CODE}/") else found.config.removeprefix(f"{CODE}/")
+    commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
+    version = found.attributes["springtune_version"]
+    changed = f"; what differs from the commit is in `{DIFF}`" if found.code.diff else ""
+    return f"""# {found.study.title}
+
+The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is
+described in `{METADATA}`: this is an RO-Crate.
+
+| | |
+|---|---|
+| `{found.config}` | the study |
+| `{found.dataset}` | its dataset: NetCDF-4, for xarray or any HDF5 viewer |
+| `{found.folder}/{due.PAGE}` | a page to browse it |
+| `{CODE}/` | the program, with the versions of all packages in `{CODE}/{environment.LOCK_FILES[0]}` |
+
+To check that all is as it was packed:
+
+    sha256sum -c {SUMS}
+
+To compute it again, with Python {environment.minor(found.software["python"])} and make, and to compare:
+
+    cd {CODE}
+    make study STUDY={study}
+    . .venv/bin/activate
+    springtune diff ../{found.folder} {found.folder} --relative 0 --absolute 0
+
+`springtune verify ARCHIVE --reproduce` does all of this with the archive as it was packed.
+"""
+
+
+def _of_file(name: str, path: Path) -> Packed:
+    return Packed(name, path, records.checksum(path), path.stat().st_size)
+
+
+def of_text(name: str, text: str) -> Packed:
+    """A file of an archive that is a text."""
+    content = text.encode(errors="surrogateescape")
+    return Packed(name, content, hashlib.sha256(content).hexdigest(), len(content))
