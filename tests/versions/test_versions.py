@@ -52,7 +52,7 @@ DECLARED = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 
 NEEDED = [*DECLARED["dependencies"], *DECLARED["optional-dependencies"]["cholesky"]]
 NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
-"""Packages that physics may need. Snakemake is none of them, and what it needs may have no wheel for the newest Python."""
+"""Packages that physics may need. Snakemake is none, and what it needs may have no wheel for the newest Python."""
 
 TESTERS = [one for one in DECLARED["optional-dependencies"]["test"] if re.match("hypothesis|mujoco|pytest", one)]
 
