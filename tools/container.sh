@@ -7,4 +7,8 @@ if [ ! -w "${HOME:-/}" ] || [ "${HOME:-/}" = / ]; then
     mkdir -p -m 700 "$HOME" || exit 1
     export HOME
 fi
+# A user without a name: Snakemake asks for one.
+if ! id -un >/dev/null 2>&1; then
+    export LOGNAME="${LOGNAME:-user-$(id -u)}"
+fi
 exec springtune "$@"

@@ -20,7 +20,8 @@ pull=missing
 if [ "${BASE:-registry}" = debootstrap ]; then
     command -v debootstrap >/dev/null || fail "there is no debootstrap; install it: apt-get install debootstrap"
     if ! podman image exists "docker.io/library/debian:$debian-slim"; then
-        debootstrap --variant=minbase --include=ca-certificates "$debian" "$scratch/root" http://deb.debian.org/debian >/dev/null
+        debootstrap --variant=minbase --include=ca-certificates "$debian" "$scratch/root" http://deb.debian.org/debian \
+            >/dev/null
         # Certificates of this machine: a mirror or a proxy of its own may need them.
         cp /etc/ssl/certs/ca-certificates.crt "$scratch/root/etc/ssl/certs/"
         tar -C "$scratch/root" -c . | podman import --quiet \
@@ -30,7 +31,8 @@ if [ "${BASE:-registry}" = debootstrap ]; then
     pull=never
     say "base: debian:$debian by debootstrap, not the registry's"
 fi
-podman build --quiet --pull=$pull ${ISOLATION:+--isolation "$ISOLATION"} --build-arg "DEBIAN=$debian" --tag $image . >/dev/null
+podman build --pull=$pull ${ISOLATION:+--isolation "$ISOLATION"} --build-arg "DEBIAN=$debian" --tag $image . \
+    >"$scratch/log" 2>&1 || { tail -n 30 "$scratch/log"; fail "it does not build"; }
 say "it builds: $(podman image inspect --format '{{.Size}}' $image | awk '{printf "%.2f GB", $1 / 1e9}')"
 
 # As documented: a folder of one's own, a user whom the image does not know, nothing of the image writable.
@@ -59,7 +61,7 @@ called "$entry" --help | grep -q '^Usage: springtune' || fail "it does not tell 
 say "its own user is an ordinary one, and it tells its commands"
 
 for program in pip uv gcc; do
-    ! called sh -c "command -v $program" >/dev/null || fail "it holds $program"
+    ! called sh -c "command -v $program" >/dev/null 2>&1 || fail "it holds $program"
 done
 test "$(called python -c '
 import sys, pathlib, importlib.util as found
