@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -41,13 +41,18 @@ SEED ?= 1
 test-fuzz: $(VENV)/.test
 	OPENBLAS_NUM_THREADS=1 python tests/fuzz $(INPUTS) $(SEED)
 
-# The same numbers by SuperLU and by CHOLMOD, and with the oldest packages that pyproject.toml allows, which are installed.
+# The same numbers by SuperLU and by CHOLMOD, with the oldest packages that pyproject.toml allows, and with the newest by
+# each Python (python3.11 ...) on PATH; physics holds with them. They are installed, and what is not there is named.
 test-versions: $(VENV)/.test
 	pytest -rs tests/versions
 
 # A table of changes: which jobs run then, what they compute, and that the dataset is that of a fresh run.
 test-reruns: $(VENV)/.test
 	pytest -n 2 tests/reruns
+
+# The container image, built and used as its page says; BASE=debootstrap where no registry can be reached.
+test-container:
+	sh tests/container/run.sh
 
 # A release without releasing: built, checked, installed where nothing else is. What it needs is installed apart.
 release-check: $(VENV)/.test

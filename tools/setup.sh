@@ -50,7 +50,12 @@ install() {
     fi
     "$python" -m pip install --quiet "$@"
 }
-install --require-hashes -r "requirements/$what.txt"
+install --require-hashes -r "requirements/$what.txt" || {
+    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 14))' && ! command -v cc >/dev/null &&
+        say "for Python 3.14 a package that Snakemake needs, immutables, had to be compiled when this was written;" \
+            "install a compiler (apt-get install gcc python3-dev), or put an older python3 first on PATH"
+    exit 1
+}
 if [ "$what" = run ]; then
     install --only-binary :all: --require-hashes -r requirements/cholesky.txt ||
         say "no CHOLMOD for this machine: SuperLU factorizes in its place, in three to five times the time"

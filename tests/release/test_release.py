@@ -218,17 +218,20 @@ def test_running_says_what_is_missing_and_where_it_is(call):
     assert sorted(call.here.iterdir()) == before
 
 
-def test_it_runs_a_study_where_the_source_is_unpacked(call, empty, release):
-    """With the environment of the wheel, in the folder of the source distribution: the other half of the message."""
+@pytest.mark.parametrize("named", [False, True], ids=["there", "here"])
+def test_the_source_runs_a_study(call, empty, release, named):
+    """With the environment of the wheel, in the folder of the source or with it named: what the message tells to do."""
     with tarfile.open(release[0]) as file:
         file.extractall(call.here)
     call("springtune", "new", "mine")
+    source = call.here / NAME
     environment = {"PATH": f"{empty}:/usr/bin:/bin", "HOME": str(call.here), "LANG": "C.UTF-8"}
-    folder = call.here / NAME
-    command = (empty / "springtune", "run", call.here / "mine.yaml", "--cores", "1")
-    done(*command, cwd=folder, env=environment)
+    environment |= {"SPRINGTUNE_WORKFLOW": str(source)} if named else {}
+    folder = call.here if named else source
+    done(empty / "springtune", "run", call.here / "mine.yaml", "--cores", "1", cwd=folder, env=environment)
     assert (folder / "results/mine/dataset.nc").is_file()
     assert (folder / "results/mine/index.html").is_file()
+    assert not (source / "results").exists() or not named
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ compared with nothing.
 import os
 import pickle
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -45,6 +46,18 @@ COUNTS = re.compile("status|stable|pivots|evaluations|load_share")
 
 LEFT = re.compile("seconds|residual|estimate|iterations|solver|contrast_error|spring_forces")
 """Of names of what rounding leaves: bounds on errors, not results. Forces are kept in single precision."""
+
+
+DECLARED = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+
+NEEDED = [*DECLARED["dependencies"], *DECLARED["optional-dependencies"]["cholesky"]]
+NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
+"""Packages that physics may need. Snakemake is none, and what it needs may have no wheel for the newest Python."""
+
+TESTERS = [one for one in DECLARED["optional-dependencies"]["test"] if re.match("hypothesis|mujoco|pytest", one)]
+
+PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.search(r":: 3\.\d+$", one)]
+"""Versions of Python that are supported."""
 
 
 @pytest.fixture(scope="module")
@@ -105,22 +118,33 @@ def test_superlu_and_cholmod_agree(study, usual):
     assert compared(found, usual) == ({}, [])
 
 
-@pytest.fixture(scope="module")
-def oldest(tmp_path_factory):
-    """A Python with the oldest packages that `pyproject.toml` allows: the newest releases of these minor versions."""
-    declared = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-    wanted = [*declared["dependencies"], *declared["optional-dependencies"]["cholesky"]]
-    floors = [one.partition(">=")[::2] for one in wanted if not one.startswith("snakemake")]
-    floors = [f"{name}=={least}{'' if '.' in least else '.0'}.*" for name, least in floors]
-    folder = tmp_path_factory.mktemp("oldest") / "venv"
-    for command in (["venv", "--python", sys.executable, folder], ["pip", "install", "--python", folder, *floors]):
+def environment(folder, python, packages):
+    """A Python of its own with packages, and with what the physics tests are run by."""
+    for command in (["venv", "--python", python, folder], ["pip", "install", "--python", folder, *packages, *TESTERS]):
         try:
             done = subprocess.run(["uv", *map(str, command)], capture_output=True, text=True, timeout=600)
         except (OSError, subprocess.TimeoutExpired) as error:
-            pytest.skip(f"the oldest packages cannot be installed here: {error}")
+            pytest.skip(f"packages cannot be installed here: {error}")
         if done.returncode:
-            pytest.skip(f"the oldest packages cannot be installed here: {done.stderr.strip()[-300:]}")
+            pytest.skip(f"packages cannot be installed here: {done.stderr.strip()[-300:]}")
     return folder / "bin/python"
+
+
+def physics(python):
+    """Run the physics tests by a Python, and assert that they hold."""
+    call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider", "tests/physics"]
+    here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(call, cwd=REPOSITORY, env=here, capture_output=True, text=True)
+    print(done.stdout.splitlines()[-1:])
+    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-2000:]
+
+
+@pytest.fixture(scope="module")
+def oldest(tmp_path_factory):
+    """A Python with the oldest packages that `pyproject.toml` allows: the newest releases of these minor versions."""
+    floors = [one.partition(">=")[::2] for one in NEEDED]
+    floors = [f"{name}=={least}{'' if '.' in least else '.0'}.*" for name, least in floors]
+    return environment(tmp_path_factory.mktemp("oldest") / "venv", sys.executable, floors)
 
 
 @pytest.mark.slow
@@ -128,3 +152,22 @@ def test_the_oldest_and_the_newest_packages_agree(study, usual, oldest):
     found = computed(study, oldest, "oldest")
     assert found["versions"]["numpy"] != usual["versions"]["numpy"]
     assert compared(found, usual) == ({}, [])
+
+
+@pytest.mark.slow
+def test_physics_holds_with_the_oldest_packages(oldest):
+    physics(oldest)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", PYTHONS)
+def test_every_python_agrees_with_the_newest_packages(version, study, usual, tmp_path):
+    """Of those that are on PATH; which are not is what `-rs` tells."""
+    python = shutil.which(f"python{version}")
+    if python is None:
+        pytest.skip(f"there is no python{version} on PATH")
+    newest = environment(tmp_path / "venv", python, NEEDED)
+    found = computed(study, newest, "newest")
+    print(f"Python {version}:", found["versions"])
+    assert compared(found, usual) == ({}, [])
+    physics(newest)

@@ -22,6 +22,9 @@ NOT_SOLVED = 3
 WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
 """Files by which a checkout is known."""
 
+ELSEWHERE = "SPRINGTUNE_WORKFLOW"
+"""Environment variable that names a checkout whose workflow runs in the current folder, as that of a container does."""
+
 
 @click.command(
     epilog=examples(
@@ -42,9 +45,10 @@ WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
 def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 
-    Checks the study and then runs Snakemake in the folder of the checkout, where results/ is. All options but those
-    below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
-    the study is wrong or a job failed, and with 2 when it was called in a wrong way.
+    Checks the study and then runs Snakemake in the folder of the checkout, where results/ is; in this folder, if the
+    environment variable SPRINGTUNE_WORKFLOW names a checkout. All options but those below are Snakemake's. Exits with 0
+    when everything is made, scenes that could not be solved included, with 1 when the study is wrong or a job failed,
+    and with 2 when it was called in a wrong way.
     """
     from ..kinds import load_study  # here, so that --help does not wait for it
     from ..study import StudyError
@@ -73,12 +77,14 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     except StudyError as error:
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
-    if checkout != Path.cwd():
-        click.echo(f"results go to {checkout / 'results' / study.name}", err=True)
-    path = path.relative_to(checkout) if path.is_relative_to(checkout) else path
+    folder = Path.cwd() if os.environ.get(ELSEWHERE) else checkout
+    if folder != Path.cwd():
+        click.echo(f"results go to {folder / 'results' / study.name}", err=True)
+    path = path.relative_to(folder) if path.is_relative_to(folder) else path
+    workflow = [] if folder == checkout else ["--snakefile", str(checkout / "Snakefile")]
     # A list of targets would take a path that follows it for one more of them, and so would --configfile.
-    command = [*_snakemake(), *options, "--configfile", str(path)]
-    os.chdir(checkout)
+    command = [*_snakemake(), *workflow, *options, "--configfile", str(path)]
+    os.chdir(folder)
     if not strict or {"-n", "--dry-run", "--dryrun"} & {*options}:
         os.execv(command[0], command)
     code = _called(command)
@@ -113,20 +119,33 @@ def _meant(path: Path) -> str:
     return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""
 
 
+def is_checkout(folder: Path) -> bool:
+    """Whether a folder is a checkout."""
+    return all((folder / file).is_file() for file in WORKFLOW)
+
+
 def checkout_here() -> bool:
     """Whether this folder is a checkout."""
-    return all(Path(file).is_file() for file in WORKFLOW)
+    return is_checkout(Path())
 
 
 def _library_checkout() -> Path | None:
     """The checkout that the library is part of; None if it is installed without one."""
     folder = Path(__file__).parents[3]
-    return folder if all((folder / file).is_file() for file in WORKFLOW) else None
+    return folder if is_checkout(folder) else None
 
 
 def checkout_of_run() -> Path | None:
-    """Folder of the workflow: this one, or that of the library; None where there is neither."""
-    return Path.cwd() if checkout_here() else _library_checkout()
+    """Folder of the workflow: the one that is named, this one, or that of the library; None where there is none."""
+    named = os.environ.get(ELSEWHERE)
+    if not named:
+        return Path.cwd() if checkout_here() else _library_checkout()
+    folder = Path(named).absolute()
+    if not is_checkout(folder):
+        raise click.ClickException(
+            f"{ELSEWHERE}: {named} has no Snakefile of springtune; name the folder of its source"
+        )
+    return folder
 
 
 def how_to_get_one(study: Path | None) -> str:
@@ -136,7 +155,8 @@ def how_to_get_one(study: Path | None) -> str:
     return (
         "studies are run by springtune's workflow, which is in its source and not in the installed package; get a "
         f"clone, or unpack springtune-{__version__}.tar.gz, change to its folder, and there\n"
-        f"  springtune run {study.absolute() if study else USUAL_STUDY}"
+        f"  springtune run {study.absolute() if study else USUAL_STUDY}\n"
+        f"or name that folder by {ELSEWHERE}, to have the results here"
     )
 
 
