@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow million lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -52,6 +52,10 @@ test-reruns: $(VENV)/.test
 slow: $(VENV)/.test
 	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
+
+# The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
+million: $(VENV)/.run
+	OPENBLAS_NUM_THREADS=1 python tools/million.py --write
 
 lint: $(VENV)/.test
 	ruff check

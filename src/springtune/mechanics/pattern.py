@@ -16,7 +16,7 @@ DISSECTED = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
 
 PINNED = (8, 32)
-"""Particles that are pinned where the matrix is indefinite: so many, and so many more where these do not hold it."""
+"""Particles that are pinned where the matrix is indefinite: so many, or so many where these do not hold it."""
 
 
 class Pattern:
