@@ -5,6 +5,7 @@ Each case runs in a process of its own, whose peak is that of its memory: minute
 
 import argparse
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -28,7 +29,7 @@ def scene(definition: str, kinematics: str, force: str, particles: float) -> dic
     """Seconds of the parts of a scene, from nothing to its result."""
     import springtune as st
 
-    beam, begin, ticks = st.Beam("1000 mm", "400 mm"), time.perf_counter(), time.process_time()
+    beam, begin, before = st.Beam("1000 mm", "400 mm"), time.perf_counter(), os.times()
     size = (1.0 * 0.4 / (particles * 3**0.5 / 2)) ** 0.5
     mesh = st.make_mesh(beam, "structured", f"{1e3 * size} mm")
     meshed = time.perf_counter() - begin
@@ -36,15 +37,15 @@ def scene(definition: str, kinematics: str, force: str, particles: float) -> dic
         beam, mesh, st.Material("210 GPa", 0.3), "traction", force, definition=definition, kinematics=kinematics
     )
     result = made.solve()
-    total, used = time.perf_counter() - begin, time.process_time() - ticks
-    found = result.equilibrium
+    total, after, found = time.perf_counter() - begin, os.times(), result.equilibrium
     return {
         "particles": len(mesh.points),
         "mesh": meshed,
         "springs": result.definition_seconds,
         "solve": result.seconds,
         "total": total,
-        "processor": used,
+        "user": after.user - before.user,
+        "system": after.system - before.system,
         "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
         "status": str(result.status),
         "iterations": found.iterations,
@@ -92,12 +93,13 @@ def apart(*arguments: object) -> dict[str, object]:
 
 def tables(particles: float) -> str:
     """Both tables."""
-    columns = "particles mesh springs solve total processor memory steps residual solver".split()
+    load = os.getloadavg()[0]
+    columns = "particles mesh springs solve total user system memory steps residual solver".split()
     lines = [f"| scene | {' | '.join(columns)} |", f"| --- |{' ---: |' * (len(columns) - 1)} --- |"]
     for definition, kinematics, force in SCENES:
         one = apart("scene", definition, kinematics, force, particles)
         assert one["status"] == "solved", one
-        seconds = " | ".join(f"{one[part]:.1f} s" for part in ("mesh", "springs", "solve", "total", "processor"))
+        seconds = " | ".join(f"{one[part]:.1f} s" for part in ("mesh", "springs", "solve", "total", "user", "system"))
         lines.append(
             f"| `{definition}`, {kinematics} | {one['particles']:,} | {seconds} | {one['memory']:.2f} GB | "
             f"{one['iterations']} | {one['residual']:.0e} | {one['solver']} |"
@@ -111,7 +113,7 @@ def tables(particles: float) -> str:
         seconds = " | ".join(f"{1e3 * part['seconds']:.0f} ms" for part in (rest, pins, superlu))
         left = f"{pins['residual']:.0e}, {superlu['residual']:.0e}"
         lines.append(f"| {one['unknowns']:,} | {pins['negative']} | {seconds} | {left} |")
-    return "\n".join(lines)
+    return f"Machine load as it began: {load:.1f}, of {os.cpu_count()} processors.\n\n" + "\n".join(lines)
 
 
 def main() -> None:

@@ -13,8 +13,8 @@ from .factors import Factor, SingularError
 RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
 
-STEP = 1e-4
-"""The same of a step of Newton's method, whose tangent leaves about as much."""
+STEP = 1e-6
+"""The same of a step of Newton's method, whose tangent leaves more."""
 
 MAX_CG_ITERATIONS = 300
 
@@ -27,6 +27,9 @@ COARSENING = 3.0
 
 COARSEST = 500
 """Unknowns below which the coarsest matrix is factorized, as a dense one."""
+
+MANY = 50
+"""Iterations with the grids of another matrix from which on those of its own take less time."""
 
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
@@ -70,6 +73,8 @@ class Multigrid:
     otherwise : callable, optional
         Makes the factor that takes over where conjugate gradients do not end, or meet a direction without stiffness;
         that is an error without.
+    like : Multigrid, optional
+        Of a matrix that differs little, such as that at rest: its grids serve as long as they do.
     """
 
     def __init__(
@@ -78,13 +83,22 @@ class Multigrid:
         points: np.ndarray,
         places: np.ndarray,
         otherwise: Callable[[], Factor] | None = None,
+        like: "Multigrid | None" = None,
     ) -> None:
-        self._matrix, self._otherwise = matrix, otherwise
+        self._matrix, self._otherwise, self._points, self._places = matrix, otherwise, points, places
         self._direct: Factor | None = None
-        self._levels: list[_Level] = []
-        self._certain, self._coarsest = False, None
+        self._certain = False
+        self._borrowed = like is not None and like._coarsest is not None
+        if like is not None and self._borrowed:
+            self._levels, self._coarsest = like._levels, like._coarsest
+        else:
+            self._lay_grids()
+
+    def _lay_grids(self) -> None:
+        """Levels and the factor of the coarsest one, of the matrix itself."""
+        self._borrowed, self._levels, self._coarsest = False, [], None
         try:
-            self._coarsest = self._coarsened(points, places)
+            self._coarsest = self._coarsened(self._points, self._places)
         except LinAlgError:  # then the matrix is not positive definite either
             self._levels = []
 
@@ -122,7 +136,8 @@ class Multigrid:
     def _precondition(self, right: np.ndarray) -> np.ndarray:
         """What a cycle makes of a right-hand side."""
         size = np.linalg.norm(right) or 1.0
-        return size * self._cycle(0, (right / size).astype(np.float32)).astype(float)
+        single = np.multiply(right, 1.0 / size, out=np.empty(len(right), dtype=np.float32), casting="same_kind")
+        return np.multiply(self._cycle(0, single), size, dtype=float)
 
     def _cycle(self, depth: int, right: np.ndarray) -> np.ndarray:
         from pyamg.amg_core import gauss_seidel
@@ -133,7 +148,9 @@ class Multigrid:
         entries, last = (matrix.indptr, matrix.indices, matrix.data), len(right) - 1
         solution = np.zeros_like(right)
         gauss_seidel(*entries, solution, right, 0, last + 1, 1)
-        solution += prolong @ self._cycle(depth + 1, restrict @ (right - matrix @ solution))
+        missing = matrix @ solution
+        np.subtract(right, missing, out=missing)
+        solution += prolong @ self._cycle(depth + 1, restrict @ missing)
         gauss_seidel(*entries, solution, right, last, -1, -1)
         return solution
 
@@ -183,14 +200,18 @@ class Multigrid:
             missing -= self._matrix @ solution
         better = self._precondition(missing)
         direction, weight = better.copy(), missing @ better
-        for _ in range(MAX_CG_ITERATIONS):
+        for count in range(MAX_CG_ITERATIONS):
+            if self._borrowed and count == MANY:
+                self._lay_grids()
+                return solution + self._gradients(missing, tolerance * scale / np.linalg.norm(missing))
             forces = self._matrix @ direction
             stiffness = direction @ forces
             if not stiffness > 0 or not weight > 0:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
             length = weight / stiffness
-            solution += length * direction
-            missing -= length * forces
+            forces *= length
+            missing -= forces
+            solution += np.multiply(direction, length, out=forces)
             if np.linalg.norm(missing) <= tolerance * scale:
                 self._certain |= proves
                 return solution
