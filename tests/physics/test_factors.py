@@ -222,7 +222,7 @@ def test_particles_that_are_spread_are_far_from_each_other():
 
 
 def iterative(network, displacements=None, otherwise=None):
-    return Multigrid(network.tangent(displacements).T, network.mesh.points, network._pattern.places, otherwise)
+    return Multigrid(network.tangent(displacements).T, network.mesh.points, np.flatnonzero(~network.held), otherwise)
 
 
 @settings(max_examples=30, deadline=None)

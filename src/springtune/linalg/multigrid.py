@@ -13,7 +13,7 @@ from .factors import Factor, SingularError
 RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
 
-STEP = 1e-6
+STEP_RESIDUAL = 1e-6
 """The same of a step of Newton's method, whose tangent leaves more."""
 
 MAX_CG_ITERATIONS = 300
@@ -28,7 +28,7 @@ COARSENING = 3.0
 COARSEST = 500
 """Unknowns below which the coarsest matrix is factorized, as a dense one."""
 
-MANY = 50
+MOST_BORROWED = 50
 """Iterations with the grids of another matrix from which on those of its own take less time."""
 
 MOST_LEVELS = 16
@@ -75,6 +75,11 @@ class Multigrid:
         that is an error without.
     like : Multigrid, optional
         Of a matrix that differs little, such as that at rest: its grids serve as long as they do.
+
+    Attributes
+    ----------
+    name : str
+        ``"multigrid"``, or that of the factor that took over.
     """
 
     def __init__(
@@ -86,8 +91,11 @@ class Multigrid:
         like: "Multigrid | None" = None,
     ) -> None:
         self._matrix, self._otherwise, self._points, self._places = matrix, otherwise, points, places
+        self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
+        self._levels: list[_Level] = []
+        self._coarsest: Any = None
         self._borrowed = like is not None and like._coarsest is not None
         if like is not None and self._borrowed:
             self._levels, self._coarsest = like._levels, like._coarsest
@@ -120,17 +128,13 @@ class Multigrid:
             matrix, spacing = coarse, 2.0 * spacing
         return cho_factor(matrix.toarray())
 
-    @property
-    def name(self) -> str:
-        """``"multigrid"``, or that of the factor that took over."""
-        return "multigrid" if self._direct is None else self._direct.name
-
     def _give_up(self, error: NotPositiveError) -> Factor:
         """The factor that takes over."""
         if self._otherwise is None:
             raise error
         self._levels = []
         self._direct = self._otherwise()
+        self.name = self._direct.name
         return self._direct
 
     def _precondition(self, right: np.ndarray) -> np.ndarray:
@@ -201,9 +205,9 @@ class Multigrid:
         better = self._precondition(missing)
         direction, weight = better.copy(), missing @ better
         for count in range(MAX_CG_ITERATIONS):
-            if self._borrowed and count == MANY:
+            if self._borrowed and count == MOST_BORROWED:
                 self._lay_grids()
-                return solution + self._gradients(missing, tolerance * scale / np.linalg.norm(missing))
+                return solution + self._gradients(missing, float(tolerance * scale / np.linalg.norm(missing)))
             forces = self._matrix @ direction
             stiffness = direction @ forces
             if not stiffness > 0 or not weight > 0:
@@ -223,7 +227,7 @@ class Multigrid:
 
     def step(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, so far as a step of Newton's method goes."""
-        return self.solve(right, STEP)
+        return self.solve(right, STEP_RESIDUAL)
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, to a percent."""
