@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -82,6 +82,11 @@ slow: $(VENV)/.test
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
+
+# The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
+million: $(VENV)/.run
+	OPENBLAS_NUM_THREADS=1 python tools/million.py --write
+
 lint: $(VENV)/.test
 	sh tools/lint.sh
 

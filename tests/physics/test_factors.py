@@ -8,6 +8,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from springtune.linalg.factors import Analysis, SingularError, SuperLUFactor, factorize
+from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
 from springtune.linalg.ordering import nested_dissection, spread
 from springtune.linalg.pinned import factorize_pinned
 from springtune.mechanics import network as networks
@@ -178,7 +179,7 @@ def test_an_unstable_path_is_the_same_with_pins_and_without(mesh_type, monkeypat
 
     def path(pinned):
         monkeypatch.setattr(networks, "PINNED", pinned)
-        problem = problem_on(mesh)
+        problem = problem_on(mesh, solver="Cholesky")
         found = follow(problem, -2e-4, increment=2e-3 * problem.network.unknowns**0.5, most_points=8)
         names.add(problem.network.factorize_tangent(found.displacements[-1]).name)
         return found
@@ -193,7 +194,7 @@ def test_an_unstable_path_is_the_same_with_pins_and_without(mesh_type, monkeypat
 def test_what_pins_do_not_hold_goes_to_superlu(monkeypatch):
     monkeypatch.setattr(networks, "PINNED", 0)
     mesh = MESH_TYPES["structured"](0.1, 0.02, 2.5e-3)
-    network = problem_on(mesh, -half_weight(mesh)).network
+    network = problem_on(mesh, -half_weight(mesh), "Cholesky").network
     factor = network.factorize_tangent()
     assert (factor.name, factor.negative_pivots) == ("SuperLU", network.unknowns)
 
@@ -201,7 +202,7 @@ def test_what_pins_do_not_hold_goes_to_superlu(monkeypatch):
 def test_a_stable_tangent_after_an_unstable_one_has_the_factor_that_it_always_has(monkeypatch):
     monkeypatch.setattr(networks, "PINNED", 0)
     mesh = MESH_TYPES["structured"](0.2, 0.01, 2.5e-3)
-    fresh, used = problem_on(mesh), problem_on(mesh)
+    fresh, used = (problem_on(mesh, solver="Cholesky") for _ in range(2))
     bent = -5e-3 * used.slope / np.abs(used.slope).max()
     assert used.network.factorize_tangent(bent).name == "pinned Cholesky"
     ours, theirs = (problem.network.factorize_tangent(1e-6 * bent) for problem in (fresh, used))
@@ -215,6 +216,82 @@ def test_particles_that_are_spread_are_far_from_each_other():
     apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(len(points))
     assert len(points) == 16 and apart.min() > 0.5 * (mesh.area / 16) ** 0.5
     assert len(spread(points[:3], 8)) == 2
+
+
+# -- multigrid ---------------------------------------------------------------------------------------------------------
+
+
+def iterative(network, displacements=None, otherwise=None):
+    return Multigrid(network.tangent(displacements).T, network.mesh.points, np.flatnonzero(~network.held), otherwise)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), spacing=st.floats(0.05, 3.0))
+def test_grids_hold_rigid_motions_and_even_strains(seed, spacing):
+    """Bilinear interpolation of a linear field is the field, wherever particles are."""
+    generator = np.random.default_rng(seed)
+    points = generator.uniform(0, [1.0, 0.3], (40, 2))
+    held_none = np.arange(80)
+    prolong, nodes = bilinear(points, held_none, spacing)
+    strain, motion = generator.standard_normal((2, 2)), generator.standard_normal(2)
+    fine, coarse = ((at @ strain + motion).ravel() for at in (points, nodes))
+    assert np.abs(prolong @ coarse - fine).max() <= 1e-5  # single precision
+    assert np.array_equal((prolong.toarray() != 0).any(axis=1), np.ones(80, dtype=bool))
+
+
+@pytest.mark.parametrize("mesh_type", MESH_TYPES)
+def test_multigrid_gives_what_a_factorization_gives_in_few_steps(mesh_type, monkeypatch):
+    """Not by many steps: of 2,500 unknowns conjugate gradients alone take some hundred."""
+    mesh = MESH_TYPES[mesh_type](0.1, 0.04, 1.8e-3)
+    problem = problem_on(mesh)
+    factor = iterative(problem.network)
+    monkeypatch.setattr("springtune.linalg.multigrid.MAX_CG_ITERATIONS", 40)
+    solution, exact = factor.solve(problem.load), problem.rest_factor.solve(problem.load)
+    assert np.abs(solution - exact).max() <= 1e-9 * np.abs(exact).max()
+    assert (factor.name, factor.negative_pivots) == ("multigrid", 0)
+
+
+def test_multigrid_meets_what_is_unstable_without_being_shown_where(monkeypatch):
+    """The load stretches the beam and does not bend it; yet the random residual besides finds that it buckles."""
+    mesh = MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
+    problem = problem_on(mesh)
+    pressed = -5e-3 * problem.slope / np.abs(problem.slope).max()
+    exact = problem.network.factorize_tangent(pressed)
+    assert exact.negative_pivots > 0
+    with pytest.raises(IndefiniteError):
+        iterative(problem.network, pressed).solve(problem.load)
+    assert iterative(problem.network, pressed).negative_pivots == 1
+    taken_over = iterative(problem.network, pressed, lambda: exact)
+    assert np.array_equal(taken_over.solve(problem.load), exact.solve(problem.load))
+    assert (taken_over.name, taken_over.negative_pivots) == (exact.name, exact.negative_pivots)
+
+
+def test_a_large_network_takes_multigrid_and_an_unstable_one_a_factor_with_pins(monkeypatch):
+    """As a million particles do, with limits that 3,000 unknowns are beyond."""
+    for name, limit in (("LARGE", 100), ("LARGEST", 100), ("PINNED", 100)):
+        monkeypatch.setattr(networks, name, limit)
+    monkeypatch.setattr(networks, "CHOLESKY", True)
+    mesh = MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
+    ours, theirs = problem_on(mesh), problem_on(mesh, solver="Cholesky")
+    for s in (2e-4, -1e-7):
+        found, exact = ours.nonlinear(s), theirs.nonlinear(s)
+        assert found.converged and found.factor.name == "multigrid" and exact.factor.name == "Cholesky"
+        assert np.abs(found.displacements - exact.displacements).max() <= 1e-8 * np.abs(exact.displacements).max()
+        assert ours.judge(s, found)[0] is theirs.judge(s, exact)[0] is Status.SOLVED
+    pressed = -5e-3 * ours.slope / np.abs(ours.slope).max()
+    factors = [problem.network.factorize_tangent(pressed) for problem in (ours, theirs)]
+    assert factors[0].negative_pivots == factors[1].negative_pivots > 0
+    assert factors[0].name == "pinned Cholesky"
+
+
+@pytest.mark.slow
+def test_a_million_particles_take_3_gigabytes():
+    """The memory of the scene's process is the same in every run; seconds depend on the machine."""
+    from runpy import run_path
+
+    found = run_path("tools/million.py")["apart"]("scene", "delingette", "linear", "4 MN", 1e6)
+    assert found["status"] == "solved" and found["solver"] == "multigrid" and found["error"] <= 1e-9
+    assert found["memory"] <= 3.0
 
 
 # -- order of elimination ----------------------------------------------------------------------------------------------

@@ -13,8 +13,8 @@ from .factors import Factor, SingularError
 RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
 
-STEP = 1e-4
-"""The same of a step of Newton's method, whose tangent leaves about as much."""
+STEP_RESIDUAL = 1e-6
+"""The same of a step of Newton's method, whose tangent leaves more."""
 
 MAX_CG_ITERATIONS = 300
 
@@ -27,6 +27,9 @@ COARSENING = 3.0
 
 COARSEST = 500
 """Unknowns below which the coarsest matrix is factorized, as a dense one."""
+
+MOST_BORROWED = 50
+"""Iterations with the grids of another matrix from which on those of its own take less time."""
 
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
@@ -70,6 +73,13 @@ class Multigrid:
     otherwise : callable, optional
         Makes the factor that takes over where conjugate gradients do not end, or meet a direction without stiffness;
         that is an error without.
+    like : Multigrid, optional
+        Of a matrix that differs little, such as that at rest: its grids serve as long as they do.
+
+    Attributes
+    ----------
+    name : str
+        ``"multigrid"``, or that of the factor that took over.
     """
 
     def __init__(
@@ -78,13 +88,25 @@ class Multigrid:
         points: np.ndarray,
         places: np.ndarray,
         otherwise: Callable[[], Factor] | None = None,
+        like: "Multigrid | None" = None,
     ) -> None:
-        self._matrix, self._otherwise = matrix, otherwise
+        self._matrix, self._otherwise, self._points, self._places = matrix, otherwise, points, places
+        self.name = "multigrid"
         self._direct: Factor | None = None
+        self._certain = False
         self._levels: list[_Level] = []
-        self._certain, self._coarsest = False, None
+        self._coarsest: Any = None
+        self._borrowed = like is not None and like._coarsest is not None
+        if like is not None and self._borrowed:
+            self._levels, self._coarsest = like._levels, like._coarsest
+        else:
+            self._lay_grids()
+
+    def _lay_grids(self) -> None:
+        """Levels and the factor of the coarsest one, of the matrix itself."""
+        self._borrowed, self._levels, self._coarsest = False, [], None
         try:
-            self._coarsest = self._coarsened(points, places)
+            self._coarsest = self._coarsened(self._points, self._places)
         except LinAlgError:  # then the matrix is not positive definite either
             self._levels = []
 
@@ -106,23 +128,20 @@ class Multigrid:
             matrix, spacing = coarse, 2.0 * spacing
         return cho_factor(matrix.toarray())
 
-    @property
-    def name(self) -> str:
-        """``"multigrid"``, or that of the factor that took over."""
-        return "multigrid" if self._direct is None else self._direct.name
-
     def _give_up(self, error: NotPositiveError) -> Factor:
         """The factor that takes over."""
         if self._otherwise is None:
             raise error
         self._levels = []
         self._direct = self._otherwise()
+        self.name = self._direct.name
         return self._direct
 
     def _precondition(self, right: np.ndarray) -> np.ndarray:
         """What a cycle makes of a right-hand side."""
         size = np.linalg.norm(right) or 1.0
-        return size * self._cycle(0, (right / size).astype(np.float32)).astype(float)
+        single = np.multiply(right, 1.0 / size, out=np.empty(len(right), dtype=np.float32), casting="same_kind")
+        return np.multiply(self._cycle(0, single), size, dtype=float)
 
     def _cycle(self, depth: int, right: np.ndarray) -> np.ndarray:
         from pyamg.amg_core import gauss_seidel
@@ -133,7 +152,9 @@ class Multigrid:
         entries, last = (matrix.indptr, matrix.indices, matrix.data), len(right) - 1
         solution = np.zeros_like(right)
         gauss_seidel(*entries, solution, right, 0, last + 1, 1)
-        solution += prolong @ self._cycle(depth + 1, restrict @ (right - matrix @ solution))
+        missing = matrix @ solution
+        np.subtract(right, missing, out=missing)
+        solution += prolong @ self._cycle(depth + 1, restrict @ missing)
         gauss_seidel(*entries, solution, right, last, -1, -1)
         return solution
 
@@ -183,14 +204,18 @@ class Multigrid:
             missing -= self._matrix @ solution
         better = self._precondition(missing)
         direction, weight = better.copy(), missing @ better
-        for _ in range(MAX_CG_ITERATIONS):
+        for count in range(MAX_CG_ITERATIONS):
+            if self._borrowed and count == MOST_BORROWED:
+                self._lay_grids()
+                return solution + self._gradients(missing, float(tolerance * scale / np.linalg.norm(missing)))
             forces = self._matrix @ direction
             stiffness = direction @ forces
             if not stiffness > 0 or not weight > 0:
                 raise IndefiniteError("a direction without stiffness: the tangent is singular or unstable")
             length = weight / stiffness
-            solution += length * direction
-            missing -= length * forces
+            forces *= length
+            missing -= forces
+            solution += np.multiply(direction, length, out=forces)
             if np.linalg.norm(missing) <= tolerance * scale:
                 self._certain |= proves
                 return solution
@@ -202,7 +227,7 @@ class Multigrid:
 
     def step(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, so far as a step of Newton's method goes."""
-        return self.solve(right, STEP)
+        return self.solve(right, STEP_RESIDUAL)
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, to a percent."""

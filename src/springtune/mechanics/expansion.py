@@ -45,6 +45,8 @@ class Expansion:
     order : int, optional
     turning : bool, optional
         Whether the parameter is the way along the path.
+    rough : bool, optional
+        Whether Newton's method corrects what is left of a solve.
 
     Attributes
     ----------
@@ -75,9 +77,11 @@ class Expansion:
         factor: Factor,
         order: int = ORDER,
         turning: bool = False,
+        rough: bool = False,
     ) -> None:
         self.s, self.order, self.turning = s, 0, turning
-        self._network, self._load, self._factor = network, load, factor
+        self._network, self._load = network, load
+        self._solve = factor.step if rough else factor.solve
         self.coefficients = np.zeros((1, *network.held.shape))
         if displacements is not None:
             self.coefficients[0] = displacements
@@ -113,7 +117,7 @@ class Expansion:
                 inverse[n] = -inverse[0] * np.einsum("ni,ni->i", length[1 : n + 1], inverse[n - 1 :: -1])
                 known = np.einsum("ni,nji->ji", inverse[1 : n + 1], d[n - 1 :: -1])
                 right = -network.gather((weight * known).T)
-            change = self._factor.solve(right)
+            change = self._solve(right)
             if n == 1:
                 self._first = change
             elif self.turning:

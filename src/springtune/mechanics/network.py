@@ -449,7 +449,9 @@ class Network:
 
         takes_over = symmetric and CHOLESKY and self.solver is None and self.unknowns <= FACTORIZED
         rows = matrix.T if symmetric else matrix.tocsr()
-        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if takes_over else None)
+        at_rest = self.__dict__.get("rest_factor")
+        like = at_rest if isinstance(at_rest, Multigrid) else None
+        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if takes_over else None, like)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

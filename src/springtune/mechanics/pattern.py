@@ -15,8 +15,8 @@ from .energies import Energy
 DISSECTED = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
 
-PINNED = (8, 32)
-"""Particles that are pinned where the matrix is indefinite: so many, and so many more where these do not hold it."""
+PIN_PARTICLES = (8, 32)
+"""Particles that are pinned where the matrix is indefinite: so many, or so many where these do not hold it."""
 
 
 class Pattern:
@@ -104,7 +104,7 @@ class Pattern:
     @cached_property
     def pins(self) -> list[np.ndarray]:
         """Unknowns to pin where the matrix is indefinite: those of particles spread over the mesh."""
-        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PINNED)
+        chosen = (self.number[spread(self.mesh.points, count)].ravel() for count in PIN_PARTICLES)
         return [pins[pins >= 0] for pins in chosen]
 
     @cached_property

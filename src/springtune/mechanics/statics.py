@@ -113,11 +113,6 @@ class StaticProblem:
         return self.network.rest_factor
 
     @cached_property
-    def _pull(self) -> np.ndarray:
-        """Load of the linear network over ``s``, less what prescribed displacements take [1], shape (unknowns,)."""
-        return self.load if self.given is None else self.load - self.network.linear_resistance(self.given)
-
-    @cached_property
     def _slope(self) -> tuple[np.ndarray, float, float]:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
 
@@ -125,7 +120,11 @@ class StaticProblem:
             missing = self.load - self.network.linear_resistance(slope)
             return missing, norm(missing) / self.load_norm
 
-        first = self.moved(1.0, self.network.expand(self.rest_factor.solve(self._pull)))
+        if self.given is None:
+            first = self.network.expand(self.rest_factor.solve(self.load))
+        else:
+            pull = self.load - self.network.linear_resistance(self.given)
+            first = self.given + self.network.expand(self.rest_factor.solve(pull))
         here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
         return here.displacements, here.residual, error
 
@@ -137,7 +136,7 @@ class StaticProblem:
     @cached_property
     def start(self) -> Expansion:
         """Short series about rest: where Newton's method starts."""
-        return Expansion(self.network, self.load, 0.0, None, self.rest_factor, order=START_ORDER)
+        return Expansion(self.network, self.load, 0.0, None, self.rest_factor, order=START_ORDER, rough=True)
 
     @cached_property
     def rest(self) -> Expansion:
@@ -293,10 +292,7 @@ class StaticProblem:
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
-        if self.rest_factor.name == "multigrid":
-            # A start needs no more than a step does; each order of the series would take as long.
-            starts.insert(0, lambda s: self.moved(s, s * self.network.expand(self.rest_factor.step(self._pull))))
-        elif not self.network.energies and self.follower is None and self.given is None:
+        if not self.network.energies and self.follower is None and self.given is None:
             # The series is of springs under dead loads.
             starts.insert(0, lambda s: self.start.predict(s))
         for start in starts:

@@ -41,7 +41,7 @@ ROOT = Group(
         "solver": (
             SCENE,
             "1",
-            "what solved: Cholesky, SuperLU or multigrid, by what is installed and the number of unknowns",
+            "what solved: (pinned) Cholesky, SuperLU or multigrid, by what is installed and the number of unknowns",
             "",
         ),
         "definition_seconds": (SCENE, "s", "time to derive the springs' parameters, shared by loads", np.nan),
