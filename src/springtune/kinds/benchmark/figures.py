@@ -141,7 +141,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     if not there:
         labels.say(panel, f"No approach has an error: {_statuses(case)}.")
         return panel
-    labels.note(panel, _lost(case), below=0.62)
+    labels.note(panel, _lost(case), below=-0.16)
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
         panel.plot([seconds], [estimate], "*", color="black", markersize=7)
@@ -165,11 +165,7 @@ def _lost(case):
     """How many cases were asked for and have no numbers, in words; empty where all have."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
     asked, lost = int((flags != 0).sum()), int(((flags != 0) & (flags != Status.SOLVED)).sum())
-    return (
-        f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the page of the benchmark says why"
-        if lost
-        else ""
-    )
+    return f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the dataset says why" if lost else ""
 
 
 def _statuses(case):

@@ -46,6 +46,9 @@ BRIEF = 0.05
 LONG = 0.4
 """Cases above these seconds run once."""
 
+BESIDE = 10.0
+"""Seconds of the processor that a case takes at most besides its longest run, imports and all."""
+
 UPDATES = 4_000_000
 """Springs that an explicit run advances, each step counted anew,"""
 
@@ -218,10 +221,10 @@ def _case(scene, approach, size, meshes, most_seconds, once=False):
             made.edges  # noqa: B018  computed when first asked for
             meshes[mesh_type, size] = made, time.perf_counter() - begin
         mesh, meshing = meshes[mesh_type, size]
-    return _in_process(_repeat, most_seconds, scene, approach, size, mesh, meshing, once)
+    return in_process(_repeat, most_seconds, scene, approach, size, mesh, meshing, once)
 
 
-def _in_process(function, most_seconds, *arguments):
+def in_process(function, most_seconds, *arguments):
     """What a function finds in a process of its own, or what became of it: `status`, `message`, and whether `beyond`.
 
     Parameters
@@ -250,7 +253,8 @@ def _in_process(function, most_seconds, *arguments):
     except EOFError:
         process.join()
         if process.exitcode == -signal.SIGPROF:
-            limits = f"{_limit(most_seconds)}, or within the limits of the study"
+            own = not left or left > most_seconds + BESIDE
+            limits = _limit(most_seconds) if own else f"{_limit(most_seconds)}, or what is left of the study's `limits`"
             return _hole(f"not done within {limits}") | {"beyond": True}
         return _hole("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
     finally:
@@ -330,7 +334,7 @@ def curves(scene, size, most_seconds):
     dict of str to ndarray, shape (n_counts,)
         And what became of them.
     """
-    found = _in_process(_curves, most_seconds, scene, size)
+    found = in_process(_curves, most_seconds, scene, size)
     if "status" in found:
         return {"curve_status": found["status"], "curve_message": np.array(found["message"], dtype=object)}
     return found | {"curve_status": Status.SOLVED, "curve_message": np.array("", dtype=object)}
@@ -371,7 +375,7 @@ def solvers(scene, sizes, most_seconds):
             if name == "Cholesky" and not factors.CHOLESKY:
                 found = _hole("CHOLMOD is not installed; install springtune[cholesky]")
             else:
-                found = _in_process(_solver, most_seconds, scene, mesh, name)
+                found = in_process(_solver, most_seconds, scene, mesh, name)
             _note(found, arrays, status, message, (i, j))
     return arrays | {"solver_status": status, "solver_message": message}
 
@@ -390,7 +394,7 @@ def _solver(alarm, scene, mesh, name):
     return {"solver_seconds": seconds[2], "solver_again_seconds": seconds[3]}
 
 
-def explicit(scene, sizes, most_seconds):
+def explicit(scene, sizes, most_seconds, updates=UPDATES):
     """Explicit steps a second of nonlinear springs, and the memory that they move, beside a plain copy of memory.
 
     A step reads each spring's end, rest vector, length and stiffness once, and of each particle four vectors, two of
@@ -406,19 +410,19 @@ def explicit(scene, sizes, most_seconds):
     arrays["explicit_error"] = np.full((shape[0], shape[2]), np.nan)
     status, message = _blank(shape[:1])
     for j, size in enumerate(sizes):
-        found = _in_process(_explicit, most_seconds, scene, size)
+        found = in_process(_explicit, most_seconds, scene, size, updates)
         _note(found, arrays, status, message, (j,))
     copied = [_copied(count) for count in THREAD_COUNTS]
     return arrays | {"explicit_status": status, "explicit_message": message, "copy_bandwidth": np.array(copied)}
 
 
-def _explicit(alarm, scene, size):
+def _explicit(alarm, scene, size, updates):
     mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
     sheet = Sheet(mesh, scene.beam.thickness)
     springs, _ = sheet.derive("lattice", scene.material)
     motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force)
     step = 0.9 * motion.step_bound("central-difference")
-    steps = max(FEWEST_STEPS, round(UPDATES / len(mesh.edges)))
+    steps = max(FEWEST_STEPS, round(updates / len(mesh.edges)))
     seconds, ends = np.full((len(THREAD_COUNTS), len(PRECISIONS)), np.nan), []
     for k, precision in enumerate(PRECISIONS):
         for t, threads in enumerate(THREAD_COUNTS):

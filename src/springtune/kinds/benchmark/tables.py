@@ -149,13 +149,13 @@ def _solvers(data):
 
 
 def _curve(data):
+    if data.curve_message.item():
+        return [f"None was timed: {data.curve_message.item()}."]
     rows = [
         [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
         for count in data.curve_count.values
     ]  # fmt: skip
     lines = markdown_table(["stiffnesses", "one path", "solve by solve"], rows)
-    if data.curve_message.item():
-        return [*lines, "", f"{data.curve_message.item()}."]
     return [*lines, "", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
             f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
 
