@@ -82,11 +82,6 @@ slow: $(VENV)/.test
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
-
-# The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
-million: $(VENV)/.run
-	OPENBLAS_NUM_THREADS=1 python tools/million.py --write
-
 lint: $(VENV)/.test
 	sh tools/lint.sh
 
@@ -108,6 +103,10 @@ results/quick/dataset.nc: | $(VENV)/.run
 # The pictures of the pages, from their studies; the benchmark among them takes minutes.
 pictures: $(VENV)/.run
 	python tools/pictures.py
+
+# The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
+million: $(VENV)/.run
+	OPENBLAS_NUM_THREADS=1 python tools/million.py --write
 
 # What studies of a thousand to a hundred thousand scenes take, into docs/scale.md; some minutes.
 scale: $(VENV)/.run

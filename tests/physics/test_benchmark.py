@@ -1,5 +1,10 @@
 """The approaches of the benchmark against each other and the reference, and how a case is run."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +17,7 @@ from springtune.kinds.benchmark.measure import LoadedBeam
 from springtune.kinds.benchmark.names import OTHER_APPROACHES, approach_names
 from springtune.kinds.benchmark.tables import comparison
 from springtune.kinds.benchmark.variables import BENCHMARK
+from springtune.linalg import SOLVERS
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
@@ -85,7 +91,12 @@ def test_calculix_takes_part(name, references):
     assert answer(SCENES[name], "calculix-cps8")[0] == pytest.approx(references[name], rel=2e-3)
 
 
-def test_a_case_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
+def asked(sizes, approaches, **shortest):
+    """The shortest size of each approach; the shortest of all of those that are not named."""
+    return [shortest.get(name.replace("-", "_").replace("/", "_"), min(sizes)) for name in approaches]
+
+
+def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
     approaches = approach_names(["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "free-form"])
     assert approaches == (
         "lattice/structured",
@@ -94,23 +105,108 @@ def test_a_case_has_the_shapes_of_the_dataset_and_leaves_out_what_takes_long():
         "linear-triangles",
         "free-form",
     )
-    found = benchmark.run(SCENES["traction"], approaches, (2e-3, 5e-3, 1e-2), 1e-6, ["lattice/braced"], 10.0)
+    wanted = (2e-3, 5e-3, 1e-2)
+    finest = asked(wanted, approaches, lattice_structured=1e-2)
+    found = benchmark.run(SCENES["traction"], approaches, wanted, finest, 30.0)
     sizes = {"scene": 1, "approach": len(approaches), "mesh_size": 3}
     for name, values in found.items():
         assert np.shape(values) == tuple(sizes[one] for one in BENCHMARK.variables[name][0] if one != "scene"), name
     assert np.isfinite(found["seconds"][1]).all() and np.isfinite(found["seconds"][0]).tolist() == [False, False, True]
-    assert "left out" in found["message"][0, 0] and (found["peak_memory"][1] >= 0).all()
+    assert found["status"][0].tolist() == [Status.NOT_REQUESTED, Status.NOT_REQUESTED, Status.SOLVED]
+    assert not found["message"].any() and (found["peak_memory"][1] >= 0).all()
     assert np.abs(found["error"][2, 2]) < 0.01
     parts = sum(found[f"{part}_seconds"][1] for part in benchmark.PARTS)
     assert (parts > 0).all() and (found["factorizing_seconds"][1] > 0).all()
+
+
+def test_what_is_run_does_not_depend_on_the_machine(monkeypatch):
+    approaches, sizes = ("lattice/structured", "linear-triangles"), (5e-3, 1e-2)
+    quick = benchmark.run(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
+    clock = time.perf_counter
+    monkeypatch.setattr(time, "perf_counter", lambda: 1e4 * clock())  # all takes ten thousand times as long
+    slow = benchmark.run(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
+    assert (slow["seconds"] > 1.0).all() and (slow["status"] == quick["status"]).all()
+    assert (quick["status"] == Status.SOLVED).all() and (slow["error"] == quick["error"]).all()
+
+
+def ended_by(number, below):
+    """Approach that ends as if the machine were too slow, or too small, for sizes below one."""
+
+    def approach(scene, size, clock):
+        if size < below:
+            os.kill(os.getpid(), number)
+        return APPROACHES["free-form"](scene, size, clock)
+
+    return approach
+
+
+@pytest.mark.parametrize(
+    ("number", "message"),
+    [
+        (signal.SIGPROF, "not done within 30 s of the processor (`most_seconds` of the benchmark)"),
+        (signal.SIGKILL, "ended: by the limits of the study, or for lack of memory"),
+    ],
+)
+def test_what_a_machine_cannot_do_is_a_hole_that_says_so(number, message, monkeypatch):
+    """Limits of time and memory, as on a slow machine: cells with status and message, and the others are measured."""
+    approaches, sizes = ("relaxation", "linear-triangles"), (2e-3, 4e-3, 5e-3, 1e-2)
+    monkeypatch.setitem(APPROACHES, "relaxation", ended_by(number, below=4.5e-3))
+    second = Beam(0.06, 0.015, 1e-3, "60x15")
+    found = benchmark.run(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0, second)
+    assert found["status"][0].tolist() == [Status.FAILED, Status.FAILED, Status.SOLVED, Status.SOLVED]
+    assert message in found["message"][0, 1]
+    assert found["message"][0, 0].startswith("not run: at 4 mm it was ")
+    assert (found["status"][1] == Status.SOLVED).all() and not found["message"][1].any()
+    assert np.isnan(found["seconds"][0, :2]).all() and np.isfinite(found["seconds"][0, 2:]).all()
+    assert found["second_status"][0].tolist() == [0, 0, Status.SOLVED, Status.SOLVED]
+
+
+def test_seconds_of_the_processor_end_a_run():
+    """Of the process, and of a program that it starts."""
+
+    def spin(alarm):
+        while True:
+            pass
+
+    found = benchmark.in_process(spin, 0.05)
+    assert found["status"] == Status.FAILED and found["beyond"] and "not done within 0.05 s" in found["message"]
+
+    def call(alarm):
+        subprocess.run([sys.executable, "-c", "while True: pass"])
+        raise RuntimeError("the program failed")
+
+    found = benchmark.in_process(call, 0.05)
+    assert found["status"] == Status.FAILED and "not done within 0.05 s" in found["message"]
+
+
+def test_parts_beside_the_cases_are_holes_too():
+    """Each takes hundreds of the milliseconds that it has."""
+    scene, sizes, most = SCENES["traction"], (2e-3,), 1e-3
+    curves = benchmark.curves(scene, 2e-3, most)
+    assert curves["curve_status"] == Status.FAILED and "not done within 0.001 s" in curves["curve_message"].item()
+    steps = benchmark.explicit(scene, sizes, most)
+    assert (steps["explicit_status"] == Status.FAILED).all() and steps["explicit_message"].all()
+    systems = benchmark.solvers(scene, sizes, most)
+    multigrid = SOLVERS.index("multigrid")
+    assert systems["solver_status"][multigrid] == Status.FAILED and systems["solver_message"][multigrid].all()
+
+
+def test_explicit_steps_are_timed_in_threads_and_precisions():
+    found = benchmark.explicit(SCENES["traction"], (5e-3, 1e-2), 30.0, updates=1)
+    assert (found["explicit_status"] == Status.SOLVED).all() and (found["spring_updates"] > 0).all()
+    springs = len(MESH_TYPES["structured"](0.1, 0.02, 5e-3).edges)
+    assert found["spring_updates"][0] == pytest.approx(springs * found["explicit_steps"][0])
+    assert (found["explicit_error"][:, 0] == 0).all() and (found["explicit_error"][:, 1] > 0).all()
+    assert (found["explicit_error"] < 1e-4).all() and (found["copy_bandwidth"] > 0).all()
 
 
 def test_errors_are_checked_on_a_second_beam():
     """A definition's error there is what a run of that beam has, and the assured error is the largest of all."""
     second = Beam(0.06, 0.015, 1e-3, "60x15")
     approaches, sizes = ("lattice/structured", "linear-triangles"), (2e-3, 5e-3)
-    found = benchmark.run(SCENES["block"], approaches, sizes, 10.0, second_beam=second)
-    there = benchmark.run(replace(SCENES["block"], beam=second), approaches, sizes, 10.0)
+    finest = asked(sizes, approaches)
+    found = benchmark.run(SCENES["block"], approaches, sizes, finest, 30.0, second_beam=second)
+    there = benchmark.run(replace(SCENES["block"], beam=second), approaches, sizes, finest, 30.0)
     assert found["second_error"] == pytest.approx(there["error"], rel=1e-9)
     assert np.isnan(found["assured_error"][:, 0]).all()  # nothing finer was run
     both = np.abs([found["error"], found["second_error"]])
@@ -127,7 +223,7 @@ def test_an_error_that_crosses_zero_or_stays_has_no_order():
 
 
 def test_a_case_that_fails_is_stored_with_its_message():
-    found = benchmark.run(SCENES["traction"], ("van-gelder/braced",), (5e-3,), 1.0)
+    found = benchmark.run(SCENES["traction"], ("van-gelder/braced",), (5e-3,), (5e-3,), 30.0)
     assert found["status"][0, 0] == Status.FAILED and found["message"][0, 0]
 
 

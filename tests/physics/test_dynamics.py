@@ -440,15 +440,15 @@ def test_a_standing_wave_on_a_chain_has_its_closed_form(linear, precision, error
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 @pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("linear", [False, True])
-def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, precision, monkeypatch):
-    monkeypatch.setattr(stepping, "FEWEST", 20)
-    motion = beam(mesh_type="free", linear=linear, mass_damping=20.0)
+def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, precision):
+    motion = beam(mesh_type="free", size=6e-4, linear=linear, mass_damping=20.0)
+    step = 0.5 * motion.step_bound("symplectic-euler")
+    assert len(motion.network.mesh.edges) >= 3 * stepping.FEWEST
     if damped:
-        motion = with_(motion, dampers=1e-7 * motion.network.stiffness)
-    step = 0.5 * motion.step_limit("symplectic-euler")
+        motion = with_(motion, dampers=0.05 * step * motion.network.stiffness)
     runs = [
         motion.run("central-difference", step, 101, sample=33, precision=precision, threads=count)
-        for count in (1, 2, 3, 50)
+        for count in (1, 2, 3)
     ]
     for run in runs[1:]:
         assert (run.displacements == runs[0].displacements).all() and (run.velocities == runs[0].velocities).all()
@@ -459,26 +459,26 @@ def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, prec
 def test_parts_of_a_network_have_all_of_it_once():
     pointers = beam(mesh_type="free", size=1e-3).stiffness_matrix.indptr
     for threads in (1, 2, 7):
-        parts = stepping._parts(pointers, threads)
+        parts = stepping.parts_of(pointers, threads)
         assert len(parts) == threads and parts[0][0] == 0 and parts[-1][1] == len(pointers) - 1
         assert all(one[1] == other[0] and one[0] < one[1] for one, other in zip(parts, parts[1:]))
-    assert stepping._parts(pointers, 10**6)[0][1] > 1  # not more than have enough to do
+    assert stepping.parts_of(pointers, 10**6)[0][1] > 1  # not more than have enough to do
 
 
 @pytest.mark.parametrize("broken", [0, 1])
-def test_a_part_that_fails_ends_the_others(broken, monkeypatch):
-    monkeypatch.setattr(stepping, "FEWEST", 20)
-    motion = beam()
+def test_a_part_that_fails_ends_the_others(broken):
+    motion = beam(size=7e-4)
+    assert len(motion.network.mesh.edges) >= 2 * stepping.FEWEST
     stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
     stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
-    taken = stepper._function
+    taken = stepper.function
 
     def function(part, *arguments):
         if part == broken:
             raise MemoryError("no room")
         taken(part, *arguments)
 
-    stepper._function = function
+    stepper.function = function
     with pytest.raises(MemoryError, match="no room"):
         stepper.advance(10)
     stepper.close()

@@ -888,12 +888,22 @@ class TestBenchmark:
         assert (case.beam.name, case.second_beam.name, case.second_beam.height) == ("long", "short", 0.02)
         assert load(TIMED.replace("  second_beam: short\n", "")).parts["benchmark"][0].second_beam is None
 
+    def test_sizes_are_those_of_the_study(self, load):
+        text = TIMED.replace("\ngrids", "\n  finest: 5 mm\n  finest_of: {relaxation: 2 mm}\ngrids")
+        case = load(text).parts["benchmark"][0]
+        assert dict(zip(case.approaches, case.finest))["relaxation"] == 2e-3
+        assert {size for name, size in zip(case.approaches, case.finest) if name != "relaxation"} == {5e-3}
+        assert set(load(TIMED).parts["benchmark"][0].finest) == {2e-3}
+
     @pytest.mark.parametrize(
         ("old", "new", "message"),
         [
             ("second_beam: short", "second_beam: shirt", "unknown beam 'shirt'; did you mean 'short'?"),
             ("mesh_size: [2 mm, 5 mm]\ngrids", "mesh_size: 12 mm\ngrids", "12 mm is too large for 'short'"),
+            ("\ngrids", "\n  finest: 3 mm\ngrids", "3 mm is no mesh size of this benchmark; choose of 2 mm, 5 mm"),
+            ("\ngrids", "\n  finest_of: {lattice/right: 5 mm}\ngrids", "'lattice/right' is no approach of this"),
+            ("\ngrids", "\n  finest_of: {relaxation: 1 mm}\ngrids", "1 mm is no mesh size of this benchmark"),
         ],
     )
-    def test_unfit_second_beams_are_refused(self, refusal, old, new, message):
+    def test_unfit_beams_and_sizes_are_refused(self, refusal, old, new, message):
         assert old in TIMED and message in refusal(TIMED.replace(old, new))

@@ -142,7 +142,7 @@ SIZES_RUN = (1e-3, 2e-3, 5e-3, 1e-2)
 def timed(errors, second, seconds=(0.08, 0.02, 0.004, 0.001)):
     """Group of a benchmark of made-up errors, from the finest mesh size to the coarsest, approach by approach."""
     axes = {"scene": ("traction",), "approach": tuple(errors), "mesh_size": SIZES_RUN, "linear_solver": ("SuperLU",),
-            "curve_count": (1,)}  # fmt: skip
+            "curve_count": (1,), "thread_count": (1, 2), "precision": ("float64", "float32")}  # fmt: skip
     data = BENCHMARK.empty(axes)
     data["machine_load"].values[:] = 0.0
     data["error"].values[0], data["second_error"].values[0] = list(errors.values()), list(second.values())
@@ -192,6 +192,24 @@ def test_without_a_second_beam_nothing_is_called_the_quickest():
     errors = {"steady": STEADY}
     text = benchmark.page(timed(errors, {"steady": [np.nan] * 4}))
     assert "no second beam" in text and "the quickest ways to an error" not in text
+
+
+def test_holes_of_the_benchmark_are_listed_by_their_reason():
+    tree = timed({"steady": STEADY, "slow": (np.nan, np.nan, 0.001, 0.002)}, {"steady": STEADY, "slow": STEADY})
+    data = tree["benchmark"].to_dataset()
+    data.status.values[:] = [[[1, 1, 1, 1], [5, 5, 1, 1]]]
+    data.message.values[0, 1, 1], data.message.values[0, 1, 0] = "not done within 30 s", "not run"
+    data["solver_status"].values[0, 2], data["solver_message"].values[0, 2] = 5, "no memory"
+    data["explicit_message"].values[:] = "not done"
+    text = benchmark.page(xr.DataTree.from_dict({"/benchmark": data}))
+    assert (
+        "### traction: what has no numbers\n\n- `slow` (1 mm): not run\n- `slow` (2 mm): not done within 30 s\n" in text
+    )
+    assert "- `SuperLU` (5 mm): no memory" in text and "None was timed: not done." in text
+    data["spring_updates"].values[:], data["explicit_bandwidth"].values[:] = 2e8, 1e10
+    data["explicit_error"].values[:], data["copy_bandwidth"].values[:] = 1e-6, 2e10
+    rows = tables(benchmark.page(xr.DataTree.from_dict({"/benchmark": data})))["Explicit steps"]
+    assert rows[0]["float32, 2 threads"] == "200, 10.0" and rows[0]["error, float32"] == "1.0e-06"
 
 
 def test_the_page_states_the_rule():

@@ -24,7 +24,7 @@ from numba.extending import intrinsic
 PATIENCE = 1000
 """Looks at another part, some microseconds, after which a waiting thread lets others have its core."""
 
-ROW = 8
+STRIDE = 8
 """Numbers of a part in what tells its progress: a line of the cache, which no other part writes."""
 
 
@@ -142,7 +142,7 @@ def advance_springs(
         State [m, m/s], from one to the other in turns where there are two: u needs two if there are several parts, v
         if there are dampers, too.
     steps : int
-    progress : ndarray of int64, shape (n_parts + 1, ROW)
+    progress : ndarray of int64, shape (n_parts + 1, STRIDE)
         Steps that each part has done, zeros; the last row is not zero where a part has failed.
     """
     damped, count = len(dampers) > 0, len(ghosts)
@@ -220,7 +220,7 @@ def advance_matrix(
     u, v : ndarray, shape (2, unknowns) and (1 or 2, unknowns)
         State, from one to the other in turns where there are two: v needs two if there are dampers.
     steps : int
-    progress : ndarray of int64, shape (n_parts + 1, ROW)
+    progress : ndarray of int64, shape (n_parts + 1, STRIDE)
         As of `advance_springs`.
     """
     damped = len(dampers) > 0

@@ -127,7 +127,7 @@ class ExplicitSteps(Stepper):
         self._back: Callable[..., np.ndarray]
         self._as = self._back = np.array
         self._numbers = self.kind(keep), self.kind(step)
-        self._function: Callable[..., None] | None = None
+        self.function: Callable[..., None] | None = None
         if motion.linear:
             self._of_matrix(motion.stiffness_matrix, gain, threads)
         elif network.energies:
@@ -150,10 +150,10 @@ class ExplicitSteps(Stepper):
             for values in (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, gain, motion.load)
         ]
         of_springs, of_points = numbers[:4], [*numbers[4:], np.empty(gain.shape, dtype=self.kind)]
-        self._function = advance_springs
+        self.function = advance_springs
         self._parts: list[tuple[Any, ...]] = []
         pointers = np.searchsorted(first, np.arange(len(gain) + 1))
-        for begin, end in _parts(pointers, threads):
+        for begin, end in parts_of(pointers, threads):
             crossing = np.flatnonzero((first < begin) & (second >= begin) & (second < end))
             ghosts, starts = np.unique(first[crossing], return_index=True)
             springs = np.r_[crossing, pointers[begin] : pointers[end]]
@@ -173,8 +173,8 @@ class ExplicitSteps(Stepper):
         index = matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32)
         numbers = matrix.data, damping, network.reduce(gain), network.reduce(motion.load)
         arrays = *index, *(np.ascontiguousarray(values, dtype=self.kind) for values in numbers)
-        self._function = advance_matrix
-        self._parts = [(*part, *arrays) for part in _parts(matrix.indptr, threads)]
+        self.function = advance_matrix
+        self._parts = [(*part, *arrays) for part in parts_of(matrix.indptr, threads)]
         self._as, self._back = network.reduce, network.expand
         self._states = 2, 1 + (len(damping) > 0)
 
@@ -186,7 +186,7 @@ class ExplicitSteps(Stepper):
             np.repeat(np.asarray(self._as(values), dtype=self.kind)[None], count, axis=0)
             for values, count in zip((u, v), self._states)
         )
-        if self._function is not None:
+        if self.function is not None:
             from .kernels import packed
 
             with packed():  # it is compiled
@@ -199,7 +199,7 @@ class ExplicitSteps(Stepper):
 
     def advance(self, steps: int) -> None:
         """See `Stepper`."""
-        if self._function is None:
+        if self.function is None:
             self._advance_energies(steps)
             return
         calls, progress = self._calls(steps)
@@ -228,11 +228,11 @@ class ExplicitSteps(Stepper):
 
     def _calls(self, steps: int) -> tuple[list[Callable[[], None]], np.ndarray]:
         """Steps of each part, and the progress by which parts wait for each other."""
-        from .kernels import ROW
+        from .kernels import STRIDE
 
-        progress = np.zeros((len(self._parts) + 1, ROW), dtype=np.int64)
+        progress = np.zeros((len(self._parts) + 1, STRIDE), dtype=np.int64)
         rest = *self._numbers, self._u, self._v, steps, progress
-        function = self._function
+        function = self.function
         assert function is not None
         return [partial(function, number, *part, *rest) for number, part in enumerate(self._parts)], progress
 
@@ -266,7 +266,7 @@ class ExplicitSteps(Stepper):
         return u, v
 
 
-def _parts(pointers: np.ndarray, threads: int) -> list[tuple[int, int]]:
+def parts_of(pointers: np.ndarray, threads: int) -> list[tuple[int, int]]:
     """Rows, from one to before another, of as many parts with as many entries as threads have enough to do.
 
     Parameters

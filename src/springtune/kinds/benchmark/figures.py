@@ -7,6 +7,7 @@ from ...output import labels, style
 from ...output.dataset import STATUS
 from ...output.selection import choose, group
 from ...problem.compare import unbeaten
+from ...problem.status import Status
 from .names import PARTS
 from .outputs import figures
 
@@ -140,6 +141,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     if not there:
         labels.say(panel, f"No approach has an error: {_statuses(case)}.")
         return panel
+    labels.note(panel, _lost(case), below=-0.16)
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
         panel.plot([seconds], [estimate], "*", color="black", markersize=7)
@@ -159,10 +161,17 @@ def _scene(data, scene):
     return data.sel(choose(data.scene.notnull(), scene=scene))
 
 
-def _statuses(case):
-    """What became of the cases of a scene, in words."""
+def _lost(case):
+    """How many cases were asked for and have no numbers, in words; empty where all have."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    found = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])]
+    asked, lost = int((flags != 0).sum()), int(((flags != 0) & (flags != Status.SOLVED)).sum())
+    return f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the dataset says why" if lost else ""
+
+
+def _statuses(case):
+    """What became of the cases of a scene that have no numbers, in words."""
+    flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
+    found = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[(flags != 0) & (flags != Status.SOLVED)])]
     return ", ".join(found) or "none was asked for"
 
 

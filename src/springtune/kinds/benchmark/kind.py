@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ...linalg import SOLVERS
+from ...mechanics.integrators import PRECISIONS
 from ...mesh import MESH_TYPES
 from ...problem.geometry import Beam
 from ...problem.loads import LOADS
@@ -24,12 +25,11 @@ from ...study.fields import (
     MeshType,
     Named,
     OneOrMore,
-    Text,
     number,
     one_of,
 )
 from ..base import Kind
-from .names import CURVE_COUNTS, OTHER_APPROACHES, approach_names
+from .names import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
 from .plan import STAGES
 
@@ -69,15 +69,17 @@ class BenchmarkConfig(Section):
         "the paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
     )
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    finest: Length | None = Field(None, description="The shortest of them that most approaches have; all without.")
+    finest_of: dict[str, Length] = Field(
+        default_factory=dict,
+        description="The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`.",
+    )
     most_seconds: Seconds = Field(
-        "0.2",
+        "30",
         validate_default=True,
-        description="Seconds that a run may take; a finer size that would take more is left out.",
+        description="Seconds of the processor that a run may take; what takes more is a hole that says so, and so are "
+        "finer sizes of it.",
     )
-    thorough: Annotated[list[Text], OneOrMore()] = Field(
-        [], validate_default=False, description="Approaches that may take more, such as `delingette/structured`."
-    )
-    most_thorough: Seconds = Field("8", validate_default=True, description="Seconds that a run of those may take.")
 
 
 @dataclass(frozen=True)
@@ -97,9 +99,10 @@ class Case:
     approaches : tuple of str
     mesh_sizes : tuple of float
         Lengths of an edge [m], ascending.
-    most_seconds, most_thorough : float
-        Seconds that a run may take: of most approaches, and of those below.
-    thorough : tuple of str
+    finest : tuple of float
+        The shortest edge of each approach [m].
+    most_seconds : float
+        Seconds of the processor that a run may take.
     second_beam : Beam or None
         Beam on which errors are checked.
     """
@@ -111,9 +114,8 @@ class Case:
     force: float
     approaches: tuple[str, ...]
     mesh_sizes: tuple[float, ...]
+    finest: tuple[float, ...]
     most_seconds: float
-    most_thorough: float
-    thorough: tuple[str, ...]
     second_beam: Beam | None
 
 
@@ -156,10 +158,17 @@ def _check(config, problems):
         if name not in MESH_TYPES:
             problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
     approaches = approach_names(section.definition, section.mesh_type, section.approach)
-    for name in section.thorough:
+    for name in section.finest_of:
         if name not in approaches:
             message = f"'{name}' is no approach of this benchmark; {nearest(name, approaches)}"
-            problems.add(("benchmark", "thorough"), message)
+            problems.add(("benchmark", "finest_of", name), message)
+    given = {("finest",): section.finest} | {("finest_of", name): size for name, size in section.finest_of.items()}
+    for place, size in given.items():
+        if size is not None and size not in section.mesh_size:
+            known = ", ".join(f"{1e3 * one:g} mm" for one in sorted(section.mesh_size))
+            problems.add(
+                ("benchmark", *place), f"{1e3 * size:g} mm is no mesh size of this benchmark; choose of {known}"
+            )
 
 
 def _expand(config, declared):
@@ -169,6 +178,8 @@ def _expand(config, declared):
     mesh_types = [name for name in MESH_TYPES if name in section.mesh_type]
     definitions = [name for name in DEFINITIONS if name in section.definition]
     others = [name for name in OTHER_APPROACHES if name in section.approach]
+    approaches = approach_names(definitions, mesh_types, others)
+    finest = section.finest or min(section.mesh_size)
     return tuple(
         Case(
             name,
@@ -176,11 +187,10 @@ def _expand(config, declared):
             declared.materials[scene.material],
             scene.load,
             LOADS[scene.load].sign * scene.force,
-            approach_names(definitions, mesh_types, others),
+            approaches,
             tuple(sorted(section.mesh_size)),
+            tuple(section.finest_of.get(name, finest) for name in approaches),
             section.most_seconds,
-            section.most_thorough,
-            tuple(sorted(section.thorough)),
             declared.beams[section.second_beam] if section.second_beam else None,
         )
         for name, scene in section.scenes.items()
@@ -193,6 +203,8 @@ def _axes(cases):
         "scene": tuple(one.name for one in cases),
         "approach": cases[0].approaches,
         "curve_count": CURVE_COUNTS,
+        "thread_count": THREAD_COUNTS,
+        "precision": PRECISIONS,
         "linear_solver": SOLVERS,
     }
 

@@ -26,6 +26,9 @@ PARTS = ("meshing", "assembling", "factorizing", "solving")
 CURVE_COUNTS = (1, 11, 61, 201)
 """Numbers of stiffnesses of the benchmark's sensitivity curves."""
 
+THREAD_COUNTS = (1, 2)
+"""Numbers of threads of the benchmark's explicit steps."""
+
 
 def approach_names(definitions: Iterable[str], mesh_types: Sequence[str], others: Iterable[str]) -> tuple[str, ...]:
     """Names of the approaches: ``definition/mesh type``, those that go together, and others."""

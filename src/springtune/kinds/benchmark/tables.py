@@ -7,6 +7,7 @@ import xarray as xr
 
 from ...jobs.atomic import write_text
 from ...output.tables import markdown_table
+from ...problem.status import Status
 from .names import PARTS
 from .outputs import PAGE
 
@@ -42,8 +43,12 @@ def page(tree: xr.DataTree) -> str:
         if np.isfinite(cells.assured_error).any():
             parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(cells), ""]
         parts += [f"### {scene}: approaches on one mesh size", "", *_one_size(cells), ""]
+        lost = _holes(cells.approach.values, cells.mesh_size.values, cells.status, cells.message)
+        if lost:
+            parts += [f"### {scene}: what has no numbers", "", *lost, ""]
     parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
-    return "\n".join([*parts, "### A sensitivity curve", "", *_curve(data), ""])
+    parts += ["### A sensitivity curve", "", *_curve(data), ""]
+    return "\n".join([*parts, "### Explicit steps", "", *_explicit(data), ""])
 
 
 def _time(seconds):
@@ -89,9 +94,24 @@ def _quickest(cells):
     return markdown_table(["error", "first", "second", "third"], rows)
 
 
+def _holes(approaches, sizes, status, message):
+    """What was asked for and has no numbers: a line a reason, with its approaches and mesh sizes."""
+    flags, words = (one.transpose(..., "mesh_size").values for one in (status, message))
+    found = {}
+    for i, approach in enumerate(approaches):
+        for j in np.flatnonzero((flags[i] != Status.NOT_REQUESTED) & (flags[i] != Status.SOLVED)):
+            found.setdefault(str(words[i, j]), {}).setdefault(str(approach), []).append(sizes[j])
+    lines = []
+    for why, places in found.items():
+        named = [f"`{name}` ({', '.join(f'{1e3 * size:g}' for size in at)} mm)" for name, at in places.items()]
+        lines.append(f"- {', '.join(named)}: {why}")
+    return lines
+
+
 def _one_size(cells):
-    """Error, seconds and memory on the finest size that half of the approaches have."""
-    counts = np.isfinite(cells.seconds.values).sum(axis=0)
+    """Error, seconds and memory on the finest size that half of the approaches are asked for."""
+    asked = (cells.status != Status.NOT_REQUESTED) | np.isfinite(cells.seconds)
+    counts = asked.transpose("approach", "mesh_size").values.sum(axis=0)
     place = int(np.flatnonzero(counts >= 0.5 * counts.max())[0])
     cells = cells.isel(mesh_size=place)
     order = np.argsort(np.abs(cells.error.values))
@@ -112,7 +132,9 @@ def _one_size(cells):
 
 def _solvers(data):
     first, again = data.solver_seconds, data.solver_again_seconds
-    sizes = [size for size in data.mesh_size.values if np.isfinite(first.sel(mesh_size=size)).any()]
+    status, message = data.solver_status, data.solver_message
+    asked = (status != Status.NOT_REQUESTED) | np.isfinite(first)
+    sizes = [size for size in data.mesh_size.values if asked.sel(mesh_size=size).any()]
     rows = [
         [f"{1e3 * size:g} mm"]
         + [
@@ -121,22 +143,48 @@ def _solvers(data):
         ]
         for size in sizes
     ]
-    return markdown_table(["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)], rows)
+    heads = ["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)]
+    lost = _holes(data.linear_solver.values, data.mesh_size.values, status, message)
+    return markdown_table(heads, rows) + (["", *lost] if lost else [])
 
 
 def _curve(data):
+    if data.curve_message.item():
+        return [f"None was timed: {data.curve_message.item()}."]
     rows = [
         [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
         for count in data.curve_count.values
     ]  # fmt: skip
     lines = markdown_table(["stiffnesses", "one path", "solve by solve"], rows)
-    lines += ["", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
-              f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
-    if "explicit_steps" in data and np.isfinite(data.explicit_steps):
-        lines += ["", f"Explicit steps of nonlinear springs: {float(data.explicit_steps):.0f} a second, which move "
-                  f"{float(data.explicit_bandwidth) / 1e9:.1f} GB/s; a plain copy of memory moves "
-                  f"{float(data.copy_bandwidth) / 1e9:.1f} GB/s."]  # fmt: skip
-    return lines
+    return [*lines, "", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
+            f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
+
+
+def _explicit(data):
+    """Rates of explicit steps, by threads and precision, beside a plain copy of memory; errors of single precision."""
+    rates, moved = data.spring_updates / 1e6, data.explicit_bandwidth / 1e9
+    ways = [(threads, kind) for kind in data.precision.values for threads in data.thread_count.values]
+    rows = []
+    for size in data.mesh_size.values[np.isfinite(rates).any(["thread_count", "precision"]).values]:
+        cells = [dict(mesh_size=size, thread_count=threads, precision=kind) for threads, kind in ways]
+        numbers = [f"{float(rates.sel(cell)):.0f}, {float(moved.sel(cell)):.1f}" for cell in cells]
+        wrong = float(data.explicit_error.sel(mesh_size=size, precision=data.precision.values[-1]))
+        rows.append([f"{1e3 * size:g} mm", *numbers, f"{wrong:.1e}"])
+    if not rows:
+        words = {str(word) for word in data.explicit_message.values if word}
+        return [f"None was timed{': ' + '; '.join(sorted(words)) if words else ''}."]
+    heads = [f"{kind}, {threads} thread{'s' if threads > 1 else ''}" for threads, kind in ways]
+    heads = ["structured mesh", *heads, f"error, {data.precision.values[-1]}"]
+    copies = ", ".join(
+        f"{float(data.copy_bandwidth.sel(thread_count=threads)) / 1e9:.1f} GB/s by {threads}"
+        for threads in data.thread_count.values
+    )
+    lines = ["Nonlinear springs that steps advance, in millions a second, and memory that they read and write, in "
+             f"GB/s. A plain copy of memory moves {copies}. The numbers of a run do not depend on its threads; errors "
+             "are those of displacements against double precision, over the largest.", ""]  # fmt: skip
+    told = zip(data.mesh_size.values, data.explicit_message.values)
+    lost = [f"- {1e3 * size:g} mm: {word}" for size, word in told if word]
+    return lines + markdown_table(heads, rows) + (["", *lost] if lost else [])
 
 
 NOISE = 1.3

@@ -7,6 +7,7 @@ from ...output.dataset import Group
 CASE = ("scene", "approach", "mesh_size")
 OF_SCENE = ("scene",)
 SOLVER_AXES = ("linear_solver", "mesh_size")
+EXPLICIT_AXES = ("mesh_size", "thread_count", "precision")
 
 BENCHMARK = Group(
     "/benchmark",
@@ -14,6 +15,8 @@ BENCHMARK = Group(
         "displacement": (CASE, "m", "displacement of the loaded side along the force", np.nan),
         "error": (CASE, "1", "signed error of the displacement, over the reference's", np.nan),
         "second_error": (CASE, "1", "signed error of the displacement on the second beam", np.nan),
+        "second_status": (CASE, "1", "what became of the case on the second beam", 0),
+        "second_message": (CASE, "1", "why there is no error on the second beam", ""),
         "assured_error": (
             CASE,
             "1",
@@ -45,18 +48,33 @@ BENCHMARK = Group(
         "machine_load": (OF_SCENE, "1", "load of the machine at the start, processes", np.nan),
         "solver_seconds": (SOLVER_AXES, "s", "time from a matrix to a solution, its sparsity analysed", np.nan),
         "solver_again_seconds": (SOLVER_AXES, "s", "time of the next matrix of that sparsity", np.nan),
+        "solver_status": (SOLVER_AXES, "1", "what became of the linear system", 0),
+        "solver_message": (SOLVER_AXES, "1", "why there are no seconds", ""),
         "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", np.nan),
         "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", np.nan),
         "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", np.nan),
         "linear_seconds": ((), "s", "time of one linear solve there", np.nan),
-        "explicit_steps": ((), "s-1", "explicit steps a second of nonlinear springs there", np.nan),
-        "explicit_bandwidth": ((), "byte s-1", "memory that these steps read and write", np.nan),
-        "copy_bandwidth": ((), "byte s-1", "memory that a plain copy reads and writes", np.nan),
+        "curve_status": ((), "1", "what became of the curves", 0),
+        "curve_message": ((), "1", "why there are no seconds of curves", ""),
+        "explicit_steps": (EXPLICIT_AXES, "s-1", "explicit steps a second of nonlinear springs", np.nan),
+        "spring_updates": (EXPLICIT_AXES, "s-1", "springs that these steps advance, each step counted anew", np.nan),
+        "explicit_bandwidth": (EXPLICIT_AXES, "byte s-1", "memory that these steps read and write", np.nan),
+        "explicit_error": (
+            ("mesh_size", "precision"),
+            "1",
+            "largest difference of their displacements from those in double precision, over the largest of these",
+            np.nan,
+        ),
+        "explicit_status": (("mesh_size",), "1", "what became of the explicit steps", 0),
+        "explicit_message": (("mesh_size",), "1", "why there are no explicit steps", ""),
+        "copy_bandwidth": (("thread_count",), "byte s-1", "memory that a plain copy reads and writes", np.nan),
     },
     dimensions={
         "scene": "scene of the benchmark",
         "approach": "definition / mesh type, or another approach",
         "linear_solver": "solver of linear systems",
         "curve_count": "number of stiffnesses of a sensitivity curve",
+        "thread_count": "number of threads of explicit steps",
+        "precision": "floating-point numbers of explicit steps",
     },
 )
