@@ -202,7 +202,8 @@ def _common(study, scene):
 @once_a_study("grids")
 def shown_scenes(study):
     """Scenes whose whole fields are kept, whether or not they are drawn: of a part those of the whole study."""
-    return shown({scene for grid in study.grids for scene in grid.scenes}, study.swept)
+    scenes = study.scenes if study.part is None else {scene for grid in study.grids for scene in grid.scenes}
+    return shown(scenes, study.swept)
 
 
 def solved_keys(study, mesh, calibration):
@@ -364,6 +365,7 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
+    scenes = by_mesh(study.scenes)
     families = [
         {"name": stem(mesh), "thickness": mesh.beam.thickness, "scenes": _scenes(study, mesh)}
         for meshes in members
