@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 MADE_BY = "https://w3id.org/ro/wfrun/provenance/0.5"
 """Profile by which an archive is told from other zip files."""
 
+OF_MACHINE = "/benchmark"
+"""Group that measures a machine: its speed decides what is in it."""
+
 UNZIPPED = 2**20
 """Bytes that are read at once."""
 
@@ -180,11 +183,14 @@ class Reproduced:
         What differs bit by bit, and beyond the usual tolerance; the archive is before.
     others : dict of str to tuple of str
         What the numbers depend on and what is another one: versions, processor. As it was, and as it is.
+    measured : bool
+        Whether there is a group that measures the machine, which is not compared.
     """
 
     exact: "Comparison"
     near: "Comparison"
     others: dict[str, tuple[str, str]]
+    measured: bool = False
 
     @property
     def same(self) -> bool:
@@ -312,12 +318,15 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
     from ..output.comparison import Tolerance, compare
 
     with reading.open(kept) as before, reading.open(made) as after:
-        exact = compare(before, after, Tolerance(0.0, 0.0))
-        near = compare(before, after) if exact.different else exact
+        groups = {node.path for tree in (before, after) for node in tree.subtree}
+        kept_groups = sorted(groups - {OF_MACHINE})
+        exact = compare(before, after, Tolerance(0.0, 0.0), kept_groups)
+        near = compare(before, after, groups=kept_groups) if exact.different else exact
         versions = [json.loads(tree.attrs["software"]) for tree in (before, after)]
     here = environment.machine()
     pairs = {name: (versions[0].get(name, "none"), versions[1].get(name, "none")) for name in versions[0] | versions[1]}
     pairs |= {
         name: (machine.get(name, "not told"), here.get(name, "not told")) for name in ("architecture", "processor")
     }
-    return Reproduced(exact, near, {name: pair for name, pair in pairs.items() if pair[0] != pair[1]})
+    others = {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
+    return Reproduced(exact, near, others, OF_MACHINE in groups)
