@@ -192,7 +192,7 @@ def test_parts_beside_the_cases_are_holes_too():
 
 
 def test_explicit_steps_are_timed_in_threads_and_precisions():
-    found = benchmark.explicit(SCENES["traction"], (5e-3, 1e-2), 30.0, updates=1)
+    found = benchmark.explicit(SCENES["traction"], (5e-3,), 30.0, updates=1)
     assert (found["explicit_status"] == Status.SOLVED).all() and (found["spring_updates"] > 0).all()
     springs = len(MESH_TYPES["structured"](0.1, 0.02, 5e-3).edges)
     assert found["spring_updates"][0] == pytest.approx(springs * found["explicit_steps"][0])

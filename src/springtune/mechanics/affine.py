@@ -1,17 +1,13 @@
 """Stiffness of networks whose particles all follow an even strain: closed forms, before anything relaxes."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..mesh.cells import Mesh
+from .moduli import Elastic, unit_fields, work_of
 from .network import Network
 
-if TYPE_CHECKING:
-    from .moduli import Elastic
 
-
-def affine_stiffness(mesh: Mesh, springs: "Elastic") -> np.ndarray:
+def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     """Stiffness in plane stress that a network had if all its particles followed an even strain (Cauchy and Born).
 
     Of springs it is the closed form ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66 whatever their
@@ -39,9 +35,5 @@ def affine_stiffness(mesh: Mesh, springs: "Elastic") -> np.ndarray:
     [[1.125, 0.375, 0.0], [0.375, 1.125, 0.0], [0.0, 0.0, 0.375]]
     """
     network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
-    x, y = (mesh.points - mesh.points[0]).T
-    none = np.zeros(len(x))
-    fields = [np.stack(field, axis=1) for field in ((x, none), (none, y), (0.5 * y, 0.5 * x))]
-    forces = [network.linear_forces(field) for field in fields]
-    work = np.array([[float((force * field).sum()) for field in fields] for force in forces]) / mesh.area
-    return 0.5 * (work + work.T)
+    fields = unit_fields(mesh)
+    return work_of(fields, [network.linear_forces(field) for field in fields], mesh)

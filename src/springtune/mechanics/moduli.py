@@ -85,6 +85,17 @@ UNIT_STRAINS = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 0.5),
 """Unit strains xx, yy and shear angle xy [1]."""
 
 
+def unit_fields(mesh: Mesh) -> list[np.ndarray]:
+    """Displacements of all particles by each of the unit strains [m], shape (n_points, 2)."""
+    return [(mesh.points - mesh.points[0]) @ np.array(strain) for strain in UNIT_STRAINS]
+
+
+def work_of(fields: list[np.ndarray], forces: list[np.ndarray], mesh: Mesh) -> np.ndarray:
+    """Stiffness as the work that forces under each unit strain [m] do on its fields [m], over the area [1], (3, 3)."""
+    work = np.array([[(force * field).sum() for field in fields] for force in forces]) / mesh.area
+    return 0.5 * (work + work.T)
+
+
 def strip_fault(mesh: Mesh) -> str:
     """Why a patch test between rollers says nothing of a mesh, with the remedy; empty where it does.
 
@@ -270,14 +281,12 @@ class PatchTest:
         """Stiffness under affine displacements of the outline, see `outline_stiffness`."""
         held = self._frame[0]
         network = self._network("frame", held, springs)
-        fields = [(self.mesh.points - self.mesh.points[0]) @ np.array(strain) for strain in UNIT_STRAINS]
+        fields = unit_fields(self.mesh)
         moved = fields
         if network.unknowns:
             inside = [network.rest_factor.solve(network.linear_resistance(field)) for field in fields]
             moved = [field - network.expand(inner) for field, inner in zip(fields, inside)]
-        forces = [network.linear_forces(field) for field in moved]
-        work = np.array([[(force * field).sum() for field in fields] for force in forces]) / self.mesh.area
-        return 0.5 * (work + work.T)
+        return work_of(fields, [network.linear_forces(field) for field in moved], self.mesh)
 
     def axial(self, springs: Elastic) -> tuple[float, float]:
         """Young's modulus and Poisson's ratio, see `axial_moduli`."""

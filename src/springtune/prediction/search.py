@@ -9,6 +9,7 @@ much as it did over the last doubling of the cells, so that it is not just passi
 
 import math
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -390,7 +391,7 @@ def _number(error: float | str) -> float:
     return math.nan if isinstance(error, str) else error
 
 
-class _Search:
+class _Search(ABC):
     """Meshes of one type, by the number of cells across; each solved once."""
 
     def __init__(
@@ -401,25 +402,25 @@ class _Search:
         self._found: dict[tuple[int, str], MeshChoice] = {}
         self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
 
+    @abstractmethod
     def _exact(self, cells: int) -> tuple[float, float]:
         """Mesh size of so many cells across, and the smaller side, which no mesh size exceeds [m]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _particles(self, cells: int) -> float:
         """Particles of such a mesh, about."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _mesh(self, size: float) -> Mesh:
         """The mesh of a size."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _trial(self, mesh: Mesh) -> "TriedMesh | TriedShape":
         """The definitions on it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
         """Seconds of the longest static solve of some loads, and the largest stable explicit step [s]."""
-        raise NotImplementedError
 
     def climb(self) -> None:
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""

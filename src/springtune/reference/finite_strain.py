@@ -13,6 +13,7 @@ beam is solved, which does not buckle; where it acts along it, as in bending and
 break the symmetry. Elements shrink towards the corners, and the load grows in steps where it must.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -414,12 +415,12 @@ _Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]
 """First derivatives of an energy by t and d, and second ones by tt, td, dd."""
 
 
-class _PlaneLaw:
+class _PlaneLaw(ABC):
     """Energy of a sheet with E = 1, of the trace and the determinant of C in the plane."""
 
+    @abstractmethod
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """First derivatives by t and d, and second ones by tt, td, dd."""
-        raise NotImplementedError
 
     def response(self, strain: np.ndarray) -> "Response":
         """Stress and tangent at Green's strains.
