@@ -106,10 +106,10 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
         noted = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}
         Path("plan.json").write_text(json.dumps({"stages": noted}))
         tool.do_stages(config, "invent")
-        with counted(scenes._scene_key, store.read, Filler.put) as count:
+        with counted(scenes.completed_key, store.read, Filler.put) as count:
             study = planned(config)[0]
-            groups = collect._groups(study, made.folder)
-        assert count["_scene_key"] == len(study.scenes) == 16 * forces
+            groups = collect.gathered(study, made.folder)
+        assert count["completed_key"] == len(study.scenes) == 16 * forces
         assert int((groups["/"].status == 1).sum()) == len(study.scenes)
         opened[forces] = count["read"]
         # Of a reference its values, and for each kinematics whether it applies; of a mesh its size.
@@ -126,10 +126,10 @@ def test_keys_made_together_are_those_made_one_by_one():
 
 def test_the_page_of_tables_shows_so_many_rows_and_says_so():
     rows = [{"name": f"row {number}", "error_percent": 0.5} for number in range(page.MOST_ROWS + 1)]
-    table = page._further({"stem": "many", "title": "Many", "note": "", "rows": rows})
+    table = page.shown({"stem": "many", "title": "Many", "note": "", "rows": rows})
     assert len(table["lines"]) == page.MOST_ROWS
     assert table["beyond"] == "The first 1000 of 1001 rows; the file has all of them: "
-    assert page._further({"stem": "few", "title": "Few", "note": "", "rows": rows[:-1]})["beyond"] == ""
+    assert page.shown({"stem": "few", "title": "Few", "note": "", "rows": rows[:-1]})["beyond"] == ""
 
 
 def test_numbers_are_extrapolated_by_their_exponent(tool):

@@ -40,7 +40,7 @@ def run(config: str | Path, folder: str | Path, output: str | Path) -> list[Path
 
 
 def _collected(study: "Study", config: str | Path, folder: Path, output: Path) -> list[Path]:
-    groups = mended(lambda: _groups(study, folder), folder)
+    groups = mended(lambda: gathered(study, folder), folder)
     try:
         dataset.write(output, groups, provenance.attributes(study, config))
     except OSError as error:  # the message says it all
@@ -70,8 +70,20 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
     records.write(record, digest, _collected(study, config, Path(folder), Path(output)))
 
 
-def _groups(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
-    """Groups of the dataset of a study."""
+def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+    """Groups of the dataset of a study, of what its stages stored.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where its results are.
+
+    Returns
+    -------
+    dict of str to xarray.Dataset
+        By path in the dataset.
+    """
     groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:

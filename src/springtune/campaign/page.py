@@ -43,7 +43,7 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
     written["index.html"] = environment.get_template("page.html").render(
         tables=scenes,
-        further=[_further(table) for table in tables if "title" in table],
+        further=[shown(table) for table in tables if "title" in table],
         beams=_beams(tree.to_dataset()),
         marks={mark for table in scenes for mark in table["marks"]},
         attributes=tree.attrs,
@@ -201,8 +201,20 @@ def _objections(rows: list[Mapping[str, Any]], kinematics: list[str]) -> list[st
 # -- other tables ------------------------------------------------------------------------------------------------------
 
 
-def _further(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table of any columns as it is shown: heads with units, and texts."""
+def shown(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table of any columns as it is shown: heads with units, and texts.
+
+    Parameters
+    ----------
+    table : mapping
+        Its ``stem``, ``title``, ``note`` and ``rows``.
+
+    Returns
+    -------
+    dict
+        These, ``heads``, ``lines`` of texts, ``words`` (places of the columns that are no numbers), and ``beyond``: what it
+        says of rows that are not shown.
+    """
     rows = table["rows"]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     texts, words = {}, []

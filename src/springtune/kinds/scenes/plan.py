@@ -131,10 +131,11 @@ def curve_key(study, curve):
 
 def scene_key(study: "Study", scene: "SceneSpec") -> str:
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    return _scene_key(study, scene, _common(study, scene)["key"])
+    return completed_key(study, scene, _common(study, scene)["key"])
 
 
-def _scene_key(study, scene, common):
+def completed_key(study, scene, common):
+    """Key of a scene by that of what scenes like it share."""
     return hash_of(
         common,
         scene.force,
@@ -151,7 +152,7 @@ def scene_keys(study):
     for mesh, scenes in by_mesh(study.scenes).items():
         commons, keys = _Commons(study), []
         for scene in scenes:
-            keys.append(_scene_key(study, scene, commons.of(scene)["key"]))
+            keys.append(completed_key(study, scene, commons.of(scene)["key"]))
         found[mesh] = keys
     return found
 
