@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns slow lint docs site pictures lock clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns mutants slow lint docs site pictures lock clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -49,6 +49,16 @@ test-versions: $(VENV)/.test
 test-reruns: $(VENV)/.test
 	pytest -n 2 tests/reruns
 
+# Small errors put into the physics one at a time, and whether a test fails for each: hours; SHARE tries a part of them.
+SHARE ?= 1
+MUTANTS := build/mutants/packages
+mutants: $(VENV)/.test $(MUTANTS)
+	PYTHONPATH=$(CURDIR)/src:$(MUTANTS) python tools/mutants.py --share $(SHARE)
+
+$(MUTANTS): requirements/mutants.txt
+	python -m uv pip install --quiet --require-hashes --no-deps --target $@ --requirement $<
+	touch $@
+
 slow: $(VENV)/.test
 	pytest -n 2 -m slow --ignore tests/faults --ignore tests/reruns --ignore tests/versions
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
@@ -85,6 +95,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
+	$(LOCK) requirements/mutants.in --constraints requirements/test.txt --output-file requirements/mutants.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 
 # Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.
