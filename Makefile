@@ -10,7 +10,7 @@ VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million clean
+.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
 
 study: $(VENV)/.run
 	springtune run $(STUDY)
@@ -77,6 +77,16 @@ test-archive: $(VENV)/.test
 test-storage: $(VENV)/.test
 	pytest -rs tests/storage
 
+# Small errors put into the physics one at a time, and whether a test fails for each: hours; SHARE tries a part of them.
+SHARE ?= 1
+MUTANTS := build/mutants/packages
+mutants: $(VENV)/.test $(MUTANTS)
+	PYTHONPATH=$(CURDIR)/src:$(MUTANTS) python tools/mutants.py --share $(SHARE)
+
+$(MUTANTS): requirements/mutants.txt
+	python -m uv pip install --quiet --require-hashes --no-deps --target $@ --requirement $<
+	touch $@
+
 slow: $(VENV)/.test
 	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
@@ -127,6 +137,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) pyproject.toml requirements/build.in requirements/storage.in --extra s3 --output-file requirements/storage.txt
+	$(LOCK) requirements/mutants.in --constraints requirements/test.txt --output-file requirements/mutants.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 	$(LOCK) requirements/validator.in --output-file requirements/validator.txt
 

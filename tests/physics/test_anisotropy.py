@@ -258,6 +258,18 @@ def test_what_is_chosen_instead_fits_the_mesh():
     assert "'orthotropic'" in str(caught.value) and "'delingette'" not in str(caught.value)
 
 
+def test_springs_that_are_just_not_there_are_no_negative_ones():
+    """Isotropic, so C11 - C12 + C66 = 3 C66: no springs along sides of sqrt(3) to 1, and a refusal beyond."""
+    steel = Material(210e9, 0.3)
+    edge = np.sqrt(3.0)
+    for ratio in (edge, edge * (1 - 1e-15), edge * (1 + 1e-15)):
+        springs = DEFINITIONS["orthotropic"].springs(braced(ratio), steel, THICKNESS)
+        assert springs.relative.min() >= 0 and (springs.relative < 1e-12).any()
+        assert differ(affine("orthotropic", braced(ratio), steel), steel.plane_stress) <= 1e-12
+    with pytest.raises(DefinitionError, match="negative"):
+        DEFINITIONS["orthotropic"].springs(braced(edge * 1.001), steel, THICKNESS)
+
+
 def test_orthotropic_names_the_bound_and_the_rectangles_that_serve():
     stiff = AnisotropicMaterial(9.0, 1.0, 1.2, 0.8)
     with pytest.raises(

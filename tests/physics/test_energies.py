@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy
+from springtune.mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, corner_angles, signed_areas
 from springtune.problem.materials import Material
@@ -95,6 +95,23 @@ def test_small_strain_keeps_its_digits(kind):
     forces = energy.forces(1e-15 * direction).reshape(linear.shape) / 1e-15
     # A displacement of 1e-15 m over edges of 5 mm: the law is linear to 1e-12.
     assert np.abs(forces - linear).max() <= 1e-10 * np.abs(linear).max()
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "neo-Hooke", "Yeoh"])
+def test_a_common_motion_costs_no_digits(kind):
+    """Strains of 1e-9, moved by 1 m as a whole: changes are taken from differences of displacements."""
+    if kind in KINDS:
+        mesh, energy = energy_of(kind, 8)
+    else:
+        mesh, one = MESH_TYPES["free"](0.02, 0.01, 5e-3), np.ones
+        count = len(mesh.triangles)
+        moduli = (one((count, 3)),) if kind == "Yeoh" else (one(count), 2 * one(count))
+        energy = (YeohEnergy if kind == "Yeoh" else NeoHookeEnergy)(mesh.points, mesh.triangles, *moduli)
+    # Multiples of 2^-50 m: one added to them is exact.
+    moved = np.round(scattered(mesh, 9, 5e-12) * 2**50) / 2**50
+    forces = energy.forces(moved)
+    # Positions, which directions are taken from, are rounded to 1e-16 m, over 5 mm.
+    assert np.abs(energy.forces(moved + 1.0) - forces).max() <= 1e-12 * np.abs(forces).max()
 
 
 @settings(max_examples=25)

@@ -1,10 +1,16 @@
 """Equilibria against independent solutions, and what is said when there are none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import root
 
+from springtune.mechanics.network import Network
 from springtune.mechanics.newton import TOLERANCE
+from springtune.mechanics.statics import StaticProblem
+from springtune.mesh import Mesh
+from springtune.problem.status import Status
 
 from problems import beam_problem
 
@@ -101,6 +107,59 @@ def test_straight_equilibrium_beyond_the_euler_load_is_seen_to_be_unstable():
     assert problem.nonlinear(-0.8 * euler / k).factor.negative_pivots == 0
     beyond = problem.nonlinear(-1.2 * euler / k)
     assert beyond.converged and beyond.factor.negative_pivots == 1
+
+
+def test_load_steps_grow_and_start_where_the_path_points():
+    """On a straight path the last two equilibria lead to the next one, but for the square of the strain."""
+
+    class Watched(StaticProblem):
+        calls = ()
+
+        def newton(self, s, start, *arguments):
+            found = super().newton(s, start, *arguments)
+            if len(self.calls) < 2:  # both first guesses fail, so that the load is taken in steps
+                found = replace(found, converged=False)
+            self.calls += ((s, start, found),)
+            return found
+
+    problem, _ = beam_problem("free")
+    watched = Watched(problem.network, problem.network.expand(problem.load))
+    s = 1e-6
+    found = watched.nonlinear(s)
+    steps = watched.calls[2:]
+    assert [round(step / s, 12) for step, _, _ in steps] == [0.25, 0.625, 1.0]
+    for _, start, end in steps:
+        assert np.abs(start - end.displacements).max() <= 1e-3 * np.abs(end.displacements).max()
+    assert found.iterations == sum(end.iterations for _, _, end in watched.calls)
+    assert (found.displacements == steps[-1][2].displacements).all() and np.isnan(found.unstable_share)
+
+
+def arch(stiffness=1.0, rise=0.1):
+    """Two springs from supports 2 m apart to a particle in the middle, so high above them (von Mises' truss)."""
+    mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise]]), np.array([[0, 1, 2]]))
+    held = np.array([[True, True], [True, True], [True, False]])
+    network = Network(mesh, held, stiffness * (mesh.edges != [0, 1]).any(axis=1))
+    return StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
+
+
+@pytest.mark.parametrize("beyond", [1.02, 1.3, 4.0])
+@pytest.mark.parametrize("stiffness", [1.0, 50.0])
+def test_an_arch_carries_its_closed_form_and_no_more(stiffness, beyond):
+    """At height y its springs push 2 (L0 / L - 1) y, at most where L^3 = L0; it is told as a share of the load."""
+    problem = arch(stiffness)
+    rest = np.hypot(1.0, 0.1)
+    length = rest ** (1 / 3)
+    largest = 2 * stiffness * (rest / length - 1) * np.sqrt(length**2 - 1)
+    assert problem.nonlinear(-0.98 * largest).converged
+    s = -beyond * largest
+    found = problem.nonlinear(s)
+    assert not found.converged
+    # Points of the path lie close to its top, where it is flat; the last equilibrium is a load step below.
+    assert found.limit_share * beyond == pytest.approx(1, abs=2e-3)
+    assert 1 - 1 / 16 <= found.load_share * beyond <= 1
+    status, message, pivots = problem.judge(s, found)
+    assert status is Status.UNSTABLE and np.isnan(pivots)
+    assert f"turns back, unstable, at {100 * found.limit_share:.3g} % of the load" in message
 
 
 def test_same_problem_same_numbers():

@@ -257,19 +257,16 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     moduli: dict[str, Any] = {}
     for part in fields(first):  # type: ignore[arg-type]
         own = [getattr(energy, part.name) for energy, _, _ in parts]
-        given = [one for one in own if one is not None]
         if part.name == "largest":  # a range of data, not a modulus
             own = [np.broadcast_to(one, len(where)) for one, (_, where, _) in zip(own, parts)]
             moduli[part.name] = np.concatenate(own)[order]
             continue
-        if part.name in CELL_FIELDS or not given or not isinstance(given[0], np.ndarray):
+        if part.name in CELL_FIELDS or not isinstance(own[0], np.ndarray):  # which is none in all parts, see `_law`
             continue
         if part.name == "coefficients":  # of laws with fewer terms the others are zero
-            most = max(one.shape[1] for one in given)
-            own = given = [np.pad(one, ((0, 0), (0, most - one.shape[1]))) for one in given]
-        # What an energy has besides its cells is in proportion to its stiffness; a part may lack it.
-        full = [np.zeros((len(where), *given[0].shape[1:])) for _, where, _ in parts]
-        scaled = [none if one is None else scale * one for one, none, (_, _, scale) in zip(own, full, parts)]
-        moduli[part.name] = np.concatenate(scaled)[order]
+            most = max(one.shape[1] for one in own)
+            own = [np.pad(one, ((0, 0), (0, most - one.shape[1]))) for one in own]
+        # What an energy has besides its cells is in proportion to its stiffness.
+        moduli[part.name] = np.concatenate([scale * one for one, (_, _, scale) in zip(own, parts)])[order]
     corners = mesh.cells[first.corners.shape[1]][cells[order]]
     return replace(first, points=mesh.points, corners=corners, **moduli)  # type: ignore[type-var]

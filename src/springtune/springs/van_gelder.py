@@ -53,7 +53,4 @@ def general(mesh: Mesh, material: Material, thickness: float) -> Springs:
     nu = material.poisson_ratio
     half_cotangents = (squares.sum(axis=1, keepdims=True) - 2 * squares) / (8 * areas)
     parts = areas / squares / (1 + nu) + nu / (1 - nu**2) * half_cotangents
-    total = mesh.sum_to_edges({3: parts})
-    # Right angles opposite an edge give it exactly nothing but rounding.
-    total[np.abs(total) < 1e-14] = 0.0
-    return Springs(material.young_modulus * thickness, not_negative(total))
+    return Springs(material.young_modulus * thickness, not_negative(mesh.sum_to_edges({3: parts})))
