@@ -212,8 +212,8 @@ def shown(table: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        These, ``heads``, ``lines`` of texts, ``words`` (places of the columns that are no numbers), and ``beyond``: what
-        it says of rows that are not shown.
+        These, ``heads``, ``lines`` of texts, ``words`` (places of the columns that are no numbers), and ``beyond``:
+        what it says of rows that are not shown.
     """
     rows = table["rows"]
     columns = list(dict.fromkeys(name for row in rows for name in row))
