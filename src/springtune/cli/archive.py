@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     epilog=examples(
         "springtune archive results/paper",
         "springtune archive config/paper.yaml --out paper.zip",
-        "springtune verify results/paper.crate.zip --reproduce",
     )
 )
 @click.argument("study", type=click.Path(path_type=Path))
