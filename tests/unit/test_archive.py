@@ -12,7 +12,9 @@ from contextlib import chdir
 from pathlib import Path, PurePosixPath
 
 import h5py
+import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -424,6 +426,24 @@ class TestEnvironment:
             file["displacement"][...] = factor * file["displacement"][...]
         found = reproduction.compared(made / "results/one/dataset.nc", tmp_path / "dataset.nc", machine)
         assert found.same is same and found.exact.different is (factor != 1.0)
+
+    @pytest.mark.parametrize(
+        ("status", "error", "ended_otherwise", "same"),
+        [([1, 1], [0.1, 0.2], 0, True), ([1, 5], [0.1, np.nan], 1, True), ([1, 1], [0.1, 0.3], 0, False)],
+        ids=["the same", "not done here", "another number"],
+    )
+    def test_a_benchmark_is_compared_where_its_cases_ended_alike(
+        self, made, tmp_path, status, error, ended_otherwise, same
+    ):
+        meanings = {"flag_values": np.arange(6, dtype="i1"), "flag_meanings": "a solved c d e failed"}
+        files = tmp_path / "before.nc", tmp_path / "after.nc"
+        for path, flags, values, seconds in zip(files, ([1, 1], status), ([0.1, 0.2], error), (1.0, 2.0)):
+            shutil.copy(made / "results/one/dataset.nc", path)
+            data = xr.Dataset({"error": ("approach", values), "seconds": ("approach", [seconds, seconds])})
+            data["status"] = ("approach", np.array(flags, dtype="i1"), meanings)
+            data.to_netcdf(path, mode="a", group="benchmark", engine="h5netcdf")
+        found = reproduction.compared(*files, environment.machine())
+        assert (found.same, found.ended_otherwise) == (same, ended_otherwise)
 
 
 def test_rows_of_parameters_count_among_the_files_of_a_study(made):
