@@ -79,7 +79,7 @@ def write_study(folder):
 def make_checkout(folder):
     """What of a checkout an archive needs, with the program as it is."""
     shutil.copytree(REPOSITORY / "src/springtune", folder / "src/springtune", ignore=shutil.ignore_patterns("*.pyc"))
-    for name in ("Snakefile", "Makefile", "pyproject.toml", "LICENSE", "tools/setup.sh", *environment.LOCK_FILES):
+    for name in {*contents.CHECKOUT_FILES} - {contents.CITATION}:
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(REPOSITORY / name, folder / name)
     shutil.copytree(REPOSITORY / "workflow/profiles", folder / "workflow/profiles")
@@ -233,6 +233,11 @@ class TestContents:
             }
             assert "from no git checkout" in file.read("README.md").decode()
 
+    @pytest.mark.skipif(not (REPOSITORY / ".git").exists(), reason="there is no git to ask")
+    def test_without_git_nothing_is_forgotten_that_git_knows(self):
+        known = {name.partition("/")[0] for name in git("-C", REPOSITORY, "ls-files").splitlines()}
+        assert known - {*contents.TREE} == {".ci", ".pre-commit-config.yaml"}
+
     def test_a_study_outside_of_the_checkout_comes_with_its_files(self, checkout, tmp_path):
         config = write_study(tmp_path / "elsewhere/deep")
         config.write_text(STUDY.replace("forces.csv", "../forces.csv"))
@@ -288,7 +293,7 @@ class TestRefusals:
         refused(run("archive", "results/one"), said)
         assert not list(Path("results").glob("*.zip*"))
 
-    @pytest.mark.parametrize("name", ["Makefile", "requirements/run.txt"])
+    @pytest.mark.parametrize("name", ["Makefile", "hatch_build.py", "requirements/run.txt"])
     def test_what_nobody_could_run(self, checkout, name):
         Path(name).unlink()
         refused(run("archive", "results/one"), f"{name}: missing in this folder")
