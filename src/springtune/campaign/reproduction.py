@@ -318,7 +318,8 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
     from ..output.comparison import Tolerance, compare
 
     with reading.open(kept) as before, reading.open(made) as after:
-        exact, groups = compare(before, after, Tolerance(0.0, 0.0)), []
+        exact = compare(before, after, Tolerance(0.0, 0.0))
+        groups: list[str] = []
         flags = [one for group in exact.groups if group.name == OF_MACHINE for one in group.flags]
         ended_otherwise = sum(one.changed for one in flags)
         if ended_otherwise:
