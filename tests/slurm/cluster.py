@@ -35,7 +35,7 @@ AccountingStorageType=accounting_storage/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core_Memory
 SchedulerParameters=batch_sched_delay=0,sched_interval=1
-ReturnToService=2
+ReturnToService=1
 KillWait=2
 MinJobAge=3600
 StateSaveLocation={folder}/state
@@ -69,7 +69,9 @@ def install():
 
 def asked(*command):
     """What a command of Slurm prints."""
-    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, f"{' '.join(command)}: {done.stderr}"
+    return done.stdout
 
 
 def until(condition, seconds=60.0, every=0.2):

@@ -15,6 +15,9 @@ import pytest
 
 REPOSITORY = Path(__file__).parents[2]
 HOST = "127.0.0.1"
+SIGNED = {"Authorization": "AWS4-HMAC-SHA256 Credential=testing/20200101/us-east-1/s3/aws4_request"}
+"""What the server asks for before it gives an object: that somebody signed, whoever it is."""
+
 PASSED_ON = {"connection", "transfer-encoding", "content-length", "date", "server"}
 """Headers of an answer that are said anew."""
 
@@ -110,7 +113,7 @@ class Between:
     def ask(self, how, path, content=None):
         """Ask the server itself; its answer."""
         server = http.client.HTTPConnection(HOST, self.port)
-        server.request(how, path, content, {"Authorization": "AWS testing:testing"})  # else objects are private
+        server.request(how, path, content, SIGNED)
         answer = server.getresponse()
         found = answer.read()
         server.close()

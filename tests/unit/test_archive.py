@@ -12,7 +12,9 @@ from contextlib import chdir
 from pathlib import Path, PurePosixPath
 
 import h5py
+import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -77,7 +79,7 @@ def write_study(folder):
 def make_checkout(folder):
     """What of a checkout an archive needs, with the program as it is."""
     shutil.copytree(REPOSITORY / "src/springtune", folder / "src/springtune", ignore=shutil.ignore_patterns("*.pyc"))
-    for name in ("Snakefile", "Makefile", "pyproject.toml", "LICENSE", "tools/setup.sh", *environment.LOCK_FILES):
+    for name in {*contents.CHECKOUT_FILES} - {contents.CITATION}:
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(REPOSITORY / name, folder / name)
     shutil.copytree(REPOSITORY / "workflow/profiles", folder / "workflow/profiles")
@@ -231,6 +233,11 @@ class TestContents:
             }
             assert "from no git checkout" in file.read("README.md").decode()
 
+    @pytest.mark.skipif(not (REPOSITORY / ".git").exists(), reason="there is no git to ask")
+    def test_without_git_nothing_is_forgotten_that_git_knows(self):
+        known = {name.partition("/")[0] for name in git("-C", REPOSITORY, "ls-files").splitlines()}
+        assert known - {*contents.TREE} == {".ci", ".pre-commit-config.yaml"}
+
     def test_a_study_outside_of_the_checkout_comes_with_its_files(self, checkout, tmp_path):
         config = write_study(tmp_path / "elsewhere/deep")
         config.write_text(STUDY.replace("forces.csv", "../forces.csv"))
@@ -286,7 +293,7 @@ class TestRefusals:
         refused(run("archive", "results/one"), said)
         assert not list(Path("results").glob("*.zip*"))
 
-    @pytest.mark.parametrize("name", ["Makefile", "requirements/run.txt"])
+    @pytest.mark.parametrize("name", ["Makefile", "hatch_build.py", "requirements/run.txt"])
     def test_what_nobody_could_run(self, checkout, name):
         Path(name).unlink()
         refused(run("archive", "results/one"), f"{name}: missing in this folder")
@@ -424,6 +431,24 @@ class TestEnvironment:
             file["displacement"][...] = factor * file["displacement"][...]
         found = reproduction.compared(made / "results/one/dataset.nc", tmp_path / "dataset.nc", machine)
         assert found.same is same and found.exact.different is (factor != 1.0)
+
+    @pytest.mark.parametrize(
+        ("status", "error", "ended_otherwise", "same"),
+        [([1, 1], [0.1, 0.2], 0, True), ([1, 5], [0.1, np.nan], 1, True), ([1, 1], [0.1, 0.3], 0, False)],
+        ids=["the same", "not done here", "another number"],
+    )
+    def test_a_benchmark_is_compared_where_its_cases_ended_alike(
+        self, made, tmp_path, status, error, ended_otherwise, same
+    ):
+        meanings = {"flag_values": np.arange(6, dtype="i1"), "flag_meanings": "a solved c d e failed"}
+        files = tmp_path / "before.nc", tmp_path / "after.nc"
+        for path, flags, values, seconds in zip(files, ([1, 1], status), ([0.1, 0.2], error), (1.0, 2.0)):
+            shutil.copy(made / "results/one/dataset.nc", path)
+            data = xr.Dataset({"error": ("approach", values), "seconds": ("approach", [seconds, seconds])})
+            data["status"] = ("approach", np.array(flags, dtype="i1"), meanings)
+            data.to_netcdf(path, mode="a", group="benchmark", engine="h5netcdf")
+        found = reproduction.compared(*files, environment.machine())
+        assert (found.same, found.ended_otherwise) == (same, ended_otherwise)
 
 
 def test_rows_of_parameters_count_among_the_files_of_a_study(made):

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
+from springtune.kinds.benchmark.variables import BENCHMARK
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output import dataset
 from springtune.output.comparison import Tolerance, compare
@@ -93,6 +94,15 @@ class TestSame:
         other.attrs |= {"created": "today", "host": "another"}
         found = compare(made(), other)
         assert not found.different and not found.attributes
+
+    def test_nothing_that_a_benchmark_measures_is_compared(self):
+        measured = {
+            name for name, (_, units, *_) in BENCHMARK.variables.items() if units in ("s", "s-1", "byte", "byte s-1")
+        }
+        before = xr.Dataset({name: ((), 1.0) for name in BENCHMARK.variables})
+        after = before.assign({name: ((), 2.0) for name in measured})
+        assert {"seconds", "spring_updates", "copy_bandwidth"} <= measured
+        assert not compare(*(xr.DataTree.from_dict({"/benchmark": one}) for one in (before, after))).different
 
     def test_flags_are_compared_as_words(self):
         other = made()

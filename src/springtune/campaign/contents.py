@@ -37,6 +37,7 @@ CHECKOUT_FILES = (
     "Snakefile",
     "Makefile",
     "pyproject.toml",
+    "hatch_build.py",
     "LICENSE",
     CITATION,
     "tools/setup.sh",
@@ -45,8 +46,9 @@ CHECKOUT_FILES = (
 """Files of a checkout without which nobody could run an archive."""
 
 TREE = (
-    ".gitignore", "CHANGELOG.md", CITATION, "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "Snakefile",
-    "config", "docs", "examples", "profiles", "pyproject.toml", "requirements", "src", "tests", "tools", "workflow",
+    ".containerignore", ".gitignore", "CHANGELOG.md", CITATION, "CONTRIBUTING.md", "Containerfile", "LICENSE",
+    "Makefile", "README.md", "Snakefile", "config", "docs", "examples", "hatch_build.py", "profiles", "pyproject.toml",
+    "requirements", "src", "tests", "tools", "workflow",
 )  # fmt: skip
 """What a checkout consists of, where there is no git to ask."""
 

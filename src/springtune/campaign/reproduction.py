@@ -26,7 +26,7 @@ MADE_BY = "https://w3id.org/ro/wfrun/provenance/0.5"
 """Profile by which an archive is told from other zip files."""
 
 OF_MACHINE = "/benchmark"
-"""Group that measures a machine: its speed decides what is in it."""
+"""Group whose cases end by a machine's speed and programs: `most_seconds`, CalculiX, CHOLMOD."""
 
 UNZIPPED = 2**20
 """Bytes that are read at once."""
@@ -183,14 +183,14 @@ class Reproduced:
         What differs bit by bit, and beyond the usual tolerance; the archive is before.
     others : dict of str to tuple of str
         What the numbers depend on and what is another one: versions, processor. As it was, and as it is.
-    measured : bool
-        Whether there is a group that measures the machine, which is not compared.
+    ended_otherwise : int
+        Cases of the benchmark that one of the machines did and the other did not; with any, its group is not compared.
     """
 
     exact: "Comparison"
     near: "Comparison"
     others: dict[str, tuple[str, str]]
-    measured: bool = False
+    ended_otherwise: int = 0
 
     @property
     def same(self) -> bool:
@@ -318,10 +318,14 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
     from ..output.comparison import Tolerance, compare
 
     with reading.open(kept) as before, reading.open(made) as after:
-        groups = {node.path for tree in (before, after) for node in tree.subtree}
-        kept_groups = sorted(groups - {OF_MACHINE})
-        exact = compare(before, after, Tolerance(0.0, 0.0), kept_groups)
-        near = compare(before, after, groups=kept_groups) if exact.different else exact
+        exact = compare(before, after, Tolerance(0.0, 0.0))
+        groups: list[str] = []
+        flags = [one for group in exact.groups if group.name == OF_MACHINE for one in group.flags]
+        ended_otherwise = sum(one.changed for one in flags)
+        if ended_otherwise:
+            groups = sorted({node.path for tree in (before, after) for node in tree.subtree} - {OF_MACHINE})
+            exact = compare(before, after, Tolerance(0.0, 0.0), groups)
+        near = compare(before, after, groups=groups) if exact.different else exact
         versions = [json.loads(tree.attrs["software"]) for tree in (before, after)]
     here = environment.machine()
     pairs = {name: (versions[0].get(name, "none"), versions[1].get(name, "none")) for name in versions[0] | versions[1]}
@@ -329,4 +333,4 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
         name: (machine.get(name, "not told"), here.get(name, "not told")) for name in ("architecture", "processor")
     }
     others = {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
-    return Reproduced(exact, near, others, OF_MACHINE in groups)
+    return Reproduced(exact, near, others, ended_otherwise)

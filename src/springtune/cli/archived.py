@@ -74,8 +74,11 @@ def _compared(made: "Reproduced") -> bool:
         click.echo(f"  {name}: {before} in the archive, {after} here")
     from ..output.comparison import RELATIVE
 
-    if made.measured:
-        click.echo("  the group /benchmark measures the machine and is not compared")
+    if made.ended_otherwise:
+        click.echo(
+            f"  {made.ended_otherwise} cases of the benchmark ended otherwise, by this machine's speed or programs: "
+            "the group /benchmark is not compared"
+        )
     exact, near = made.exact, made.near
     count = sum(one.compared for group in exact.groups for one in (*group.flags, *group.values))
     if not exact.different:
