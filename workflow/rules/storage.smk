@@ -18,7 +18,7 @@ def stop(why):
 
 
 if not STORAGE:
-    told("publish, fetch: where? give --config storage=s3://bucket/folder")
+    stop("publish, fetch: where? give --config storage=s3://bucket/folder")
 if not re.fullmatch(r"s3://[^/{}]+(/[^{}]+)?", STORAGE):
     stop(f"storage: '{STORAGE}' is no place for results; give one such as s3://bucket/folder")
 if find_spec(PLUGIN) is None:
