@@ -210,6 +210,15 @@ class TestContents:
         assert software["python"]["softwareVersion"] == platform.python_version() and "numpy" in software
         assert {"#machine-cores", "#machine-architecture"} <= graph.keys()
 
+    @pytest.mark.parametrize("note", ["commands", "elsewhere"])
+    def test_no_machine_is_told_where_others_computed_some_of_it(self, checkout, monkeypatch, note):
+        monkeypatch.setattr(platform, "node", lambda: HOST)
+        Path(f"results/one/tasks/{note}.json").write_text("{}")
+        result = run("archive", "results/one", "--out", "merged.zip")
+        assert result.exit_code == 0 and "computed on other machines, at least in part" in result.output
+        with zipfile.ZipFile("merged.zip") as file:
+            assert b"#machine-" not in file.read("ro-crate-metadata.json")
+
     def test_commit_differences_and_new_files_are_told(self, checkout):
         with open("Snakefile", "a") as file:
             file.write("# changed\n")

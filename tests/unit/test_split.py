@@ -417,6 +417,9 @@ def test_fetched_results_are_adopted(there):
     for stage in dict.fromkeys(job.stage.name for job in campaign.plan.jobs.values()):
         made.append(Path(f"{stage}.tar"))
         packs.pack(campaign.folder, sorted(campaign.folder.glob(f"done/{stage}_*.json")), made[-1])
+    assert len(sealed.read(campaign.folder / sites.ELSEWHERE)["files"]) == len([*campaign.folder.glob("*/*.h5")]) + len(
+        [*campaign.folder.glob("meshes/*")]
+    )
     campaign.folder.rename("results/before")
     told = packs.fetch("config/many.yaml", made[:2])
     assert "jobs are left for `springtune run config/many.yaml`" in told

@@ -33,6 +33,12 @@ def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
     assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
 
 
+def test_storage_without_a_place_is_asked_for(run):
+    run.write("elsewhere.yaml", STUDY)
+    code, output = run.snakemake("elsewhere.yaml", "--nolock", "publish")
+    assert code == 1 and "where? give --config storage=s3://bucket/folder" in output, output
+
+
 def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repository):
     """As the plugin calls it; that its study is none, and grew by a million scenes, is not seen."""
     run.write("unread.yaml", "no: study\n")

@@ -13,10 +13,12 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from ..jobs import records
+from ..jobs.commands import COMMANDS_FILE
 from ..jobs.dependencies import PACKAGE
 from ..output.reading import CHANGED
 from . import due, environment, provenance
 from .plan import plan
+from .sites import ELSEWHERE
 from .verify import files as verified
 
 if TYPE_CHECKING:
@@ -136,7 +138,7 @@ class Contents:
     attributes : dict of str to str
         Of the dataset, without the machine's name.
     machine : dict of str to str
-        On which it was computed; empty where that is not this one.
+        On which all of it was computed; empty where that is not this one.
     departures : dict of str to tuple of str
         Versions that are locked, and others that the dataset was made with.
     """
@@ -218,7 +220,7 @@ def gather(study: "Study", folder: Path, scratch: Path, store: bool = False) -> 
         inputs=tuple(sorted(set(names.values()) - {own})),
         code=code,
         attributes=attributes,
-        machine=environment.machine() if host == platform.node() else {},
+        machine=environment.machine() if host == platform.node() and not _elsewhere(folder) else {},
         departures=_departures(checkout, attributes),
     )
     packed[README] = of_text(README, _readme(found))
@@ -444,6 +446,11 @@ def _without_host(dataset: Packed, scratch: Path) -> tuple[Packed, dict[str, str
             file.attrs.modify("host", np.bytes_(b"-" * len(host)))
     packed = _of_file(dataset.name, copy)
     return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), attributes, host
+
+
+def _elsewhere(folder: Path) -> bool:
+    """Whether other machines computed some of a study: nodes of a cluster, or sites whose results were added."""
+    return any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))
 
 
 def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:

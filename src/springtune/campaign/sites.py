@@ -50,6 +50,10 @@ STORED, MESH_FILE, MESHES = ".h5", ".vtu", "meshes"
 """Endings of files that stages make, and the folder of meshes and notes on them."""
 
 
+ELSEWHERE = f"{TASKS}/elsewhere.json"
+"""Note in a study's folder of the files that hold results of other machines."""
+
+
 class MergeError(Exception):
     """Results that do not fit together; the message names them and the remedy."""
 
@@ -192,9 +196,13 @@ def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path)
         If results differ that should not.
     """
     names = {scene_key(study, scene): study.name_of(scene) for scene in study.scenes}
-    makes = [make for place, paths in sorted(places.items()) if (make := _union(target / place, paths, names))]
+    found = {place: _union(target / place, paths, names) for place, paths in sorted(places.items())}
+    makes = {place: make for place, make in found.items() if make}
     atomic.remove_unfinished(target)
-    for make in makes:
+    if makes:
+        before: dict[str, list[str]] = sealed.read(target / ELSEWHERE, files=list) or {"files": []}
+        sealed.write(target / ELSEWHERE, {"files": sorted({*before["files"], *(place.as_posix() for place in makes)})})
+    for make in makes.values():
         make()
     return len(makes)
 

@@ -78,7 +78,7 @@ def _tell(found: "Contents") -> None:
         said = ", ".join(f"{name} {used} (locked: {locked})" for name, (locked, used) in found.departures.items())
         click.echo(f"  made with other versions than the lock file's, so others get the same to rounding only: {said}")
     if not found.machine:
-        click.echo("  computed on another machine, of which no cores and no processor are told")
+        click.echo("  computed on other machines, at least in part, of which no cores and no processor are told")
 
 
 def _size(count: int) -> str:

@@ -47,7 +47,7 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
     if not again:
         click.echo(
             f"its numbers are not computed again; `springtune verify {path} --reproduce` does that, by the program in "
-            f"it: its jobs took {found.seconds:.0f} s"
+            f"it: the last runs of its jobs took {found.seconds:.0f} s, without what was stored before"
         )
         return True
     try:
