@@ -195,16 +195,16 @@ class Multigrid:
 
         The first one begins with a random residual besides: where that is gone, too, no direction was without
         stiffness, and the matrix is positive definite. For as long as all stiffnesses met are positive, conjugate
-        gradients make no residual in a direction of negative stiffness smaller. What is random stands before
-        that residual as M^-1, the preconditioner, does: of a direction of stiffness ``-l`` in terms of M it is the share
-        ``l / n**0.5``. So with `RESIDUAL` and a million unknowns a direction of ``l > 1e-4`` is overlooked in one case of
-        10 000, one of ``l < 1e-8`` mostly; nor is one that has no stiffness at all and bears no load.
+        gradients make no residual in a direction of negative stiffness smaller. What is random is ``A M^-1`` of a
+        random vector, M being the preconditioner: of a direction of stiffness ``-l``, over that in M, it has a share
+        of about ``l / n**0.5``. So with `RESIDUAL` and a million unknowns a direction of ``l > 1e-4`` is overlooked in
+        one case of 10 000, one of ``l < 1e-8`` mostly; and so is one of no stiffness at all that bears no load.
         """
         solution, scale = np.zeros(len(missing)), np.linalg.norm(missing)
         if scale == 0.0:
             return solution
         if self._coarsest is None:
-            raise IndefiniteError("a particle or a coarse matrix without stiffness: the tangent is singular or unstable")
+            raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
         proves = not self._certain and tolerance <= CERTAIN
         if proves:
             random = np.random.default_rng(0).standard_normal(len(missing))
