@@ -12,6 +12,7 @@ from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
 from springtune.linalg.ordering import nested_dissection, spread
 from springtune.linalg.pinned import factorize_pinned
 from springtune.mechanics.arc_length import follow
+from springtune.mechanics.follower import FollowerPressure
 from springtune.mechanics.network import PINNED, Network
 from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem
@@ -263,6 +264,48 @@ def test_multigrid_meets_what_is_unstable_without_being_shown_where():
     taken_over = iterative(problem.network, pressed, lambda: exact)
     assert np.array_equal(taken_over.solve(problem.load), exact.solve(problem.load))
     assert (taken_over.name, taken_over.negative_pivots) == (exact.name, exact.negative_pivots)
+
+
+@pytest.mark.parametrize("factor", [-1.0, -1e-3, 0.0])
+def test_multigrid_tells_of_a_particle_that_is_held_by_nothing_or_pushed_away(factor):
+    """A smoother that divides by a diagonal that is not positive would make conjugate gradients blind to it."""
+    mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
+    stiffness = half_weight(mesh)
+    middle = np.linalg.norm(mesh.points - [0.05, 0.02], axis=1).argmin()
+    stiffness[(mesh.edges == middle).any(axis=1)] *= factor
+    network = problem_on(mesh, stiffness, "multigrid").network
+    with pytest.raises(IndefiniteError):
+        network.rest_factor.solve(np.ones(network.unknowns))
+    assert network.rest_factor.negative_pivots == 1
+
+
+def test_superlu_takes_over_from_multigrid_where_there_is_no_cholmod(monkeypatch):
+    monkeypatch.setattr("springtune.linalg.multigrid.MAX_CG_ITERATIONS", 3)
+    monkeypatch.setattr("springtune.mechanics.network.LARGE", 100)
+    monkeypatch.setattr("springtune.mechanics.network.CHOLESKY", False)
+    mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
+    found, exact = (problem_on(mesh, solver=solver).linear(1e-6) for solver in (None, "SuperLU"))
+    assert np.array_equal(found.displacements, exact.displacements)
+    assert (found.factor.name, found.factor.negative_pivots) == ("SuperLU", 0)
+
+
+def test_an_unsymmetric_tangent_that_gradients_do_not_solve_goes_to_superlu(monkeypatch):
+    monkeypatch.setattr("springtune.linalg.multigrid.MAX_CG_ITERATIONS", 3)
+    monkeypatch.setattr("springtune.mechanics.network.LARGE", 100)
+    mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
+    top = mesh.edges[(mesh.points[mesh.edges][:, :, 1] >= mesh.points[:, 1].max()).all(axis=1)]
+    pressed = 0 * mesh.points, (0.05, FollowerPressure.of_side(mesh, top, 0))
+    network = problem_on(mesh).network
+    factor, tangent, right = network.factorize_tangent(*pressed), network.tangent(*pressed), np.ones(network.unknowns)
+    assert np.abs(tangent @ factor.solve(right) - right).max() <= 1e-8
+    assert factor.name == "SuperLU"
+
+
+def test_newton_goes_on_in_steps_where_multigrid_meets_an_unstable_tangent():
+    mesh = MESH_TYPES["structured"](0.2, 0.01, 1.2e-3)
+    problem = problem_on(mesh, solver="multigrid")
+    found = problem.nonlinear(-1e-5)  # it buckles at two thirds of that
+    assert not found.converged and "unstable beyond" in found.reason and 0.5 < found.load_share < 0.7
 
 
 def test_a_nonlinear_equilibrium_is_the_same_by_multigrid():

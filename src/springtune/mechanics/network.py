@@ -30,7 +30,8 @@ LARGEST = 600_000
 """Unknowns beyond which it takes the place of a Cholesky factorization, too: it is faster there, in half the memory."""
 
 FACTORIZED = 2_500_000
-"""Unknowns up to which a Cholesky factorization, of 2 kB an unknown, takes over where multigrid comes to no end."""
+"""Unknowns up to which a Cholesky factorization, of 2 kB an unknown, takes over where multigrid comes to no end; up to
+`LARGEST` SuperLU's does, where there is no CHOLMOD or the matrix is not symmetric."""
 
 PINNED = 5_000
 """Unknowns beyond which an indefinite matrix gets a Cholesky factor with pins: a small one is factorized by SuperLU
@@ -392,6 +393,9 @@ class Network:
                 return factor
         if self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE:
             return self._multigrid(matrix, symmetric)
+        return self._superlu(matrix)
+
+    def _superlu(self, matrix: csc_array) -> SuperLUFactor:
         order, places, indices, pointers = self._pattern.elimination
         return SuperLUFactor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
 
@@ -441,13 +445,15 @@ class Network:
     def _multigrid(self, matrix: csc_array, symmetric: bool) -> Factor:
         from ..linalg.multigrid import Multigrid
 
+        cholesky = symmetric and CHOLESKY
+
         def otherwise() -> Factor:
-            factor = self._cholesky(matrix)
+            factor = self._cholesky(matrix) if cholesky else self._superlu(matrix)
             if factor is None:
                 raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
             return factor
 
-        takes_over = symmetric and CHOLESKY and self.solver is None and self.unknowns <= FACTORIZED
+        takes_over = self.solver is None and self.unknowns <= (FACTORIZED if cholesky else LARGEST)
         rows = matrix.T if symmetric else matrix.tocsr()
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None

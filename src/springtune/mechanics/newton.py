@@ -197,7 +197,11 @@ class Newton:
                 return "singular tangent"
             self._factorizations += 1
         assert self._factor is not None  # kept, or of this iterate
-        there = self._step(self.network.expand(self._factor.step(self._here.missing)))
+        try:
+            step = self._factor.step(self._here.missing)
+        except SingularError as error:  # multigrid solves before it knows
+            return str(error)
+        there = self._step(self.network.expand(step))
         lower = there is not None and there.residual <= (1.0 - 1e-4) * self._best.residual
         if self._keep and not lower:  # the tangent is of an earlier iterate
             self._keep = False

@@ -215,11 +215,10 @@ class ExplicitSteps(Stepper):
         try:
             for call in calls[1:]:
                 begun.append(self._threads.submit(take, call))
-        except RuntimeError:  # the system gives no more threads
+            take(calls[0])
+        except BaseException:  # the system gives no more threads, or the user interrupts
             progress[-1] = 1
             raise
-        else:
-            take(calls[0])
         finally:
             for one in begun:
                 one.result()
