@@ -105,13 +105,12 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
             for name in ("solver", "message", "status"):
                 assert found[name].dims == root[name].dims and (found[name] == root[name]).all(), name
                 assert {"units", "long_name"} <= set(found[name].attrs), name
-    assert complaints(tmp_path / "dataset.nc") == []
     with st.open(tmp_path) as tree:
         assert str(tree.message[{"beam": -1, "mesh_size": -1}].values.ravel()[0]).endswith("\u03bb < 1")
 
 
 def test_texts_of_most_cells_are_stored_as_ever(tmp_path):
-    root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(10000)))})
+    root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(20000)))})
     root.solver[:] = "Cholesky"
     dataset.write(tmp_path / "dataset.nc", {"/": root}, {"springtune_version": "0"})
     with h5py.File(tmp_path / "dataset.nc") as file:
