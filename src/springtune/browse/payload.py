@@ -99,14 +99,16 @@ def _walk(group: h5netcdf.Group, above: dict[str, Any]) -> Iterator[Packed]:
     """A group's description and its numbers, and those of the groups in it; `above` are labels that they share."""
     # Each is asked for once: h5netcdf looks dimensions up anew whenever it is asked.
     read = {name: (variable.dimensions, _attributes(variable)) for name, variable in group.variables.items()}
-    values = {name: _values(group.variables[name], attributes) for name, (_, attributes) in read.items()}
     labels = above | {
-        name: {"labels": [_plain(one) for one in values[name].tolist()], **_words_on(attributes)}
+        name: {
+            "labels": [_plain(one) for one in _values(group.variables[name], attributes).tolist()],
+            **_words_on(attributes),
+        }
         for name, (dimensions, attributes) in read.items()
         if dimensions == (name,)
     }
     if read or group.name == "/":
-        yield _described(group, read, values, labels)
+        yield _described(group, read, labels)
     for child in group.groups.values():
         yield from _walk(child, labels)
 
@@ -114,17 +116,16 @@ def _walk(group: h5netcdf.Group, above: dict[str, Any]) -> Iterator[Packed]:
 def _described(
     group: h5netcdf.Group,
     read: dict[str, tuple[tuple[str, ...], dict[str, Any]]],
-    values: dict[str, np.ndarray],
     labels: dict[str, Any],
 ) -> Packed:
     variables: list[dict[str, Any]] = []
     parts: list[bytes] = []
     sizes: dict[str, int] = {}
     for name, (dimensions, attributes) in read.items():
-        sizes |= zip(dimensions, values[name].shape)
+        sizes |= zip(dimensions, group.variables[name].shape)
         if dimensions == (name,):
             continue
-        row, content = _variable(values[name])
+        row, content = _variable(_values(group.variables[name], attributes))  # each read, packed and forgotten
         row |= {"name": name, "dims": list(dimensions)}
         row |= _words_on(attributes)
         if "flag_meanings" in attributes:
@@ -183,11 +184,12 @@ def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
         return _rows(row | {"type": "float"}, numbers, ~np.isnan(numbers))
     if values.dtype.kind in "iub":
         return _rows(row | {"type": "integer"}, values.astype(np.int32), values != 0)
-    texts = values.astype(str)
-    words, places = np.unique(texts, return_inverse=True)
-    places = places.reshape(texts.shape).astype(np.int32)
-    places[texts == ""] = ABSENT
-    return _rows(row | {"type": "text", "words": words.tolist()}, places, places != ABSENT)
+    # Not as an array of texts, each of which takes the room of the longest one.
+    texts = list(map(str, (values if values.dtype.kind == "O" else values.astype(str)).ravel().tolist()))
+    words = sorted(set(texts))
+    numbers_of = {word: number if word else ABSENT for number, word in enumerate(words)}
+    places = np.fromiter(map(numbers_of.__getitem__, texts), np.int32, len(texts)).reshape(values.shape)
+    return _rows(row | {"type": "text", "words": words}, places, places != ABSENT)
 
 
 def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple[dict[str, Any], bytes]:

@@ -11,6 +11,7 @@ import xarray as xr
 
 from ..jobs import atomic, records
 from ..kinds import outputs
+from ..output.dataset import small_cache
 
 if TYPE_CHECKING:
     from ..kinds.base import Output
@@ -31,7 +32,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     list of Path
         Files written.
     """
-    with xr.open_datatree(dataset, engine="netcdf4") as tree:
+    with small_cache(), xr.open_datatree(dataset, engine="netcdf4") as tree:
         tree.load()
     made: list[Path] = []
     figures = Path(folder) / "figures"

@@ -153,19 +153,16 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
     if at_finite_strain is not None:  # never a nonlinear network against small strain
         linear = root.kinematics == "linear"
         errors = errors.where(linear, at_finite_strain)
-        counted = (counted & linear | (root.status == Status.SOLVED) & at_finite_strain.notnull()).transpose(
-            *errors.dims
-        )
-    errors = errors.where(counted)
-    axis = errors.dims.index("definition")
+        counted = counted & linear | (root.status == Status.SOLVED) & at_finite_strain.notnull()
+    places = np.argwhere(counted.transpose(*errors.dims).values & np.isfinite(errors.values))
+    values, axis = errors.values[tuple(places.T)], errors.dims.index("definition")
     found = []
-    for number in range(errors.sizes["definition"]):
-        values = np.take(errors.values, number, axis)
-        if np.isfinite(values).any():
-            place = list(np.unravel_index(np.nanargmax(abs(values)), values.shape))
-            error = float(values[tuple(place)])
-            others = [dim for dim in errors.dims if dim != "definition"]
-            found.append((error, _label(root.definition, number), _labels(root, others, map(int, place))))
+    for number in np.unique(places[:, axis]).tolist():
+        own = np.flatnonzero(places[:, axis] == number)
+        worst = own[np.argmax(abs(values[own]))]
+        others = [dim for dim in errors.dims if dim != "definition"]
+        where = _labels(root, others, np.delete(places[worst], axis).tolist())
+        found.append((float(values[worst]), _label(root.definition, number), where))
     found.sort(key=lambda row: -abs(row[0]))
     if found:
         number = int(counted.sum())

@@ -2,7 +2,8 @@
 
 import os
 import shutil
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -75,14 +76,15 @@ class Group:
         data, used = {}, set()
         for name, (dimensions, units, long_name, nothing) in chosen.items():
             shape = [len(axes[dimension]) for dimension in dimensions]
-            values = np.full(shape, nothing, dtype=object if isinstance(nothing, str) else None)
-            attributes: dict[str, object] = {"long_name": long_name, "units": units}
             meanings = ({"status": STATUS} | self.flags).get(name.rpartition("_")[2])
+            dtype = "int8" if meanings else object if isinstance(nothing, str) else None
+            values = np.full(shape, nothing, dtype=dtype)
+            attributes: dict[str, object] = {"long_name": long_name, "units": units}
             if meanings:
-                values = values.astype("int8")
                 flags = np.arange(len(meanings), dtype="int8")
                 attributes |= {"flag_values": flags, "flag_meanings": " ".join(meanings)}
-            data[name] = (dimensions, values, attributes | self.further.get(name, {}))
+            # As it is: looking for dates among millions of texts costs more than the texts.
+            data[name] = xr.Variable(dimensions, values, attributes | self.further.get(name, {}), fastpath=True)
             used |= set(dimensions)
         described = DIMENSIONS | self.dimensions
         coordinates = {}
@@ -191,6 +193,13 @@ UNCOMPRESSED = 2**13
 """Bytes up to which an array is stored as it is [B]: compression would save less than it costs to look up."""
 
 
+HOLES = 0.75
+"""Share of the cells of a large array of texts from which on those without a text take no room."""
+
+TEXTS = 128
+"""Cells of a chunk of such an array: few, so that few have a text in some cells only."""
+
+
 def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
     """Write a dataset; the file appears whole or not at all.
 
@@ -211,11 +220,18 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
     tree.attrs = dict(attributes)
     # What groups share with the root is written there alone.
     own = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
-    encoding = {path: {name: _encoding(data, name) for name in data.variables} for path, data in own.items()}
+    runs = {group: _runs(data) for group, data in own.items()}
+    for group, data in own.items():
+        own[group] = data.drop_vars([name for names in runs[group][1:] for name in names])
+    first = xr.DataTree.from_dict(own)
+    encoding = {group: {name: _encoding(data, name) for name in data.variables} for group, data in own.items()}
     path = Path(path)
     try:
-        with replacing(path, synced=True) as unfinished:
-            tree.to_netcdf(unfinished, engine="netcdf4", encoding=encoding)
+        with replacing(path, synced=True) as unfinished, small_cache():
+            first.to_netcdf(unfinished, engine="netcdf4", encoding=encoding)
+            for group, (_, *others) in runs.items():
+                for names in others:
+                    _append(unfinished, group, tree[group].to_dataset(), names)
     except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
         free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
         reason = getattr(error, "strerror", None) or error
@@ -223,6 +239,71 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
             f"{path}: cannot be written ({reason}; {free:.0f} MB are free there); make room, or see to permissions and "
             "limits, and run the study again: what is solved is stored, and only this file is made anew"
         ) from None
+
+
+@contextmanager
+def small_cache() -> Iterator[None]:
+    """Context in which netCDF's library keeps four chunks of each variable, not 64 MB: each is read or written once."""
+    import netCDF4
+
+    before = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(4 * CHUNK)
+    try:
+        yield
+    finally:
+        netCDF4.set_chunk_cache(*before)
+
+
+def _runs(data: xr.Dataset) -> list[list[Hashable]]:
+    """Variables of a group in order, by what writes them: those up to the first texts that are mostly holes, ..."""
+    runs: list[list[Hashable]] = [[]]
+    apart = False
+    for name, array in data.data_vars.items():
+        before, apart = apart, _mostly_holes(array)
+        if apart or before:
+            runs.append([])
+        runs[-1].append(name)
+    return runs
+
+
+def _mostly_holes(array: xr.DataArray) -> bool:
+    """Whether an array holds texts in few of many cells."""
+    if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
+        return False
+    return float(np.mean(array.values == "")) > HOLES
+
+
+def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: Sequence[Hashable]) -> None:
+    """Write further variables into a group of a file: texts that are mostly holes, or what stands between such."""
+    if not _mostly_holes(data[names[0]]):
+        between = xr.Dataset({name: data.variables[name] for name in names})
+        encoding = {name: _encoding(data, name) for name in names}
+        between.to_netcdf(path, mode="a", group=group, engine="netcdf4", encoding=encoding)
+        return
+    # Not netCDF's own library: HDF5 would then have to write into a file to read texts that were never stored.
+    import h5netcdf
+    import h5py
+
+    (name,) = names
+    array = data[name]
+    chunk = _block(array.shape)
+    with h5netcdf.File(path, "a") as file:
+        at = f"{group.rstrip('/')}/{name}"
+        variable = file.create_variable(at, array.dims, h5py.string_dtype(), chunks=chunk)
+        variable.attrs.update(array.attrs)
+        # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
+        for place in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
+            cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(place, chunk))
+            variable[cells] = array.values[cells]
+
+
+def _block(shape: Sequence[int]) -> tuple[int, ...]:
+    """Shape of a chunk of texts: about as long in all dimensions, since grids differ in any of them."""
+    block = [1] * len(shape)
+    while np.prod(block) < TEXTS and block != list(shape):
+        _, number = min((block[n], -n) for n, length in enumerate(shape) if block[n] < length)
+        block[-number] = min(2 * block[-number], shape[-number])
+    return tuple(block)
 
 
 def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:

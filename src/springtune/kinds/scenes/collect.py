@@ -76,16 +76,16 @@ def groups(study, folder):
     _bodies(study, root)
     _printed(study, root)
     data = root.data
-    data["deformation_error"].values = deformation_error(
-        *xr.broadcast(data.displacement, data.reference_displacement.broadcast_like(data.displacement))
-    )
+    _compare(data.deformation_error, data.displacement, data.reference_displacement)
     found = {ROOT.name: data}
     if study.curves:
         found[SENSITIVITY.name] = _sensitivity(study, folder, displacements, axes)
     if study.further_references:
         found[FINITE_STRAIN.name] = _finite_strain(study, folder, axes, data.displacement)
     if block:
-        found[BLOCK.name] = _with_face_error(block.data)
+        pressed_faces = block.data
+        _compare(pressed_faces.face_error, pressed_faces.face_displacement, pressed_faces.reference_face_displacement)
+        found[BLOCK.name] = pressed_faces
     if fields:
         found[FIELDS.name] = fields.data
     return found
@@ -304,9 +304,7 @@ def _finite_strain(study, folder, axes, displacement):
                 values["reference_displacement"] = result["displacement"]
                 values["reference_error_estimate"] = result["error_estimate"]
             finite.put(values, reference=kind, **labels)
-    pairs = xr.broadcast(displacement, finite.data.reference_displacement)
-    error = finite.data["deformation_error"]
-    error.values = deformation_error(*(array.transpose(*error.dims) for array in pairs))
+    _compare(finite.data.deformation_error, displacement, finite.data.reference_displacement)
     return finite.data
 
 
@@ -314,10 +312,11 @@ def _finite_reference(folder, one, kind, fields=()):
     return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
 
 
-def _with_face_error(data):
-    pairs = xr.broadcast(data.face_displacement, data.reference_face_displacement)
-    data["face_error"].values = deformation_error(*(array.transpose(*data.face_error.dims) for array in pairs))
-    return data
+def _compare(error, network, reference):
+    """Write deformation errors where both displacements are: of a dataset that is mostly holes few cells."""
+    network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
+    there = np.isfinite(network) & np.isfinite(reference)
+    error.values[there] = deformation_error(network[there], reference[there])
 
 
 def _face_reference(study, folder, one, kind):

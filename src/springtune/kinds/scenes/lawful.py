@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE)
+"""Labels of references in plane stress of a material's own law: which of them counts first."""
+
+
 def of_own_law(finite: "xr.Dataset") -> "xr.Dataset | None":
     """A group of references at finite strain, with those in plane stress of each material's own law.
 
@@ -45,6 +49,6 @@ def own_law(cell: "xr.Dataset", name: str) -> str | None:
 
     Where no such reference is there, though it was asked for, the label is that of one that was.
     """
-    kinds = [kind for kind in (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE) if kind in cell.reference.values]
+    kinds = [kind for kind in OWN_LAWS if kind in cell.reference.values]
     there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
     return next(iter(there or kinds[::-1]), None)
