@@ -193,7 +193,7 @@ UNCOMPRESSED = 2**13
 """Bytes up to which an array is stored as it is [B]: compression would save less than it costs to look up."""
 
 
-HOLES = 0.75
+MOSTLY = 0.75
 """Share of the cells of a large array of texts from which on those without a text take no room."""
 
 TEXTS = 128
@@ -270,7 +270,7 @@ def _mostly_holes(array: xr.DataArray) -> bool:
     """Whether an array holds texts in few of many cells."""
     if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
         return False
-    return float(np.mean(array.values == "")) > HOLES
+    return float(np.mean(array.values == "")) > MOSTLY
 
 
 def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: Sequence[Hashable]) -> None:
