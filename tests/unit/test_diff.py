@@ -94,6 +94,12 @@ class TestSame:
         found = compare(made(), other)
         assert not found.different and not found.attributes
 
+    @pytest.mark.parametrize("name", ["spring_updates", "explicit_bandwidth"])
+    def test_speeds_of_a_machine_are_not_compared(self, name):
+        slow, fast = (xr.DataTree(xr.Dataset({name: ("threads", [speed])})) for speed in (1e8, 3e8))
+        found = compare(slow, fast)
+        assert not found.different
+
     def test_flags_are_compared_as_words(self):
         other = made()
         status = other["status"]

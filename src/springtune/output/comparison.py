@@ -22,7 +22,7 @@ RELATIVE = 1e-6
 
 MEASURED = (
     "seconds", "*_seconds", "seconds_*", "solver", "peak_memory", "machine_load", "pareto", "cost_exponent",
-    "explicit_steps", "*_bandwidth",
+    "explicit_steps", "spring_updates", "*_bandwidth",
 )  # fmt: skip
 """Names of variables that tell of a machine and what it was doing, not of what was computed."""
 
