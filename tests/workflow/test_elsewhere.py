@@ -1,7 +1,6 @@
 """Jobs that a cluster's nodes run: what they ask for, and what they read of a study."""
 
 import re
-import shutil
 import subprocess
 import sys
 
@@ -34,24 +33,29 @@ def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
     assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
 
 
+def test_rules_whose_jobs_go_elsewhere_have_a_benchmark(repository):
+    """What is noted of a job names it, and a rule cannot be told to have none."""
+    for path in sorted((repository / "workflow/rules").glob("*.smk")):
+        words = path.read_text().split()
+        assert words.count("shell:") == words.count("benchmark:"), path
+
+
 def test_storage_without_a_place_is_asked_for(run):
     run.write("elsewhere.yaml", STUDY)
     code, output = run.snakemake("elsewhere.yaml", "--nolock", "publish")
     assert code == 1 and "where? give --config storage=s3://bucket/folder" in output, output
 
 
-@pytest.mark.parametrize("measured", [True, False])
-def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repository, measured):
+def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repository):
     """As the plugin calls it; that its study is none, and grew by a million scenes, is not seen."""
     run.write("unread.yaml", "no: study\n")
     folder = run.folder / "results/unread"
-    shutil.rmtree(folder, ignore_errors=True)
     told = {
         "rule": "solve",
         "wildcards": {"bundle": "3"},
         "output": ["results/unread/done/solve_{bundle}.json"],
         "log": ["results/unread/logs/solve_{bundle}.log"],
-        "benchmark": "results/unread/benchmarks/solve_{bundle}.tsv" if measured else None,
+        "benchmark": "results/unread/benchmarks/solve_{bundle}.tsv",
         "threads": 1,
         "command": "echo '{braces}' $HDF5_USE_FILE_LOCKING > results/unread/done/solve_3.json",
     }
@@ -65,6 +69,5 @@ def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repo
     assert done.returncode == 0, done.stderr
     assert (folder / "done/solve_3.json").read_text() == "{braces} FALSE\n"
     made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    own = {commands.COMMANDS_FILE, "done/solve_3.json"} | ({"benchmarks/solve_3.tsv"} if measured else set())
-    assert made - {"logs/solve_3.log"} == own and not (run.folder / "None").exists()
+    assert made - {"logs/solve_3.log"} == {commands.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
     assert (folder / commands.COMMANDS_FILE).read_bytes() == before

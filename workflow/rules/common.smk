@@ -154,7 +154,7 @@ def told_elsewhere(job):
         # With wildcards: what the child calls in its turn is named by them.
         "output": list(map(str, job.rule.output)),
         "log": list(map(str, job.rule.log)),
-        "benchmark": str(job.rule.benchmark) if job.rule.benchmark else None,
+        "benchmark": str(job.rule.benchmark),
         "threads": job.threads,
         "command": job.shellcmd,
     }
