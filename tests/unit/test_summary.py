@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from rich.console import Console
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLogHandlerBase
@@ -105,6 +106,11 @@ class TestText:
         assert "  sensitivity, best stiffness  1  1 failed" in lines
         assert "  100x20, free, 1 mm, steel, traction, linear: no minimum" in lines
         assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes; 1 of 1 sensitivity, best stiffness.")
+
+    def test_a_hole_of_no_dimensions_has_its_reason_alone(self):
+        data = xr.Dataset({"status": ((), int(Status.FAILED)), "message": ((), "it folds")})
+        lines = summary.text({"/laying": data}, "A study").splitlines()
+        assert lines[lines.index("laying, failed: 1 of 1") + 1] == "  it folds"
 
     def test_a_few_are_named_of_many_and_of_each_reason_one_first(self):
         beams = [f"beam-{letter}" for letter in "abcdefghij"]

@@ -33,6 +33,13 @@ def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
     assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
 
 
+def test_rules_whose_jobs_go_elsewhere_have_a_benchmark(repository):
+    """What is noted of a job names it, and a rule cannot be told to have none."""
+    for path in sorted((repository / "workflow/rules").glob("*.smk")):
+        words = path.read_text().split()
+        assert words.count("shell:") == words.count("benchmark:"), path
+
+
 def test_storage_without_a_place_is_asked_for(run):
     run.write("elsewhere.yaml", STUDY)
     code, output = run.snakemake("elsewhere.yaml", "--nolock", "publish")

@@ -55,6 +55,8 @@ if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets
             packs_there,
         params:
             config=str(CONFIG),
+        benchmark:
+            RESULTS / "benchmarks/fetch.tsv"
         shell:
             "python -m springtune.campaign.packs fetch {params.config} {input}"
 
@@ -83,6 +85,8 @@ else:
                 folder=str(RESULTS),
             log:
                 RESULTS / f"logs/pack_{stage}.log",
+            benchmark:
+                RESULTS / f"benchmarks/pack_{stage}.tsv"
             shell:
                 "python -m springtune.campaign.packs pack {params.folder} {output} {input} > {log} 2>&1"
 
@@ -95,5 +99,7 @@ else:
             [stored(Path(file).relative_to(RESULTS)) for file in SHOWN_FILES],
         log:
             RESULTS / "logs/upload.log",
+        benchmark:
+            RESULTS / "benchmarks/upload.tsv"
         shell:
             "python -m springtune.campaign.packs copy {output} {input} > {log} 2>&1"

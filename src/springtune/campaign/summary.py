@@ -133,7 +133,7 @@ def _named(cells: Cells) -> Iterator[str]:
     order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
     shown = order if len(order) <= NAMED + 1 else order[:NAMED]
     for labels, message in shown:
-        yield f"  {labels}: {message}" if message else f"  {labels}"
+        yield f"  {': '.join(filter(None, (labels, message)))}"
     if len(shown) < len(order):
         yield f"  and {len(order) - len(shown)} more"
 
