@@ -1,11 +1,14 @@
 """Equilibria against independent solutions, and what is said when there are none."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import root
 
+from springtune.linalg.factors import SingularError
+from springtune.mechanics.follower import FollowerPressure
 from springtune.mechanics.network import Network
 from springtune.mechanics.newton import TOLERANCE
 from springtune.mechanics.statics import StaticProblem
@@ -160,6 +163,90 @@ def test_an_arch_carries_its_closed_form_and_no_more(stiffness, beyond):
     status, message, pivots = problem.judge(s, found)
     assert status is Status.UNSTABLE and np.isnan(pivots)
     assert f"turns back, unstable, at {100 * found.limit_share:.3g} % of the load" in message
+
+
+class Starts(StaticProblem):
+    """Notes the first guesses of Newton's method, and at which loads."""
+
+    guesses = ()
+
+    def newton(self, s, start, *arguments):
+        self.guesses += ((s, start),)
+        return super().newton(s, start, *arguments)
+
+
+def test_newton_starts_from_the_series_about_rest():
+    """Its order is 3: of half the load the error of the guess is a sixteenth, and that of the linear one a quarter."""
+    problem = arch()
+    errors, linear = [], []
+    for s in (-4e-6, -2e-6):
+        watched = Starts(problem.network, problem.network.expand(problem.load))
+        found = watched.nonlinear(s)
+        ((_, start),) = watched.guesses
+        errors.append(np.abs(start - found.displacements).max())
+        linear.append(np.abs(s * problem.slope - found.displacements).max())
+    assert errors[0] / errors[1] == pytest.approx(16, rel=0.1)
+    assert linear[0] / linear[1] == pytest.approx(4, rel=0.1)
+    assert errors[0] < 1e-2 * linear[0]
+
+
+def test_a_followers_load_at_rest_is_the_pattern():
+    """What stays as it is besides it is not lost, nor counted twice."""
+    network = arch().network
+    follower = FollowerPressure(network.mesh, np.array([[1, 2], [2, 0]]), 3.0)
+    rest, dead = np.zeros((3, 2)), np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 5.0]])
+    problem = StaticProblem(network, follower.forces(rest) + dead, follower, dead=dead)
+    np.testing.assert_allclose(problem.load_at(rest), problem.load, rtol=1e-15)
+    alone = StaticProblem(network, follower.forces(rest), follower)
+    np.testing.assert_allclose(alone.load_at(rest), problem.load - network.reduce(dead), rtol=1e-15)
+
+
+@pytest.mark.parametrize(("stretch", "in_steps"), [(0.14, False), (0.16, True), (0.4, True)])
+def test_springs_stretched_far_are_solved_in_load_steps(stretch, in_steps):
+    """A spring between a clamp and a roller is stretched by the force over its stiffness; far is beyond 15 %."""
+    mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
+    held = np.array([[True, True], [False, True], [True, True]])
+    network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
+    problem = Starts(network, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]))
+    found = problem.nonlinear(stretch)
+    assert found.converged and found.displacements[1, 0] == pytest.approx(stretch, rel=1e-12)
+    assert (len({s for s, _ in problem.guesses}) > 1) is in_steps
+
+
+class Singular:
+    """A factor of a tangent that is none."""
+
+    @property
+    def negative_pivots(self):
+        raise SingularError("singular")
+
+
+FLAWS = {
+    "none": ({}, Status.SOLVED, "", 0),
+    "limit beyond the load": ({"limit_share": 1.2}, Status.SOLVED, "", 0),
+    "unstable beyond the load": ({"unstable_share": 1.2}, Status.SOLVED, "", 0),
+    "limit": ({"limit_share": 0.123}, Status.UNSTABLE, "turns back, unstable, at 12.3 % of the load", np.nan),
+    "no equilibrium": (
+        {"converged": False, "reason": "no luck"},
+        Status.NOT_CONVERGED,
+        "no luck; last residual",
+        np.nan,
+    ),
+    "one pivot": ({"factor": SimpleNamespace(negative_pivots=1)}, Status.UNSTABLE, "has 1 negative pivot", 1),
+    "two pivots": ({"factor": SimpleNamespace(negative_pivots=2)}, Status.UNSTABLE, "has 2 negative pivots", 2),
+    "singular": ({"factor": Singular()}, Status.UNSTABLE, "limit point: the tangent is singular", np.nan),
+    "path": ({"unstable_share": 0.25}, Status.UNSTABLE, "the path to it is unstable at 25 % of the load", 0),
+}
+
+
+@pytest.mark.parametrize(("changes", "status", "message", "negative"), FLAWS.values(), ids=FLAWS)
+def test_an_equilibrium_is_worth_what_its_flaws_leave(changes, status, message, negative):
+    problem, s = arch(), -1e-4
+    found = replace(problem.nonlinear(s), **changes)
+    got, told, pivots = problem.judge(s, found)
+    assert got is status and (message in told if message else not told)
+    assert told.endswith("pivots") == ("pivots" in message)
+    np.testing.assert_equal(pivots, negative)
 
 
 def test_same_problem_same_numbers():

@@ -391,6 +391,21 @@ def test_pythons_minor_version_counts(monkeypatch):
     assert all(after[name] != before[name] for name in before)
 
 
+def test_of_pythons_version_what_is_before_the_patch_level_counts(monkeypatch):
+    major, minor, patch, *_ = sys.version_info
+
+    def key(*version):
+        forget()
+        monkeypatch.setattr(sys, "version_info", version)
+        return keys.stage_key("kinds.scenes.mesh")
+
+    here = key(major, minor, patch)
+    assert key(major, minor, patch + 1) == here
+    assert len({here, key(major + 1, minor, patch), key(major, minor + 1, patch), key(minor, major, patch)}) == 4
+    monkeypatch.undo()
+    forget()
+
+
 # -- definitions of one's own ------------------------------------------------------------------------------------------
 
 
