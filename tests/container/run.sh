@@ -32,7 +32,10 @@ if [ "${BASE:-registry}" = debootstrap ]; then
     say "base: debian:$debian by debootstrap, not the registry's"
 fi
 podman build --pull=$pull ${ISOLATION:+--isolation "$ISOLATION"} --build-arg "DEBIAN=$debian" --tag $image . \
-    >"$scratch/log" 2>&1 || { tail -n 30 "$scratch/log"; fail "it does not build"; }
+    >"$scratch/log" 2>&1 || {
+    tail -n 30 "$scratch/log"
+    fail "it does not build; set BASE=debootstrap where there is no registry, ISOLATION=chroot where no container starts"
+}
 say "it builds: $(podman image inspect --format '{{.Size}}' $image | awk '{printf "%.2f GB", $1 / 1e9}')"
 
 # As documented: a folder of one's own, a user whom the image does not know, nothing of the image writable.
