@@ -30,7 +30,7 @@ def locked(path: Path) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        By the normalized name of the distribution; those for other systems or versions of Python are left out.
+        By the normalised name of the distribution; those for other systems or versions of Python are left out.
     """
     from packaging.requirements import InvalidRequirement, Requirement
     from packaging.utils import canonicalize_name
