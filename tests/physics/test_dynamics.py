@@ -488,14 +488,14 @@ def test_an_interruption_while_threads_begin_ends_those_that_have_begun():
     motion = beam(size=7e-4)
     stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
     stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
-    begin = stepper._threads.submit
+    begin = stepper.threads.submit
 
     def submit(*call):
         begun.append(begin(*call))
         raise KeyboardInterrupt
 
     begun = []
-    stepper._threads.submit = submit
+    stepper.threads.submit = submit
     with pytest.raises(KeyboardInterrupt):
         stepper.advance(10)
     stepper.close()

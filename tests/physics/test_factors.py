@@ -13,7 +13,7 @@ from springtune.linalg.ordering import nested_dissection, spread
 from springtune.linalg.pinned import factorize_pinned
 from springtune.mechanics.arc_length import follow
 from springtune.mechanics.follower import FollowerPressure
-from springtune.mechanics.network import PINNED, Network
+from springtune.mechanics.network import PINNED, Network, successor
 from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
@@ -279,26 +279,30 @@ def test_multigrid_tells_of_a_particle_that_is_held_by_nothing_or_pushed_away(fa
     assert network.rest_factor.negative_pivots == 1
 
 
-def test_superlu_takes_over_from_multigrid_where_there_is_no_cholmod(monkeypatch):
-    monkeypatch.setattr("springtune.linalg.multigrid.MAX_CG_ITERATIONS", 3)
-    monkeypatch.setattr("springtune.mechanics.network.LARGE", 100)
-    monkeypatch.setattr("springtune.mechanics.network.CHOLESKY", False)
-    mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
-    found, exact = (problem_on(mesh, solver=solver).linear(1e-6) for solver in (None, "SuperLU"))
-    assert np.array_equal(found.displacements, exact.displacements)
-    assert (found.factor.name, found.factor.negative_pivots) == ("SuperLU", 0)
+@pytest.mark.parametrize(
+    ("solver", "unknowns", "symmetric", "cholesky", "found"),
+    [
+        (None, 2_500_000, True, True, "Cholesky"),
+        (None, 2_500_001, True, True, None),
+        (None, 600_000, True, False, "SuperLU"),
+        (None, 600_000, False, True, "SuperLU"),  # a pressure that follows its side, say
+        (None, 600_001, True, False, None),
+        ("multigrid", 1_000, True, True, None),
+    ],
+)
+def test_what_takes_over_from_multigrid(solver, unknowns, symmetric, cholesky, found):
+    assert successor(solver, unknowns, symmetric, cholesky) == found
 
 
-def test_an_unsymmetric_tangent_that_gradients_do_not_solve_goes_to_superlu(monkeypatch):
-    monkeypatch.setattr("springtune.linalg.multigrid.MAX_CG_ITERATIONS", 3)
-    monkeypatch.setattr("springtune.mechanics.network.LARGE", 100)
+def test_an_unsymmetric_tangent_that_gradients_do_not_solve_goes_to_superlu():
     mesh = MESH_TYPES["structured"](0.1, 0.04, 1.8e-3)
     top = mesh.edges[(mesh.points[mesh.edges][:, :, 1] >= mesh.points[:, 1].max()).all(axis=1)]
     pressed = 0 * mesh.points, (0.05, FollowerPressure.of_side(mesh, top, 0))
-    network = problem_on(mesh).network
-    factor, tangent, right = network.factorize_tangent(*pressed), network.tangent(*pressed), np.ones(network.unknowns)
+    network, exact = problem_on(mesh).network, problem_on(mesh, solver="SuperLU").network
+    tangent, right = network.tangent(*pressed), np.ones(network.unknowns)
+    places = np.flatnonzero(~network.held)
+    factor = Multigrid(tangent.tocsr(), mesh.points, places, lambda: exact.factorize_tangent(*pressed))
     assert np.abs(tangent @ factor.solve(right) - right).max() <= 1e-8
-    assert factor.name == "SuperLU"
 
 
 def test_newton_goes_on_in_steps_where_multigrid_meets_an_unstable_tangent():

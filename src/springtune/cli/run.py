@@ -22,7 +22,7 @@ NOT_SOLVED = 3
 WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
 """Files by which a checkout is known."""
 
-ELSEWHERE = "SPRINGTUNE_WORKFLOW"
+NAMED_BY = "SPRINGTUNE_WORKFLOW"
 """Environment variable that names a checkout whose workflow runs in the current folder, as that of a container does."""
 
 
@@ -77,7 +77,7 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     except StudyError as error:
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
-    folder = Path.cwd() if os.environ.get(ELSEWHERE) else checkout
+    folder = Path.cwd() if os.environ.get(NAMED_BY) else checkout
     if folder != Path.cwd():
         click.echo(f"results go to {folder / 'results' / study.name}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
@@ -137,14 +137,12 @@ def _library_checkout() -> Path | None:
 
 def checkout_of_run() -> Path | None:
     """Folder of the workflow: the one that is named, this one, or that of the library; None where there is none."""
-    named = os.environ.get(ELSEWHERE)
+    named = os.environ.get(NAMED_BY)
     if not named:
         return Path.cwd() if checkout_here() else _library_checkout()
     folder = Path(named).absolute()
     if not is_checkout(folder):
-        raise click.ClickException(
-            f"{ELSEWHERE}: {named} has no Snakefile of springtune; name the folder of its source"
-        )
+        raise click.ClickException(f"{NAMED_BY}: {named} has no Snakefile of springtune; name the folder of its source")
     return folder
 
 
@@ -156,7 +154,7 @@ def how_to_get_one(study: Path | None) -> str:
         "studies are run by springtune's workflow, which is in its source and not in the installed package; get a "
         f"clone, or unpack springtune-{__version__}.tar.gz, change to its folder, and there\n"
         f"  springtune run {study.absolute() if study else USUAL_STUDY}\n"
-        f"or name that folder by {ELSEWHERE}, to have the results here"
+        f"or name that folder by {NAMED_BY}, to have the results here"
     )
 
 

@@ -38,6 +38,33 @@ PINNED = 5_000
 as fast."""
 
 
+def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
+    """Solver that takes over from multigrid where conjugate gradients do not end.
+
+    Parameters
+    ----------
+    solver : str or None
+        That a network was made with: one that is named has no successor.
+    unknowns : int
+    symmetric : bool
+        Whether the matrix is.
+    cholesky : bool, optional
+        Whether CHOLMOD is there.
+
+    Returns
+    -------
+    str or None
+        None where factors would take more memory than most machines have.
+
+    Examples
+    --------
+    >>> [successor(None, 500_000, symmetric, cholesky=True) for symmetric in (True, False)]
+    ['Cholesky', 'SuperLU']
+    """
+    first, most = ("Cholesky", FACTORIZED) if symmetric and cholesky else ("SuperLU", LARGEST)
+    return first if solver is None and unknowns <= most else None
+
+
 class Network:
     """Particles joined by springs, some of their directions held.
 
@@ -445,19 +472,18 @@ class Network:
     def _multigrid(self, matrix: csc_array, symmetric: bool) -> Factor:
         from ..linalg.multigrid import Multigrid
 
-        cholesky = symmetric and CHOLESKY
+        next_one = successor(self.solver, self.unknowns, symmetric)
 
         def otherwise() -> Factor:
-            factor = self._cholesky(matrix) if cholesky else self._superlu(matrix)
+            factor = self._cholesky(matrix) if next_one == "Cholesky" else self._superlu(matrix)
             if factor is None:
                 raise SingularError("the tangent is singular, or unstable in more ways than pins can hold")
             return factor
 
-        takes_over = self.solver is None and self.unknowns <= (FACTORIZED if cholesky else LARGEST)
         rows = matrix.T if symmetric else matrix.tocsr()
         at_rest = self.__dict__.get("rest_factor")
         like = at_rest if isinstance(at_rest, Multigrid) else None
-        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if takes_over else None, like)
+        return Multigrid(rows, self.mesh.points, self._pattern.places, otherwise if next_one else None, like)
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""

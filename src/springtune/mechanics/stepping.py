@@ -214,7 +214,7 @@ class ExplicitSteps(Stepper):
 
         try:
             for call in calls[1:]:
-                begun.append(self._threads.submit(take, call))
+                begun.append(self.threads.submit(take, call))
             take(calls[0])
         except BaseException:  # the system gives no more threads, or the user interrupts
             progress[-1] = 1
@@ -236,14 +236,14 @@ class ExplicitSteps(Stepper):
         return [partial(function, number, *part, *rest) for number, part in enumerate(self._parts)], progress
 
     @cached_property
-    def _threads(self) -> ThreadPoolExecutor:
+    def threads(self) -> ThreadPoolExecutor:
         """Threads for all parts but the first; they stay on their cores from one call to the next."""
         return ThreadPoolExecutor(max(1, len(self._parts) - 1))
 
     def close(self) -> None:
         """See `Stepper`."""
-        if "_threads" in self.__dict__:
-            self._threads.shutdown()
+        if "threads" in self.__dict__:
+            self.threads.shutdown()
 
     def _advance_energies(self, steps: int) -> None:
         """As the kernels, of a network whose energies are not compiled."""
