@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..jobs import atomic
-from ..kinds.division import dealt, part_of
+from ..kinds.division import dealt, taken
 from ..registry import NAME, NAME_RULE
 from ..study.messages import StudyError
 from ..study.model import Part
@@ -63,14 +63,14 @@ def write_parts(study: "Study", count: int, by: str, folder: Path) -> list[Writt
         which = f"part {study.part.number} of {study.part.of}"
         raise StudyError(f"{study.path}: is {which} of a study already; split the whole one")
     digest, written = digest_of(study.text), []
-    for number, (share, _) in enumerate(dealt(study, count, by), 1):
+    for number, (cost, share) in enumerate(dealt(study, count, by), 1):
         path = folder / f"{study.name}-{number}-of-{count}.yaml"
         if not NAME.fullmatch(path.stem):
             raise StudyError(f"{study.path}: '{path.stem}' cannot name a part; rename the study: {NAME_RULE}")
         if path.exists() and not is_part(path.read_text(errors="replace")):
             raise StudyError(f"{path}: is another study, and no part of one; rename it, or write to another folder")
-        own = part_of(replace(study, name=path.stem, path=path, part=Part(number, count, by, digest)))
-        written.append(Written(path, own, share))
+        own = taken(replace(study, name=path.stem, path=path, part=Part(number, count, by, digest)), share)
+        written.append(Written(path, own, cost))
     copied = _named_files(study, folder)
     for place, content in copied.items():
         atomic.write_bytes(place, content)

@@ -109,6 +109,22 @@ def part_of(study: "Study") -> "Study":
     if study.part is None:
         return study
     _, share = dealt(study, study.part.of, study.part.by)[study.part.number - 1]
+    return taken(study, share)
+
+
+def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
+    """What a study asks for with some of its pieces alone.
+
+    Parameters
+    ----------
+    study : Study
+    share : mapping of str to list of tuple
+        Names of pieces by kind, see `dealt`.
+
+    Returns
+    -------
+    Study
+    """
     for kind in kinds():
         if not study.parts[kind.name]:
             continue
