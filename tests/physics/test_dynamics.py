@@ -456,27 +456,58 @@ def test_the_numbers_are_the_same_for_any_number_of_threads(linear, damped, prec
     assert np.abs(runs[0].displacements).max() > 0
 
 
-def test_parts_of_a_network_have_all_of_it_once():
-    pointers = beam(mesh_type="free", size=1e-3).stiffness_matrix.indptr
-    for threads in (1, 2, 7):
-        parts = stepping.parts_of(pointers, threads)
-        assert len(parts) == threads and parts[0][0] == 0 and parts[-1][1] == len(pointers) - 1
-        assert all(one[1] == other[0] and one[0] < one[1] for one, other in zip(parts, parts[1:]))
-    assert stepping.parts_of(pointers, 10**6)[0][1] > 1  # not more than have enough to do
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("linear", [False, True])
+def test_steps_that_follow_each_other_along_a_network_are_those_of_the_whole(linear, damped):
+    """Blocks that are some steps ahead of others take the steps that one pass over all particles a step takes."""
+    motion = beam(mesh_type="alternating", size=7e-4, linear=linear, mass_damping=20.0)
+    step, steps, network = 0.5 * motion.step_bound("symplectic-euler"), 45, motion.network
+    if damped:
+        motion = with_(motion, dampers=0.05 * step * network.stiffness)
+    inverse = np.where(network.held, 0.0, 1 / motion.inertia)
+    u, v = np.zeros((2, *motion.load.shape))
+    for _ in range(steps):
+        force = motion.missing(u)
+        if damped:
+            force = force - motion.damper_tangent(u) @ network.reduce(v)
+        v = v + step * (inverse * network.expand(force) - motion.mass_damping * v)
+        u = u + step * v
+    found = motion.run("symplectic-euler", step, steps)
+    # Rounding alone: sums of a dozen forces, taken in another order at each of the steps.
+    assert np.abs(found.displacements - u).max() <= 1e-12 * np.abs(u).max()
+    assert np.abs(found.velocities - v).max() <= 1e-12 * np.abs(v).max()
+
+
+@given(st.integers(1, 10**6), st.integers(1, 10**4), st.floats(1, 20), st.integers(1, 64))
+def test_threads_follow_each_other_at_a_distance_that_the_network_has(rows, bandwidth, entries, threads):
+    pointers = (entries * np.arange(rows + 1)).astype(int)
+    count, size, depth = stepping.passes_of(pointers, bandwidth, 80, 40, threads)
+    assert 1 <= count <= threads and 1 <= size and 1 <= depth <= stepping.DEEPEST
+    if count > 1:
+        assert count * (depth * bandwidth + size) <= rows and count * stepping.FEWEST <= pointers[-1]
+    elif rows * 80 + pointers[-1] * 40 <= stepping.CACHE:  # nothing is gained by going ahead
+        assert (size, depth) == (rows, 1)
+
+
+def test_a_pass_is_no_deeper_than_its_rows_have_room_in_the_cache():
+    pointers = 3 * np.arange(10**6 + 1)
+    depths = [stepping.passes_of(pointers, bandwidth, 80, 40, 2)[2] for bandwidth in (100, 500, 1000, 10**5)]
+    assert depths == [stepping.DEEPEST, 4, 2, 1]
+    assert 500 * 4 * (80 + 3 * 40) <= stepping.CACHE < 500 * 6 * (80 + 3 * 40)
 
 
 @pytest.mark.parametrize("broken", [0, 1])
-def test_a_part_that_fails_ends_the_others(broken):
+def test_a_thread_that_fails_ends_the_others(broken):
     motion = beam(size=7e-4)
     assert len(motion.network.mesh.edges) >= 2 * stepping.FEWEST
     stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
     stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
     taken = stepper.function
 
-    def function(part, *arguments):
-        if part == broken:
+    def function(thread, *arguments):
+        if thread == broken:
             raise MemoryError("no room")
-        taken(part, *arguments)
+        taken(thread, *arguments)
 
     stepper.function = function
     with pytest.raises(MemoryError, match="no room"):

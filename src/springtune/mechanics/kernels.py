@@ -7,10 +7,11 @@ Both advance displacements u and velocities v by many steps of
 with d given, and g for each direction: g holds the step over the mass, 0 where a direction is held, so that nothing is
 allocated or branched on. In single precision all arrays and numbers are single.
 
-Each call advances a part of the particles, in a thread of its own: force, velocity and displacement of a particle in
-one pass. What parts read of each other is of the step before, so they wait for each other once a step. The forces on a
-particle are summed in the order of the springs, whatever the parts, so that the numbers are the same for any number of
-threads; a spring between two parts is computed by both.
+Particles are advanced in blocks, and a block by several steps before those far from it, so that its numbers stay in the
+cache of a core: step after step follows along the network at a distance of its bandwidth. So many steps are a pass;
+where there are several threads, they take passes in turns, and each follows the one before at that distance, too
+(pipelined temporal blocking, Wittmann, Hager and Wellein, 10.1109/IPDPSW.2010.5470813). What is computed, and the order
+in which the forces on a particle are summed, is the same for any number of threads and size of the blocks.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,10 +23,10 @@ from numba import config, njit, types
 from numba.extending import intrinsic
 
 PATIENCE = 1000
-"""Looks at another part, some microseconds, after which a waiting thread lets others have its core."""
+"""Looks at another thread, some microseconds, after which a waiting thread lets others have its core."""
 
 STRIDE = 8
-"""Numbers of a part in what tells its progress: a line of the cache, which no other part writes."""
+"""Numbers of a thread in what tells its progress: a line of the cache, which no other thread writes."""
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -76,30 +77,47 @@ _told: Any = intrinsic(_acquire)
 
 
 @_compiled
-def _meet(progress: np.ndarray, part: int, done: int) -> bool:
-    """Wait until all parts have done so many steps; false where one never will."""
-    parts = len(progress) - 1
-    if parts == 1:
+def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: int, distance: int) -> bool:
+    """Wait until the pass before is so many blocks ahead; false where it never will."""
+    threads = len(progress) - 1
+    if threads == 1 or number == 0:
         return True
-    _tell(progress[part], done)
-    for other in range(parts):
-        looks = 0
-        while _told(progress[other]) < done:
-            looks += 1
-            if looks > PATIENCE:
-                if _told(progress[parts]):
-                    return False
-                _yield()
+    ahead = (number - 1) % threads
+    least = (number - 1) // threads * blocks + min(blocks, block + 1 + distance)
+    looks = 0
+    while _told(progress[ahead]) < least:
+        looks += 1
+        if looks > PATIENCE:
+            if _told(progress[threads]):
+                return False
+            _yield()
     return True
 
 
 @_compiled
+def _part(block: int, size: int, behind: int, count: int) -> tuple[int, int]:
+    """Rows of a block, from one to before another, at a distance behind the first step."""
+    first = block * size - behind
+    return min(max(first, 0), count), min(max(first + size, 0), count)
+
+
+@_compiled
+def _pull(
+    rx: float, ry: float, lx: float, ly: float, length: float, stiffness: float
+) -> tuple[float, float, float, float]:
+    """Spring's vector, length, and force over length, from its ends' relative displacement and its vector at rest."""
+    x, y = lx + rx, ly + ry
+    now = np.sqrt(x * x + y * y)
+    # Elongation as (l^2 - L^2) / (l + L): no digits are lost at small strain.
+    square = (lx + x) * rx + (ly + y) * ry
+    return x, y, now, stiffness * square / ((now + length) * now)
+
+
+@_compiled
 def advance_springs(
-    part: int,
-    begin: int,
-    end: int,
-    ghosts: np.ndarray,
+    thread: int,
     pointers: np.ndarray,
+    first: np.ndarray,
     second: np.ndarray,
     rest: np.ndarray,
     lengths: np.ndarray,
@@ -107,90 +125,98 @@ def advance_springs(
     dampers: np.ndarray,
     gain: np.ndarray,
     load: np.ndarray,
-    force: np.ndarray,
     keep: float,
     step: float,
+    size: int,
+    depth: int,
+    bandwidth: int,
+    force: np.ndarray,
+    room: np.ndarray,
     u: np.ndarray,
     v: np.ndarray,
     steps: int,
     progress: np.ndarray,
 ) -> None:
-    """Steps of springs that keep their length law, each with a damper along it, for a part of the particles.
+    """Steps of springs that keep their length law, each with a damper along it, in the passes of a thread.
 
     A particle's force is whole, and nothing needs its displacement any more, when the springs are done whose other ends
-    have smaller numbers, and then its own.
+    have smaller numbers, and then its own. A block's springs are done in three loops, of which the second computes
+    several at once.
 
     Parameters
     ----------
-    part, begin, end : int
-        Number of the part, and its particles, from `begin` to before `end`.
-    ghosts : ndarray of int, shape (n_ghosts,)
-        Particles before `begin` that have springs to the part.
-    pointers : ndarray of int, shape (n_ghosts + end - begin + 1,)
-        First spring of each ghost, to the part alone, and of each particle, to particles of larger numbers.
-    second : ndarray of int, shape (n_springs,)
-        Other ends of these springs, in ascending order for each of the first ones.
-    rest : ndarray, shape (n_springs, 2)
+    thread : int
+    pointers : ndarray of int, shape (n_points + 1,)
+        First spring of each particle, to particles of larger numbers.
+    first, second : ndarray of int, shape (n_springs,)
+        Ends of the springs, in ascending order.
+    rest : ndarray, shape (2, n_springs)
         Rest vectors [m].
     lengths, stiffness, dampers : ndarray, shape (n_springs,)
         Rest length [m], stiffness [1] and damping [s] over the reference stiffness; no dampers have length 0.
-    gain, load, force : ndarray, shape (n_points, 2)
-        g [s-1], load [m], and room for the forces.
+    gain, load : ndarray, shape (n_points, 2)
+        g [s-1] and load [m].
     keep, step : float
         d [1] and step [s].
-    u, v : ndarray, shape (1 or 2, n_points, 2)
-        State [m, m/s], from one to the other in turns where there are two: u needs two if there are several parts, v
-        if there are dampers, too.
+    size, depth, bandwidth : int
+        Particles of a block, steps of a pass, largest difference between the numbers of a spring's ends.
+    force : ndarray, shape (n_points, 2)
+        Loads, and loads again at the end [m].
+    room : ndarray, shape (4, most springs of a block)
+        Of the thread, for what is between the loops.
+    u, v : ndarray, shape (1, n_points, 2)
+        State [m, m/s].
     steps : int
-    progress : ndarray of int64, shape (n_parts + 1, STRIDE)
-        Steps that each part has done, zeros; the last row is not zero where a part has failed.
+    progress : ndarray of int64, shape (n_threads + 1, STRIDE)
+        Blocks that each thread has done, zeros; the last row is not zero where a thread has failed.
     """
-    damped, count = len(dampers) > 0, len(ghosts)
-    for i in range(begin, end):
-        force[i, 0] = load[i, 0]
-        force[i, 1] = load[i, 1]
-    for done in range(steps):
-        a, b = done % len(u), (done + 1) % len(u)
-        c, d = done % len(v), (done + 1) % len(v)
-        for row in range(len(pointers) - 1):
-            ghost = row < count
-            i = ghosts[row] if ghost else begin + row - count
-            fx, fy = load[i, 0], load[i, 1]
-            if not ghost:
-                fx, fy = force[i, 0], force[i, 1]
-            ux, uy = u[a, i, 0], u[a, i, 1]
-            for e in range(pointers[row], pointers[row + 1]):
-                j = second[e]
-                rx, ry = u[a, j, 0] - ux, u[a, j, 1] - uy
-                lx, ly = rest[e, 0], rest[e, 1]
-                x, y = lx + rx, ly + ry
-                length = np.sqrt(x * x + y * y)
-                # Elongation as (l^2 - L^2) / (l + L): no digits are lost at small strain.
-                square = (lx + x) * rx + (ly + y) * ry
-                pull = stiffness[e] * square / ((length + lengths[e]) * length)
+    u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
+    ax, ay, bx, by = room[0], room[1], room[2], room[3]
+    blocks = (count + (depth - 1) * bandwidth + size - 1) // size
+    distance = (depth * bandwidth + size - 1) // size
+    for number in range(thread, (steps + depth - 1) // depth, threads):
+        for block in range(blocks):
+            if not _follow(progress, thread, number, block, blocks, distance):
+                return
+            for done in range(min(depth, steps - number * depth)):
+                begin, end = _part(block, size, done * bandwidth, count)
+                start, stop = np.int64(pointers[begin]), np.int64(pointers[end])
+                for n in range(stop - start):
+                    i, j = first[start + n], second[start + n]
+                    ax[n] = u[j, 0] - u[i, 0]
+                    ay[n] = u[j, 1] - u[i, 1]
+                    if damped:
+                        bx[n] = v[j, 0] - v[i, 0]
+                        by[n] = v[j, 1] - v[i, 1]
                 if damped:
-                    wx, wy = v[c, j, 0] - v[c, i, 0], v[c, j, 1] - v[c, i, 1]
-                    pull += dampers[e] * (x * wx + y * wy) / (length * length)
-                px, py = pull * x, pull * y
-                fx += px
-                fy += py
-                if j < end:
+                    for n in range(stop - start):
+                        e = start + n
+                        x, y, now, pull = _pull(ax[n], ay[n], rest[0, e], rest[1, e], lengths[e], stiffness[e])
+                        pull += dampers[e] * (x * bx[n] + y * by[n]) / (now * now)
+                        ax[n], ay[n] = pull * x, pull * y
+                else:
+                    for n in range(stop - start):
+                        e = start + n
+                        x, y, now, pull = _pull(ax[n], ay[n], rest[0, e], rest[1, e], lengths[e], stiffness[e])
+                        ax[n], ay[n] = pull * x, pull * y
+                for n in range(stop - start):
+                    i, j = first[start + n], second[start + n]
+                    px, py = ax[n], ay[n]
+                    force[i, 0] += px
+                    force[i, 1] += py
                     force[j, 0] -= px
                     force[j, 1] -= py
-            if not ghost:
-                vx, vy = keep * v[c, i, 0] + gain[i, 0] * fx, keep * v[c, i, 1] + gain[i, 1] * fy
-                v[d, i, 0], v[d, i, 1] = vx, vy
-                u[b, i, 0], u[b, i, 1] = ux + step * vx, uy + step * vy
-                force[i, 0], force[i, 1] = load[i, 0], load[i, 1]
-        if not _meet(progress, part, done + 1):
-            return
+                for i in range(begin, end):
+                    vx, vy = keep * v[i, 0] + gain[i, 0] * force[i, 0], keep * v[i, 1] + gain[i, 1] * force[i, 1]
+                    v[i, 0], v[i, 1] = vx, vy
+                    u[i, 0], u[i, 1] = u[i, 0] + step * vx, u[i, 1] + step * vy
+                    force[i, 0], force[i, 1] = load[i, 0], load[i, 1]
+            _tell(progress[thread], number // threads * blocks + block + 1)
 
 
 @_compiled
 def advance_matrix(
-    part: int,
-    begin: int,
-    end: int,
+    thread: int,
     pointers: np.ndarray,
     indices: np.ndarray,
     stiffness: np.ndarray,
@@ -199,42 +225,53 @@ def advance_matrix(
     load: np.ndarray,
     keep: float,
     step: float,
+    size: int,
+    depth: int,
+    bandwidth: int,
     u: np.ndarray,
     v: np.ndarray,
     steps: int,
     progress: np.ndarray,
 ) -> None:
-    """Steps of a linear network for a part of the unknowns, from the rows of its stiffness and damping matrices.
+    """Steps of a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
 
     Parameters
     ----------
-    part, begin, end : int
-        Number of the part, and its unknowns, from `begin` to before `end`.
+    thread : int
     pointers, indices : ndarray of int
         Sparsity of both.
     stiffness, dampers : ndarray, shape (n_entries,)
         Entries [1] and [s]; no dampers have length 0.
     gain, load : ndarray, shape (unknowns,)
-    keep, step : float
-        d [1] and step [s].
+    keep, step, size, depth : float or int
+        As of `advance_springs`, blocks being of unknowns.
+    bandwidth : int
+        Largest difference between the row and the column of an entry.
     u, v : ndarray, shape (2, unknowns) and (1 or 2, unknowns)
         State, from one to the other in turns where there are two: v needs two if there are dampers.
     steps : int
-    progress : ndarray of int64, shape (n_parts + 1, STRIDE)
+    progress : ndarray of int64, shape (n_threads + 1, STRIDE)
         As of `advance_springs`.
     """
-    damped = len(dampers) > 0
-    for done in range(steps):
-        a, b = done % len(u), (done + 1) % len(u)
-        c, d = done % len(v), (done + 1) % len(v)
-        for i in range(begin, end):
-            total = load[i]
-            for n in range(pointers[i], pointers[i + 1]):
-                total -= stiffness[n] * u[a, indices[n]]
-            if damped:
-                for n in range(pointers[i], pointers[i + 1]):
-                    total -= dampers[n] * v[c, indices[n]]
-            v[d, i] = keep * v[c, i] + gain[i] * total
-            u[b, i] = u[a, i] + step * v[d, i]
-        if not _meet(progress, part, done + 1):
-            return
+    damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
+    blocks = (count + (depth - 1) * bandwidth + size - 1) // size
+    distance = (depth * bandwidth + size - 1) // size
+    for number in range(thread, (steps + depth - 1) // depth, threads):
+        for block in range(blocks):
+            if not _follow(progress, thread, number, block, blocks, distance):
+                return
+            for done in range(min(depth, steps - number * depth)):
+                at = number * depth + done
+                a, b = at % len(u), (at + 1) % len(u)
+                c, d = at % len(v), (at + 1) % len(v)
+                begin, end = _part(block, size, done * bandwidth, count)
+                for i in range(begin, end):
+                    total = load[i]
+                    for n in range(pointers[i], pointers[i + 1]):
+                        total -= stiffness[n] * u[a, indices[n]]
+                    if damped:
+                        for n in range(pointers[i], pointers[i + 1]):
+                            total -= dampers[n] * v[c, indices[n]]
+                    v[d, i] = keep * v[c, i] + gain[i] * total
+                    u[b, i] = u[a, i] + step * v[d, i]
+            _tell(progress[thread], number // threads * blocks + block + 1)

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property, partial
-from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +17,16 @@ from .integrators import EXPLICIT, LAGGED, BackwardEuler
 from .network import Network
 
 FEWEST = 5000
-"""Springs, or entries of a matrix, of a part: with fewer, threads cost more than they save."""
+"""Springs, or entries of a matrix, of a thread: with fewer, threads cost more than they save."""
+
+BLOCK = 256
+"""Rows that are advanced at once: what is between the loops stays next to the processor."""
+
+CACHE = 2**19
+"""Bytes that a thread may expect to keep near its core."""
+
+DEEPEST = 8
+"""Steps of a pass at most: with more, threads wait longer for each other at its ends, and save nothing."""
 
 
 class Moving(Protocol):
@@ -145,24 +153,20 @@ class ExplicitSteps(Stepper):
         motion, network = self.motion, self.motion.network
         first, second = network.first, network.second
         dampers = np.zeros(0) if motion.dampers is None else motion.dampers
-        numbers = [
+        *of_springs, gain, load = (
             np.ascontiguousarray(values, dtype=self.kind)
-            for values in (network.rest_vectors, network.rest_lengths, network.stiffness, dampers, gain, motion.load)
-        ]
-        of_springs, of_points = numbers[:4], [*numbers[4:], np.empty(gain.shape, dtype=self.kind)]
-        self.function = advance_springs
-        self._parts: list[tuple[Any, ...]] = []
+            for values in (network.rest_vectors.T, network.rest_lengths, network.stiffness, dampers, gain, motion.load)
+        )
         pointers = np.searchsorted(first, np.arange(len(gain) + 1))
-        for begin, end in parts_of(pointers, threads):
-            crossing = np.flatnonzero((first < begin) & (second >= begin) & (second < end))
-            ghosts, starts = np.unique(first[crossing], return_index=True)
-            springs = np.r_[crossing, pointers[begin] : pointers[end]]
-            rows = np.r_[starts, len(crossing) + pointers[begin : end + 1] - pointers[begin]]
-            index = [values.astype(np.uint32) for values in (ghosts, rows, second[springs])]
-            own = [values[springs] if len(values) else values for values in of_springs]
-            self._parts.append((begin, end, *index, *own, *of_points))
-        several = len(self._parts) > 1
-        self._states = 1 + several, 1 + (several and len(dampers) > 0)
+        bandwidth = int((second - first).max(initial=1))
+        number = load.itemsize
+        threads, *pace = passes_of(pointers, bandwidth, 10 * number, 4 * number + 8, threads)
+        most = int((pointers[pace[0] :] - pointers[: -pace[0]]).max(initial=0))
+        force, index = load.copy(), (values.astype(np.uint32) for values in (pointers, first, second))
+        arrays = *index, *of_springs, gain, load, *self._numbers, *pace, bandwidth, force
+        self.function = advance_springs
+        self._threads = [(*arrays, np.empty((4, most), dtype=self.kind)) for _ in range(threads)]
+        self._states = 1, 1
 
     def _of_matrix(self, matrix: csc_array, gain: np.ndarray, threads: int) -> None:
         """Prepare steps of a linear network; the matrix is symmetric, so its columns are its rows."""
@@ -172,9 +176,13 @@ class ExplicitSteps(Stepper):
         damping = np.zeros(0) if motion.damper_matrix is None else motion.damper_matrix.data
         index = matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32)
         numbers = matrix.data, damping, network.reduce(gain), network.reduce(motion.load)
+        rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+        bandwidth = int(np.abs(matrix.indices - rows).max(initial=1))
         arrays = *index, *(np.ascontiguousarray(values, dtype=self.kind) for values in numbers)
+        number = self.kind(0).nbytes
+        threads, *pace = passes_of(matrix.indptr, bandwidth, 6 * number, number + 4, threads)
         self.function = advance_matrix
-        self._parts = [(*part, *arrays) for part in parts_of(matrix.indptr, threads)]
+        self._threads = [(*arrays, *self._numbers, *pace, bandwidth)] * threads
         self._as, self._back = network.reduce, network.expand
         self._states = 2, 1 + (len(damping) > 0)
 
@@ -209,7 +217,7 @@ class ExplicitSteps(Stepper):
             try:
                 call()
             except BaseException:
-                progress[-1] = 1  # the others need not wait for this part
+                progress[-1] = 1  # the others need not wait for this one
                 raise
 
         try:
@@ -226,19 +234,21 @@ class ExplicitSteps(Stepper):
             values[0] = values[steps % len(values)]
 
     def _calls(self, steps: int) -> tuple[list[Callable[[], None]], np.ndarray]:
-        """Steps of each part, and the progress by which parts wait for each other."""
+        """Steps of each thread, and the progress by which they wait for each other."""
         from .kernels import STRIDE
 
-        progress = np.zeros((len(self._parts) + 1, STRIDE), dtype=np.int64)
-        rest = *self._numbers, self._u, self._v, steps, progress
+        progress = np.zeros((len(self._threads) + 1, STRIDE), dtype=np.int64)
         function = self.function
         assert function is not None
-        return [partial(function, number, *part, *rest) for number, part in enumerate(self._parts)], progress
+        return [
+            partial(function, number, *arguments, self._u, self._v, steps, progress)
+            for number, arguments in enumerate(self._threads)
+        ], progress
 
     @cached_property
     def threads(self) -> ThreadPoolExecutor:
-        """Threads for all parts but the first; they stay on their cores from one call to the next."""
-        return ThreadPoolExecutor(max(1, len(self._parts) - 1))
+        """Threads beside the caller's; they stay on their cores from one call to the next."""
+        return ThreadPoolExecutor(max(1, len(self._threads) - 1))
 
     def close(self) -> None:
         """See `Stepper`."""
@@ -265,22 +275,45 @@ class ExplicitSteps(Stepper):
         return u, v
 
 
-def parts_of(pointers: np.ndarray, threads: int) -> list[tuple[int, int]]:
-    """Rows, from one to before another, of as many parts with as many entries as threads have enough to do.
+def passes_of(
+    pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, threads: int
+) -> tuple[int, int, int]:
+    """How the rows of a network are advanced: in blocks, some steps of a block before those far from it.
 
     Parameters
     ----------
     pointers : ndarray of int, shape (n_rows + 1,)
         First entry of each row.
+    bandwidth : int
+        Rows that lie between the ends of an entry at most.
+    of_row, of_entry : int
+        Bytes of what belongs to a row and to an entry.
     threads : int
+        At most so many.
 
     Returns
     -------
-    list of tuple of int
+    threads : int
+        As many as have enough to do, and as can follow each other along the rows at the distance that they need.
+    size : int
+        Rows of a block.
+    depth : int
+        Steps of a pass.
     """
-    count = int(min(threads, max(1, pointers[-1] // FEWEST)))
-    ends = np.searchsorted(pointers, np.arange(1, count) * (pointers[-1] / count)).tolist()
-    return list(pairwise([0, *ends, len(pointers) - 1]))
+    rows, entries = len(pointers) - 1, int(pointers[-1])
+    each = of_row + of_entry * entries / max(1, rows)
+    for count in range(min(threads, max(1, entries // FEWEST)), 1, -1):
+        depth = int((rows / count - 2 * BLOCK) / bandwidth)
+        if depth >= 1:
+            return count, BLOCK, max(1, min(depth, _deepest(each, bandwidth)))
+    if rows * each <= CACHE:
+        return 1, rows, 1
+    return 1, BLOCK, _deepest(each, bandwidth)
+
+
+def _deepest(each: float, bandwidth: int) -> int:
+    """Steps of a pass whose rows, of so many bytes each, find room in a cache."""
+    return int(np.clip((CACHE / each - BLOCK) / bandwidth, 1, DEEPEST))
 
 
 def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
