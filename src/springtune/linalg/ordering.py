@@ -1,4 +1,4 @@
-"""Order of elimination: nested dissection of a mesh by coordinates; and particles spread over a mesh."""
+"""Orders of particles: of elimination, by nested dissection; of little bandwidth; and some spread over a mesh."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -33,10 +33,7 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     >>> int(nested_dissection(np.stack([line, 0 * line], axis=1), np.stack([line[:-1], line[1:]], axis=1))[-1])
     49
     """
-    count = len(points)
-    first, second = edges.T
-    ones = np.ones(2 * len(edges), dtype=np.int8)
-    joined = csr_array((ones, (np.r_[first, second], np.r_[second, first])), shape=(count, count))
+    count, joined = len(points), _joined(len(points), edges)
     pointers, neighbours = joined.indptr, joined.indices
     order, low = np.empty(count, dtype=np.int64), np.zeros(count, dtype=bool)
     waiting = [(np.arange(count), 0)]
@@ -63,6 +60,44 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
         order[start + len(part) - len(separator) : start + len(part)] = separator
         waiting += [(left, start), (right, start + len(left))]
     return order
+
+
+def _joined(count: int, edges: np.ndarray) -> csr_array:
+    """Neighbours of each particle, in a row."""
+    first, second = edges.T
+    ones = np.ones(2 * len(edges), dtype=np.int8)
+    return csr_array((ones, (np.r_[first, second], np.r_[second, first])), shape=(count, count))
+
+
+def narrow(count: int, edges: np.ndarray) -> np.ndarray:
+    """Order of particles in which those that share an edge are near: as they are, or reversed Cuthill-McKee.
+
+    Parameters
+    ----------
+    count : int
+        Number of particles.
+    edges : ndarray of int, shape (n_edges, 2)
+
+    Returns
+    -------
+    ndarray of int, shape (count,)
+        Another order only where it at least halves the bandwidth, the largest distance of an edge's ends.
+
+    Examples
+    --------
+    A line whose particles are numbered from both ends in turns, and one that is in order:
+
+    >>> narrow(6, np.array([[0, 2], [2, 4], [4, 5], [3, 5], [1, 3]])).tolist()
+    [1, 3, 5, 4, 2, 0]
+    >>> narrow(4, np.array([[0, 1], [1, 2], [2, 3]])).tolist()
+    [0, 1, 2, 3]
+    """
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    order = reverse_cuthill_mckee(_joined(count, edges), symmetric_mode=True)
+    place = np.argsort(order)
+    before, after = (int(np.abs(numbers[:, 0] - numbers[:, 1]).max(initial=0)) for numbers in (edges, place[edges]))
+    return order if 2 * after <= before else np.arange(count)
 
 
 def spread(points: np.ndarray, count: int) -> np.ndarray:
