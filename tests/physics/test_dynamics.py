@@ -482,7 +482,7 @@ def test_steps_that_follow_each_other_along_a_network_are_those_of_the_whole(lin
 def test_threads_follow_each_other_at_a_distance_that_the_network_has(rows, bandwidth, entries, threads):
     pointers = (entries * np.arange(rows + 1)).astype(int)
     count, size, depth = stepping.passes_of(pointers, bandwidth, 80, 40, threads)
-    assert 1 <= count <= threads and 1 <= size and 1 <= depth <= stepping.DEEPEST
+    assert 1 <= count <= threads and 1 <= size and 1 <= depth <= stepping.DEEPEST_PASS
     if count > 1:
         assert count * (depth * bandwidth + size) <= rows and count * stepping.FEWEST <= pointers[-1]
     elif rows * 80 + pointers[-1] * 40 <= stepping.CACHE:  # nothing is gained by going ahead
@@ -492,7 +492,7 @@ def test_threads_follow_each_other_at_a_distance_that_the_network_has(rows, band
 def test_a_pass_is_no_deeper_than_its_rows_have_room_in_the_cache():
     pointers = 3 * np.arange(10**6 + 1)
     depths = [stepping.passes_of(pointers, bandwidth, 80, 40, 2)[2] for bandwidth in (100, 500, 1000, 10**5)]
-    assert depths == [stepping.DEEPEST, 4, 2, 1]
+    assert depths == [stepping.DEEPEST_PASS, 4, 2, 1]
     assert 500 * 4 * (80 + 3 * 40) <= stepping.CACHE < 500 * 6 * (80 + 3 * 40)
 
 

@@ -20,13 +20,13 @@ from .network import Network
 FEWEST = 5000
 """Springs, or entries of a matrix, of a thread: with fewer, threads cost more than they save."""
 
-BLOCK = 256
+ROWS_AT_ONCE = 256
 """Rows that are advanced at once: what is between the loops stays next to the processor."""
 
 CACHE = 2**19
 """Bytes that a thread may expect to keep near its core."""
 
-DEEPEST = 8
+DEEPEST_PASS = 8
 """Steps of a pass at most: with more, threads wait longer for each other at its ends, and save nothing."""
 
 
@@ -320,17 +320,17 @@ def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, 
     rows, entries = len(pointers) - 1, int(pointers[-1])
     each = of_row + of_entry * entries / max(1, rows)
     for count in range(min(threads, max(1, entries // FEWEST)), 1, -1):
-        depth = int((rows / count - 2 * BLOCK) / bandwidth)
+        depth = int((rows / count - 2 * ROWS_AT_ONCE) / bandwidth)
         if depth >= 1:
-            return count, BLOCK, max(1, min(depth, _deepest(each, bandwidth)))
+            return count, ROWS_AT_ONCE, max(1, min(depth, _deepest(each, bandwidth)))
     if rows * each <= CACHE:
         return 1, rows, 1
-    return 1, BLOCK, _deepest(each, bandwidth)
+    return 1, ROWS_AT_ONCE, _deepest(each, bandwidth)
 
 
 def _deepest(each: float, bandwidth: int) -> int:
     """Steps of a pass whose rows, of so many bytes each, find room in a cache."""
-    return int(np.clip((CACHE / each - BLOCK) / bandwidth, 1, DEEPEST))
+    return int(np.clip((CACHE / each - ROWS_AT_ONCE) / bandwidth, 1, DEEPEST_PASS))
 
 
 def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
