@@ -58,24 +58,29 @@ class Pattern:
         diagonal, then its own, then those below, are in order once they are told apart by column.
         """
         count, joined = self.shape[0], len(self.springs)
-        first, second, own = self.first, self.second, np.arange(count)
+        # Particles that are held in both directions have no blocks.
+        free = (self.number >= 0).any(axis=1)
+        moving, springs = np.flatnonzero(free), np.flatnonzero(free[self.first] & free[self.second])
+        place = np.cumsum(free, dtype=np.int32) - 1
+        first, second, own = place[self.first[springs]], place[self.second[springs]], place[moving]
         # What a block is made of: of the springs, once as it is and once turned, and of the particles.
-        made_of = np.concatenate([np.arange(joined), np.arange(4 * joined, 4 * joined + count), np.arange(joined)])
+        made_of = np.concatenate([springs, 4 * joined + moving, springs], dtype=np.int32, casting="same_kind")
         columns, rows = np.concatenate([second, own, first]), np.concatenate([first, own, second])
-        blocks = csr_array((made_of.astype(np.int32), (columns, rows)), shape=(count, count))
+        blocks = csr_array((made_of, (columns, rows)), shape=(len(moving), len(moving)))
         rows, place = blocks.indices, blocks.data
-        columns = np.repeat(np.arange(count, dtype=np.int32), np.diff(blocks.indptr))
+        columns = np.repeat(own, np.diff(blocks.indptr))
         # Steps to the next row and column of it; where a spring runs the other way its block is transposed.
         way = np.sign(columns - rows)  # 1 where it is as it is, -1 where it is turned, 0 of a particle
         down, right = np.array([[2 * count, 2 * joined, joined], [count, joined, 2 * joined]], dtype=np.int32)[:, way]
         made_of = np.empty((len(rows), 2, 2), dtype=np.int32)
         made_of[:, 0, 0], made_of[:, 0, 1], made_of[:, 1, 0] = place, place + down, place + right
         made_of[:, 1, 1] = place + down + right
-        stacked = bsr_array((made_of, rows, blocks.indptr), shape=(2 * count, 2 * count))
-        entries = stacked.tocsr()
-        if self.size < 2 * count:
-            entries = entries[self.places][:, self.places]
-        return entries.indices.astype(np.int32), entries.indptr.astype(np.int32), entries.data.astype(np.int64)
+        entries = bsr_array((made_of, rows, blocks.indptr), shape=(2 * len(moving), 2 * len(moving))).tocsr()
+        if self.size < 2 * len(moving):
+            places = np.flatnonzero(self.number[moving].ravel() >= 0)
+            entries = entries[places][:, places]
+        indices, pointers = (part.astype(np.int32, copy=False) for part in (entries.indices, entries.indptr))
+        return indices, pointers, entries.data.astype(np.int64)
 
     def moved(self, mesh: Mesh) -> "Pattern":
         """The same of a mesh with the same cells at other points; what depends on where these are is found anew."""
