@@ -59,7 +59,7 @@ class Pattern:
         """
         count, joined = self.shape[0], len(self.springs)
         # Particles that are held in both directions have no blocks.
-        free = (self.number >= 0).any(axis=1)
+        free = self.number.max(axis=1) >= 0
         moving, springs = np.flatnonzero(free), np.flatnonzero(free[self.first] & free[self.second])
         place = np.cumsum(free, dtype=np.int32) - 1
         first, second, own = place[self.first[springs]], place[self.second[springs]], place[moving]
