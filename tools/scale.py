@@ -188,6 +188,10 @@ def measure(scenes: int, folder: Path) -> dict[str, Numbers]:
     done = str(results / "done/present.json")
     found["tables"] = python("-m", "springtune.campaign.present", str(dataset), str(results), done, "", "tables")
     found["tables"]["file"] = megabytes(*(results / "tables").iterdir())
+    done = str(results / "done/figures.json")
+    words = (str(dataset), str(results), done, "", "size", "sweep")
+    found["figures"] = python("-m", "springtune.campaign.present", *words)
+    found["figures"]["file"] = megabytes(*(results / "figures").iterdir())
     return found
 
 
@@ -209,6 +213,9 @@ ROWS = (
     ("tables", "tables", "s", "s"),
     ("", "tables", "MB", "MB"),
     ("their size", "tables", "file", "MB"),
+    ("figures of sizes and sweeps", "figures", "s", "s"),
+    ("", "figures", "MB", "MB"),
+    ("their size", "figures", "file", "MB"),
 )
 """What is told, the step and number that it is, and its unit; memory stands below the seconds of the same step."""
 
