@@ -431,7 +431,10 @@ def test_refusals():
             solve_shape(shape, load, materials)
 
     refused("group 'rihgt' is not there.*'right'", *square((end,), tractions=(Traction("rihgt", (1.0, 0.0)),)))
-    refused("free to move or turn", *square((end,), (Support("left", x=0.0),), tractions=pull))
+    refused(
+        "its supports leave the body free to move along y; hold it",
+        *square((end,), (Support("left", x=0.0),), tractions=pull),
+    )
     clash = (Support("left", 0.0, 0.0), Support("lower", x=0.1))
     refused(r"prescribe 0 and 0.1 m along x at \(0, 0\) mm", *square((end,), clash, tractions=pull))
     refused("'tip' is a point", *square((end,), points={"tip": (1.0, 0.5)}, pressures=(Pressure("tip", 1.0),)))

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import spatial
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import coo_array
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
+from ..mesh.parts import check_held
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
@@ -704,27 +704,9 @@ class _Level:
                 straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
                 values[functions[2:]] = inverse @ (wanted[2:] - straight)
                 held[functions] = True
-        self._check_rigid(held)
+        where = f"load {problem.load.name!r} of shape {problem.shape.name!r}"
+        check_held(space.mesh.points, space.edges, held[: len(space.mesh.points)], where)
         return held, values
-
-    def _check_rigid(self, held: np.ndarray) -> None:
-        """Refuse supports that leave a piece of the body free to move."""
-        space, problem = self.space, self.problem
-        n = len(space.mesh.points)
-        ends = space.edges
-        count, piece = connected_components(csr_array((np.ones(len(ends)), ends.T), shape=(n, n)), directed=False)
-        middle, extent = space.mesh.points.mean(axis=0), np.ptp(space.mesh.points, axis=0).max()
-        x, y = ((space.mesh.points - middle) / extent).T
-        ones, zeros = np.ones(n), np.zeros(n)
-        modes = np.stack([[ones, zeros], [zeros, ones], [-y, x]]).transpose(2, 1, 0)  # points, axes, modes
-        for number in range(count):
-            rows = modes[(piece == number)][held[:n][piece == number]]
-            if len(rows) < 3 or np.linalg.matrix_rank(rows, tol=1e-9 * np.sqrt(len(rows))) < 3:
-                what = "the body" if count == 1 else f"a piece of the body that is joined to no other, of {count},"
-                raise ValueError(
-                    f"load {problem.load.name!r} of shape {problem.shape.name!r}: supports leave {what} free to move "
-                    "or turn; hold it in both directions, at two points at least"
-                )
 
     def _solve(
         self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
