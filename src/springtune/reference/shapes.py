@@ -190,6 +190,42 @@ def solve_shape(
     return converge(shape, load, by_part, grouped, tolerance)
 
 
+def solve_each(
+    shape: Shape,
+    load: LoadCase,
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    grouped: GroupedMesh | None = None,
+) -> tuple[list[ShapeReference], dict[str, str]]:
+    """References that between them have all quantities of interest that have one.
+
+    One that has none, such as the stress at a corner, does not cost the others theirs.
+
+    Parameters
+    ----------
+    shape, load, materials, grouped
+        As in `solve_shape`.
+
+    Returns
+    -------
+    references : list of ShapeReference
+        One where all quantities converge together.
+    lacking : dict of str to str
+        Why others have none, by name; by ``""`` where the load asks for none.
+    """
+    try:
+        return [solve_shape(shape, load, materials, grouped)], {}
+    except (ReferenceNotConvergedError, ValueError) as error:
+        if len(load.quantities) < 2:
+            return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
+    found: list[ShapeReference] = []
+    lacking: dict[str, str] = {}
+    for one in load.quantities:
+        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
+        found += more
+        lacking |= why
+    return found, lacking
+
+
 def converge(
     shape: Shape,
     load: LoadCase,
