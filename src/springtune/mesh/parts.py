@@ -1,8 +1,6 @@
 """Parts of a mesh that no edge joins, and whether they are held against rigid motions."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 
 def connected(edges: np.ndarray, count: int) -> np.ndarray:
@@ -22,6 +20,9 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
     >>> connected(np.array([[0, 2], [3, 1]]), 5).tolist()
     [0, 1, 0, 1, 2]
     """
+    from scipy.sparse import coo_array  # here, since studies are read without scipy
+    from scipy.sparse.csgraph import connected_components
+
     joined = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
 

@@ -38,7 +38,7 @@ def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
     load 'pull': its supports leave the body free to move along y; hold it
     >>> check_case(grouped, st.LoadCase("pull", (*pull.supports, st.Support("corner", y=0)), pull.tractions))
     """
-    from ..mesh.parts import check_held  # here, as below: studies are read without scipy and meshes
+    from ..mesh.parts import check_held  # here, since they stand on meshes
     from .boundary import supported
 
     case.check_names(grouped.sides, grouped.points, grouped.unusable)
