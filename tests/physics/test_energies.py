@@ -114,6 +114,34 @@ def test_a_common_motion_costs_no_digits(kind):
     assert np.abs(energy.forces(moved + 1.0) - forces).max() <= 1e-12 * np.abs(forces).max()
 
 
+ENERGIES = {
+    AreaEnergy: {"modulus": (16,)},
+    AngleEnergy: {"modulus": (16,)},
+    BiquadraticEnergy: {"tensile": (16, 3), "coupling": (16, 3)},
+    YeohEnergy: {"coefficients": (16, 2), "largest": (16,)},
+    NeoHookeEnergy: {"shear": (16,), "bulk": (16,)},
+}
+
+
+@pytest.mark.parametrize(("kind", "shapes"), ENERGIES.items(), ids=lambda one: getattr(one, "__name__", ""))
+def test_keys_tell_energies_apart_by_their_cells_and_by_each_modulus(kind, shapes):
+    """What a network is recognised by: of two with one key the tangent at rest is factorized once."""
+    points = np.random.default_rng(0).uniform(size=(18, 2))
+    corners = np.arange(16)[:, None] + [0, 1, 2]
+    moduli = {name: np.ones(shape) for name, shape in shapes.items()}
+    known = kind(points, corners, **moduli).key
+    assert kind(points, corners.copy(), **{name: one.copy() for name, one in moduli.items()}).key == known
+    others = [kind(points, corners[:, ::-1], **moduli)]
+    for name, one in moduli.items():
+        changed = one.copy()
+        changed.flat[-1] = 2.0
+        others.append(kind(points, corners, **moduli | {name: changed}))
+    if kind is BiquadraticEnergy:
+        others.append(kind(points, corners, moduli["tensile"]))
+        others.append(kind(points, corners, 2 * moduli["tensile"]))
+    assert len({known, *(one.key for one in others)}) == 1 + len(others)
+
+
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**31), nu=st.floats(0, 0.5), amplitude=st.floats(1e-5, 1.5e-3))
 def test_delingette_is_saint_venant_kirchhoff_at_any_strain(seed, nu, amplitude):

@@ -253,16 +253,40 @@ def test_a_prescribed_end_moves_a_chain_by_its_closed_form():
     np.testing.assert_array_equal(start, 2.0 * problem.slope)
 
 
-def test_a_singular_tangent_on_the_path_is_where_it_turns_unstable():
+@pytest.mark.parametrize(
+    ("told", "share"), [((1, False), 0.25), ((2, True), 0.25), (None, 0.25), ((0, True), np.nan), ((0, False), np.nan)]
+)
+def test_a_path_is_unstable_from_its_first_negative_or_singular_tangent_on(told, share):
+    """Flutter on the way is no matter of where the path leads."""
+
     class Turning(StaticProblem):
         def stability(self, s, displacements, factor):
-            if abs(s) < 0.3 * 0.4:
+            if told is None:
                 raise SingularError("singular")
-            return super().stability(s, displacements, factor)
+            return told
 
     problem, _ = propped_arch(1.0)
     found = Turning(problem.network, problem.network.expand(problem.load)).nonlinear(-0.4)
-    assert found.converged and found.unstable_share == 0.25
+    assert found.converged
+    np.testing.assert_equal(found.unstable_share, share)
+
+
+def test_a_mode_under_a_follower_pressure_is_its_stiffness_over_its_mass():
+    """An arch pressed flat resists by 2 (1 - L0) under a third of the mass; the pressure's pull on it is even."""
+    network = arch().network
+    follower = FollowerPressure(network.mesh, np.array([[1, 2], [2, 0]]), 3.0)
+    problem = StaticProblem(network, follower.forces(np.zeros((3, 2))), follower)
+    flat = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, -0.1]])
+    factor = problem.factorize_tangent(1.0, flat)
+    np.testing.assert_allclose(problem.modes(1.0, flat, factor), [3 * 2 * (1 - np.hypot(1, 0.1))], rtol=1e-9)
+    assert problem.stability(1.0, flat, factor) == (1, False)
+
+
+def test_a_linear_residual_is_over_the_load():
+    """A power of two times the load changes no digit of it."""
+    one, _ = beam_problem("free")
+    two = StaticProblem(one.network, 2.0**-20 * one.network.expand(one.load))
+    assert two.linear(1.0).residual == one.linear(1.0).residual > 0
 
 
 def test_newton_starts_from_the_series_about_rest():
@@ -334,6 +358,8 @@ FLAWS = {
     "none": ({}, Status.SOLVED, "", 0),
     "limit beyond the load": ({"limit_share": 1.2}, Status.SOLVED, "", 0),
     "unstable beyond the load": ({"unstable_share": 1.2}, Status.SOLVED, "", 0),
+    "limit at the load": ({"limit_share": 1.0}, Status.SOLVED, "", 0),
+    "unstable at the load": ({"unstable_share": 1.0}, Status.SOLVED, "", 0),
     "limit": ({"limit_share": 0.123}, Status.UNSTABLE, "turns back, unstable, at 12.3 % of the load", np.nan),
     "no equilibrium": (
         {"converged": False, "reason": "no luck"},
