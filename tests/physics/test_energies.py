@@ -1,5 +1,7 @@
 """Energies of areas, angles and squared lengths: exact forces and tangents, and the continuum that they stand for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -97,21 +99,67 @@ def test_small_strain_keeps_its_digits(kind):
     assert np.abs(forces - linear).max() <= 1e-10 * np.abs(linear).max()
 
 
-@pytest.mark.parametrize("kind", [*KINDS, "neo-Hooke", "Yeoh"])
+ALL_KINDS = (*KINDS, "neo-Hooke", "Yeoh")
+
+
+def any_energy(kind, seed):
+    """As `energy_of`, with the laws of rubber."""
+    if kind in KINDS:
+        return energy_of(kind, seed)
+    mesh, one = MESH_TYPES["free"](0.02, 0.01, 5e-3), np.ones
+    count = len(mesh.triangles)
+    moduli = (one((count, 3)),) if kind == "Yeoh" else (one(count), 2 * one(count))
+    return mesh, (YeohEnergy if kind == "Yeoh" else NeoHookeEnergy)(mesh.points, mesh.triangles, *moduli)
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_a_common_motion_costs_no_digits(kind):
     """Strains of 1e-9, moved by 1 m as a whole: changes are taken from differences of displacements."""
-    if kind in KINDS:
-        mesh, energy = energy_of(kind, 8)
-    else:
-        mesh, one = MESH_TYPES["free"](0.02, 0.01, 5e-3), np.ones
-        count = len(mesh.triangles)
-        moduli = (one((count, 3)),) if kind == "Yeoh" else (one(count), 2 * one(count))
-        energy = (YeohEnergy if kind == "Yeoh" else NeoHookeEnergy)(mesh.points, mesh.triangles, *moduli)
+    mesh, energy = any_energy(kind, 8)
     # Multiples of 2^-50 m: one added to them is exact.
     moved = np.round(scattered(mesh, 9, 5e-12) * 2**50) / 2**50
     forces = energy.forces(moved)
     # Positions, which directions are taken from, are rounded to 1e-16 m, over 5 mm.
     assert np.abs(energy.forces(moved + 1.0) - forces).max() <= 1e-12 * np.abs(forces).max()
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
+def test_a_place_far_from_the_origin_costs_no_digits(kind):
+    """A kilometre away: areas and sides at rest are taken from differences of positions, too."""
+    mesh, energy = any_energy(kind, 8)
+    # Multiples of 2^-40 m: 1,024 m added to them are exact.
+    points = np.round(mesh.points * 2**40) / 2**40
+    moved = np.round(scattered(mesh, 9, 1e-5) * 2**40) / 2**40
+    here, away = (replace(energy, points=points + offset).forces(moved) for offset in (0.0, 1024.0))
+    assert np.abs(away - here).max() <= 1e-13 * np.abs(here).max()
+
+
+ENERGIES = {
+    AreaEnergy: {"modulus": (16,)},
+    AngleEnergy: {"modulus": (16,)},
+    BiquadraticEnergy: {"tensile": (16, 3), "coupling": (16, 3)},
+    YeohEnergy: {"coefficients": (16, 2), "largest": (16,)},
+    NeoHookeEnergy: {"shear": (16,), "bulk": (16,)},
+}
+
+
+@pytest.mark.parametrize(("kind", "shapes"), ENERGIES.items(), ids=lambda one: getattr(one, "__name__", ""))
+def test_keys_tell_energies_apart_by_their_cells_and_by_each_modulus(kind, shapes):
+    """What a network is recognised by: of two with one key the tangent at rest is factorized once."""
+    points = np.random.default_rng(0).uniform(size=(18, 2))
+    corners = np.arange(16)[:, None] + [0, 1, 2]
+    moduli = {name: np.ones(shape) for name, shape in shapes.items()}
+    known = kind(points, corners, **moduli).key
+    assert kind(points, corners.copy(), **{name: one.copy() for name, one in moduli.items()}).key == known
+    others = [kind(points, corners[:, ::-1], **moduli)]
+    for name, one in moduli.items():
+        changed = one.copy()
+        changed.flat[-1] = 2.0
+        others.append(kind(points, corners, **moduli | {name: changed}))
+    if kind is BiquadraticEnergy:
+        others.append(kind(points, corners, moduli["tensile"]))
+        others.append(kind(points, corners, 2 * moduli["tensile"]))
+    assert len({known, *(one.key for one in others)}) == 1 + len(others)
 
 
 @settings(max_examples=25)

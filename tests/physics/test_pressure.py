@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springtune.mechanics.network import Network
-from springtune.mechanics.statics import MODES, FollowerPressure, StaticProblem
+from springtune.mechanics.statics import FAR, MODES, FollowerPressure, StaticProblem
 from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, loaded_edges, measured, weights
 from springtune.problem.geometry import Beam
@@ -99,6 +99,15 @@ def test_follower_pressure_turns_with_the_face():
     mesh = problem.network.mesh
     turned = mesh.points @ np.array([[0.0, 1.0], [-1.0, 0.0]]) - mesh.points
     assert problem.follower.forces(turned).sum(axis=0) == pytest.approx([-1, 0], abs=1e-12)
+
+
+def test_load_steps_under_a_follower_pressure_are_stable_where_its_own_share_of_it_is():
+    """A block that is pulled far, in steps: each is judged under the load there, of which many times more flutter."""
+    problem, s, _ = block("paper", stiffness=300.0, size=0.02, follower=True)
+    found = problem.nonlinear(-s)
+    assert problem.network.largest_change(found.displacements) > FAR
+    assert found.converged and np.isnan(found.unstable_share)
+    assert problem.judge(-s, found)[0] is Status.SOLVED
 
 
 def test_few_newton_steps_under_follower_pressure():

@@ -13,7 +13,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
 from springtune.problem.materials import Material
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.reference.shapes import converge, solve_shape
+from springtune.reference.shapes import converge, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 
 STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
@@ -347,6 +347,8 @@ def test_a_polygon_for_a_circle_has_infinite_stresses():
     of_file, grouped = Shape("plate", shape.thickness, file="plate.msh"), mesh_shape(shape, 2e-3)
     with pytest.raises(ValueError, match="'top-of-the-hole' is infinite.*give the shape as an outline with arcs"):
         solve_shape(of_file, load, material, grouped)
+    (alone,), lacking = solve_each(of_file, replace(load, quantities=load.quantities[:2]), material, grouped)
+    assert list(alone.values) == ["end"] and list(lacking) == ["top-of-the-hole"]
     end = replace(load, quantities=load.quantities[:1])
     smooth, coarse = (solve_shape(one, end, material, mesh) for one, mesh in ((shape, None), (of_file, grouped)))
     assert coarse.values["end"] == pytest.approx(smooth.values["end"], rel=1e-3)  # the hole's area is 1 % smaller
@@ -431,7 +433,10 @@ def test_refusals():
             solve_shape(shape, load, materials)
 
     refused("group 'rihgt' is not there.*'right'", *square((end,), tractions=(Traction("rihgt", (1.0, 0.0)),)))
-    refused("free to move or turn", *square((end,), (Support("left", x=0.0),), tractions=pull))
+    refused(
+        "its supports leave the body free to move along y; hold it",
+        *square((end,), (Support("left", x=0.0),), tractions=pull),
+    )
     clash = (Support("left", 0.0, 0.0), Support("lower", x=0.1))
     refused(r"prescribe 0 and 0.1 m along x at \(0, 0\) mm", *square((end,), clash, tractions=pull))
     refused("'tip' is a point", *square((end,), points={"tip": (1.0, 0.5)}, pressures=(Pressure("tip", 1.0),)))

@@ -275,7 +275,7 @@ class TestRefusals:
             run("archive", "results/one"),
             "results/one: is not what the study asks for now",
             "collect: results/one/summary.txt is missing",
-            "make it: snakemake --configfile config/one.yaml",
+            "make it: springtune run config/one.yaml",
         )
         assert not list(Path("results").glob("*.zip*"))
 

@@ -457,6 +457,22 @@ def test_modules_beside_ones_own_definition_count(own):
     assert own(text, helpers__in_more=more.replace("1.0", "2.0")).digest != first.digest
 
 
+def test_modules_of_ones_own_elsewhere_on_the_path_count(own, tmp_path, monkeypatch):
+    """A module, one of a package under a name of Python's own, and none of what Python has or nobody has."""
+    texts = {"apart_from_it": "import scipy", "boxed_up/__init__": "", "boxed_up/json": "import numba"}
+    for name, text in texts.items():
+        path = tmp_path / "elsewhere" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    monkeypatch.syspath_prepend(tmp_path / "elsewhere")
+    tried = "try:\n    import had_by_nobody\nexcept ImportError:\n    import decimal\n"
+    found = own(f"import apart_from_it, boxed_up.json, json\n{tried}{OWN}")
+    others = {path for path in found.files if not path.is_relative_to(dependencies.PACKAGE)}
+    elsewhere = {path.relative_to(tmp_path / "elsewhere") for path in others if path.parent != tmp_path}
+    assert {path.as_posix() for path in elsewhere} == {"apart_from_it.py", "boxed_up/json.py"}
+    assert set(found.packages) == {"had_by_nobody", "numba", "numpy", "scipy"}
+
+
 def test_names_of_the_package_itself_are_followed(own):
     text = OWN.replace("from springtune.springs import Springs, definition", "import springtune as st")
     text = text.replace("@definition", "@st.definition").replace("Springs(", "st.Springs(")

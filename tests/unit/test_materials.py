@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from springtune import StudyError, load_study
 from springtune.jobs.hashing import hash_of
-from springtune.jobs.keys import material_key
+from springtune.jobs.keys import beam_key, material_key
 from springtune.kinds import kinds
+from springtune.problem.geometry import Beam
 from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, engineering_constants, material_of
 from springtune.study import study_model
 from springtune.study.expand import declared
@@ -134,6 +135,11 @@ def test_results_depend_on_every_constant_and_on_no_label():
     for constant in CONSTANTS:
         assert hash_of(material_key(replace(PLY, **{constant: getattr(PLY, constant) + 1e6}))) != known
     assert hash_of(material_key(replace(PLY, density=3.0), density=True)) != hash_of(material_key(PLY, density=True))
+
+
+def test_of_a_beam_all_but_its_label_is_in_a_key():
+    known = beam_key(Beam(0.2, 0.04, 1e-3, "200x40"))
+    assert known == {"length": 0.2, "height": 0.04, "thickness": 1e-3, "name": ""}
 
 
 def test_keys_of_isotropic_materials_are_what_they_were():

@@ -106,10 +106,10 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
         noted = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}
         Path("plan.json").write_text(json.dumps({"stages": noted}))
         tool.do_stages(config, "invent")
-        with counted(scenes.completed_key, store.read, Filler.put) as count:
+        with counted(scenes.scene_key, store.read, Filler.put) as count:
             study = planned(config)[0]
             groups = collect.gathered(study, made.folder)
-        assert count["completed_key"] == len(study.scenes) == 16 * forces
+        assert count["scene_key"] == len(study.scenes) == 16 * forces
         assert int((groups["/"].status == 1).sum()) == len(study.scenes)
         opened[forces] = count["read"]
         # Of a reference its values, and for each kinematics whether it applies; of a mesh its size.

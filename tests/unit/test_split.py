@@ -1,5 +1,8 @@
 """A study split over sites: its parts are all of it and no scene twice, and their results together are those of one."""
 
+import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -283,6 +286,31 @@ def test_results_of_parts_make_the_dataset_of_one_place(there):
             assert found[path][name].values.tobytes() == group[name].values.tobytes() or group[name].dtype == object
     again = run("merge", "config/many.yaml", *PARTS)
     assert "0 of them written" in again.output
+
+
+def test_nothing_runs_before_the_dataset_where_the_study_has_run_before(there):
+    """Snakemake compares the time of what a job took here with those of what the merge tells of the jobs before it."""
+    assert run("merge", "config/many.yaml", *PARTS).exit_code == 0
+    folder = Path("results/many")
+    jobs = sorted(folder.glob("done/*.json"))
+    for job in jobs:  # as a run leaves them
+        atomic.write_text(folder / f"benchmarks/{job.stem}.tsv", "s\n1.0\n")
+    here = [job for job in jobs if job.stem.startswith(("sensitivity", "reference"))]
+    known = {job: sealed.read(job) | {"work": {"of this machine": [1, 1.0, 1.0]}} for job in here}
+    for job in jobs:
+        if job in known:
+            sealed.write(job, known[job])
+        else:  # what it did here was something else
+            sealed.write(job, sealed.read(job) | {"digest": "another"})
+    assert run("merge", "config/many.yaml", *PARTS).exit_code == 0
+    assert {job: sealed.read(job) for job in here} == known
+    assert {path.stem for path in folder.glob("benchmarks/*")} == {job.stem for job in here}
+    command = [sys.executable, "-m", "snakemake", "-n", "--cores", "2", "--configfile", "config/many.yaml"]
+    command += ["--snakefile", CONFIG.parent / "Snakefile", "--workflow-profile", "none"]
+    told = subprocess.run([*map(str, command)], capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    counts = dict(re.findall(r"^(\w+) +(\d+)$", told.stdout.partition("Job stats:")[2], re.MULTILINE))
+    assert counts == dict.fromkeys(["collect", "browse", "present_scenes", "all"], "1") | {"total": "4"}
 
 
 def test_folders_may_be_anywhere_and_have_any_name(there):

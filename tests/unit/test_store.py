@@ -1,5 +1,6 @@
 """The store of results and the digest of code."""
 
+import hashlib
 import subprocess
 import sys
 
@@ -58,6 +59,12 @@ def test_a_folder_in_the_place_of_a_file_is_set_aside(tmp_path):
 def test_keys_depend_on_values_not_on_their_order():
     assert hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
     assert hash_of({"a": 1.0}) != hash_of({"a": 1.0000000000000002})
+
+
+def test_keys_are_those_that_results_were_stored_under():
+    """Another key of the same would compute everything again: 24 digits of the SHA-256 of JSON without spaces."""
+    assert hash_of({"b": [2, "x"], "a": 0.1}, None) == hashlib.sha256(b'[{"a":0.1,"b":[2,"x"]},null]').hexdigest()[:24]
+    assert len(hash_of()) == 24
 
 
 def test_stages_depend_on_what_they_import_and_on_nothing_else():

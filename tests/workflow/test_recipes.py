@@ -57,9 +57,7 @@ def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_a_row_and_a_study
     (repository / "config/columns.yaml").write_text(study)
     command = ["-m", "snakemake", "--snakefile", "Snakefile", "--cores", "2", "--configfile", "config/columns.yaml"]
     environment = os.environ | {"PYTHONPATH": str(repository / "src")}
-    done = subprocess.run(
-        [sys.executable, *command], cwd=repository, env=environment, capture_output=True, text=True, timeout=300
-    )
+    done = subprocess.run([sys.executable, *command], cwd=repository, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"^columns +1$", done.stdout + done.stderr, re.MULTILINE)  # the rule, under its own name
     results = repository / "results/columns"

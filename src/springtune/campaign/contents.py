@@ -274,7 +274,7 @@ def _unfinished(study: "Study", folder: Path, faults: dict[str, str], stale: Ite
     said = [f"{name}: {why}" for name, why in faults.items()]
     said += [f"{name}: the study or the program changed since" for name in stale]
     shown = said[:MOST_TOLD] + ([f"and {len(said) - MOST_TOLD} more"] if len(said) > MOST_TOLD else [])
-    remedy = f"snakemake --configfile {study.path}"
+    remedy = f"springtune run {study.path}"
     if any(why.endswith(records.DAMAGED) for why in faults.values()):
         remedy = f"springtune verify {study.path} --set-aside, then {remedy}"
     lines = [f"{folder}: is not what the study asks for now, and is not archived", *shown, f"make it: {remedy}"]

@@ -1,5 +1,8 @@
 """What options say of a beam, its mesh and its material: shared by the commands that take no study."""
 
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,10 +30,24 @@ class Unmet(ValueError):
     """What is asked for cannot be had, though the options are right."""
 
 
-def refused(error: Exception, message: str) -> int:
-    """Say why nothing is done, in one line, and return the exit code: 2 where the message names a wrong option."""
-    click.echo(message, err=True)
-    return WRONG if message.startswith("--") and not isinstance(error, (Unmet, OSError)) else FAILED
+@contextmanager
+def refusals(option: str, target: Path | None, named: Callable[[str], str] = str) -> Iterator[None]:
+    """Context in which what is wrong is said in one line, and the exit code is 2 where that begins with an option.
+
+    `option` is the one of the file to be written, `target`; `named` puts options in the place of arguments in messages.
+    """
+    try:
+        yield
+    except click.UsageError:
+        raise
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else error
+        click.echo(f"{option}: {target}: {why}; give a file that can be written", err=True)
+        raise SystemExit(FAILED) from None
+    except (click.ClickException, ValueError) as error:
+        said = named(error.message if isinstance(error, click.ClickException) else str(error))
+        click.echo(said, err=True)
+        raise SystemExit(WRONG if said.startswith("--") and not isinstance(error, Unmet) else FAILED) from None
 
 
 def check_target(option: str, target: Path) -> None:
@@ -48,11 +65,6 @@ SPRING_FILES = ".csv, .json, .vtu (ParaView), .h5, .xml or .mjcf (MuJoCo), .scn 
 
 MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 """Young's modulus and Poisson's ratio of the paper's materials."""
-
-
-def known_materials(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Materials whose names begin so, for a shell to complete."""
-    return [name for name in MATERIALS if name.startswith(begun)]
 
 
 def asked_quantity(option: str, text: str, kind: str) -> float:

@@ -1,16 +1,13 @@
 """Recommend a definition for one mesh, or a mesh for one error."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from .completion import mesh_types
 from .examples import examples
 from .options import (
-    MATERIALS,
     SPRING_FILES,
     Unmet,
     asked_beam,
@@ -19,10 +16,10 @@ from .options import (
     asked_size,
     check_target,
     is_made,
-    known_materials,
-    refused,
+    refusals,
 )
-from .shape_options import SHAPE_HELP, asked_shape, check_kind
+from .shape_options import asked_shape, check_kind
+from .sheet_options import sheet_options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -45,28 +42,13 @@ if TYPE_CHECKING:
         'springtune predict --shape config/shapes.yaml:cook --material third --error "2 %"',
     )
 )
-@click.option("--beam", help="Length x height in mm, such as 200x40.")
-@click.option("--shape", help=SHAPE_HELP)
-@click.option("--load", help="Load case of a shape.  [default: its only one]")
-@click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
-@click.option(
-    "--mesh",
-    "mesh_type",
-    shell_complete=mesh_types,
-    help="A mesh type, or a mesh file; with --error mesh types, such as structured,free.  "
-    "[default: structured; with --error all]",
+@sheet_options(
+    "A mesh type, or a mesh file; with --error mesh types, such as structured,free.  "
+    "[default: structured; with --error all]"
 )
-@click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
-@click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
-@click.option(
-    "--material",
-    shell_complete=known_materials,
-    help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
-)
-@click.option("--young", help="Young's modulus, such as '210 GPa'.")
-@click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
 @click.option("--density", help="Density, such as '7850 kg/m^3': for the largest stable time steps.")
 @click.option("--error", help="Find the coarsest mesh that keeps this error, such as '1 %'.")
+@click.option("--load", help="Load case of a shape.  [default: its only one]")
 @click.option(
     "--loads",
     help="Loads that count: some of traction, compression, bending, shear and pressure, such as traction,bending.  "
@@ -106,9 +88,8 @@ def predict(
     A shape of a study has errors in the quantities that its load case asks for.
     """
     from ..prediction import CASES, check_beam
-    from ..springs import DefinitionError
 
-    try:
+    with refusals("--write", target):
         check_kind(shape, beam, ("load",))
         if target is not None:
             check_target("--write", target)
@@ -129,13 +110,6 @@ def predict(
             _find(sheet, solid, error, cases, mesh_type, springs_alone, as_json, target)
         else:
             _predict(sheet, solid, cases, mesh_type or "structured", size, unit, springs_alone, as_json, target)
-    except OSError as problem:
-        why = os.strerror(problem.errno) if problem.errno else problem
-        raise SystemExit(refused(problem, f"--write: {target}: {why}; give a file that can be written")) from None
-    except click.UsageError:
-        raise
-    except (click.ClickException, DefinitionError, ValueError) as problem:
-        raise SystemExit(refused(problem, str(getattr(problem, "message", problem)))) from None
 
 
 def _on_shape(asked: "AskedShape", error: str | None, springs_alone: bool, as_json: bool, target: Path | None) -> None:

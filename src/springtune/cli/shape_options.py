@@ -21,10 +21,6 @@ if TYPE_CHECKING:
 NAMED_SHAPE = "config/shapes.yaml:cook"
 """How a shape is named, for messages."""
 
-SHAPE_HELP = (
-    f"A study's shape, such as {NAMED_SHAPE}, in the place of a beam; the name may be left out where there is one."
-)
-
 MESH_SIZE = re.compile("^mesh size: [^ ]+ ")
 """How messages of a mesh size begin."""
 

@@ -1,15 +1,14 @@
 """The springs of a mesh, as files for other programs."""
 
-import os
 import re
 import warnings
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .completion import mesh_types
 from .examples import examples
 from .options import (
     SPRING_FILES,
@@ -20,10 +19,10 @@ from .options import (
     asked_size,
     check_target,
     is_made,
-    known_materials,
-    refused,
+    refusals,
 )
-from .shape_options import SHAPE_HELP, asked_shape, check_kind
+from .shape_options import asked_shape, check_kind
+from .sheet_options import sheet_options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -59,26 +58,7 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
         "--definition lattice --out hole.xml",
     )
 )
-@click.option("--beam", help="Length x height in mm, such as 200x40.")
-@click.option("--shape", "shape", help=SHAPE_HELP)
-@click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet.")
-@click.option(
-    "--mesh",
-    "mesh_type",
-    default="structured",
-    show_default=True,
-    shell_complete=mesh_types,
-    help="A mesh type, or a mesh file.",
-)
-@click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file.")
-@click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file.")
-@click.option(
-    "--material",
-    shell_complete=known_materials,
-    help="steel or rubber; or give --young and --poisson; of a shape one of its study.",
-)
-@click.option("--young", help="Young's modulus, such as '210 GPa'.")
-@click.option("--poisson", help="Poisson's ratio, from 0 to 0.5.")
+@sheet_options("A mesh type, or a mesh file.", "structured")
 @click.option("--density", help="Density, such as '7850 kg/m^3': for masses, and the largest stable time steps.")
 @click.option(
     "--definition",
@@ -127,9 +107,8 @@ def springs(
     asks for.
     """
     from ..handover.simulation import EquilibriumWarning
-    from ..springs import DefinitionError
 
-    try:
+    with refusals("--out", target, partial(OPTIONS.sub, "--", count=1)):
         check_kind(shape, beam, ("scale",))
         check_target("--out", target)
         if shape is not None:
@@ -145,14 +124,6 @@ def springs(
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", EquilibriumWarning)
             written = net.write(target)
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno else error
-        raise SystemExit(refused(error, f"--out: {target}: {why}; give a file that can be written")) from None
-    except click.UsageError:
-        raise
-    except (click.ClickException, DefinitionError, ValueError) as error:
-        said = OPTIONS.sub("--", str(getattr(error, "message", error)), count=1)
-        raise SystemExit(refused(error, said)) from None
     click.echo(written_text(net, written))
     for one in heard:
         click.echo(str(one.message))

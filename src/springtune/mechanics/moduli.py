@@ -23,6 +23,7 @@ import numpy as np
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh, MeshError
+from ..mesh.parts import connected
 from .energies import Energy
 from .network import Network
 
@@ -143,11 +144,7 @@ def strip_fault(mesh: Mesh) -> str:
 
 def _one_round(outline: np.ndarray, count: int) -> bool:
     """Whether edges, two at each of their particles, make one round."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    joined = coo_array((np.ones(len(outline)), outline.T), shape=(count, count))
-    rounds = connected_components(joined, directed=False)[1][outline[:, 0]]
+    rounds = connected(outline, count)[outline[:, 0]]
     return bool((rounds == rounds[0]).all())
 
 
@@ -168,11 +165,7 @@ def free_body(mesh: Mesh) -> np.ndarray:
     MeshError
         If the mesh has parts that no edge joins, or points without a cell.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(mesh.points)
-    parts = connected_components(coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count)))[0]
+    parts = connected(mesh.edges, len(mesh.points)).max() + 1
     if parts > 1:
         raise MeshError(f"the mesh has {parts} parts that no edge joins, and a free body is one; join them")
     corner = np.argmin(mesh.points.sum(axis=1))

@@ -186,6 +186,26 @@ def most_requested(root: xr.Dataset, dimension: str) -> str:
 NO_NODE = np.int32(-1)
 """Of UGRID's connectivities, where a mesh has fewer springs or cells than another one, or a cell fewer corners."""
 
+UGRID: dict[str, dict[str, object]] = {
+    "mesh": {
+        "cf_role": "mesh_topology",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "x y",
+        "edge_node_connectivity": "spring_nodes",
+        "face_node_connectivity": "cell_nodes",
+        "node_dimension": "particle",
+        "edge_dimension": "spring",
+        "face_dimension": "cell",
+    },
+    "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
+    "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+}
+"""Attributes of unstructured meshes by the conventions UGRID-1.0, see `Group.further`."""
+
+OF_PARTICLES: dict[str, object] = {"mesh": "mesh", "location": "node"}
+OF_SPRINGS: dict[str, object] = {"mesh": "mesh", "location": "edge"}
+"""Attributes of what such a mesh has of each particle, or of each spring."""
+
 CHUNK = 2**18
 """Bytes of a chunk of a compressed array [B], at most: what reading one cell of it reads."""
 

@@ -5,7 +5,7 @@ of small strain; a patch test between rollers measures Young's modulus and Poiss
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf, nan
 from typing import NamedTuple, cast
 
@@ -388,26 +388,17 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
     dict of str to QuantityReference or str
         By quantity; where there is none the reason.
     """
-    from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
+    from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
-    case, found, small = statement.case, ShapeReferences(), set[str]()
-    as_read = statement.grouped if statement.shape.file else None
-    together = [case.quantities]
-    while together:
-        asked = together.pop(0)
-        try:
-            solved = solve_shape(statement.shape, replace(case, quantities=asked), statement.by_part, as_read)
-        except (ReferenceNotConvergedError, ValueError) as error:
-            if len(asked) > 1:
-                together += [(one,) for one in asked]
-            else:
-                found[asked[0].name] = str(error)
-        else:
-            small.update(name for name in solved.negligible if solved.values[name])
-            found |= {
-                one.name: QuantityReference(float(solved.values[one.name]), float(solved.error_estimates[one.name]))
-                for one in asked
-            }
+    case, as_read = statement.case, statement.grouped if statement.shape.file else None
+    solved, lacking = solve_each(statement.shape, case, statement.by_part, as_read)
+    found = ShapeReferences(lacking)
+    for one in solved:
+        found |= {
+            name: QuantityReference(float(value), float(one.error_estimates[name]))
+            for name, value in one.values.items()
+        }
+    small = {name for one in solved for name in one.negligible if one.values[name]}
     if len(small) < len(case.quantities):
         found |= dict.fromkeys(small, "next to nothing beside what is largest of its kind; an error would say nothing")
     return {one.name: found[one.name] for one in case.quantities}

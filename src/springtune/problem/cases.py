@@ -38,7 +38,8 @@ def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
     load 'pull': its supports leave the body free to move along y; hold it
     >>> check_case(grouped, st.LoadCase("pull", (*pull.supports, st.Support("corner", y=0)), pull.tractions))
     """
-    from .boundary import supported  # here, since it stands on meshes
+    from ..mesh.parts import check_held  # here, since they stand on meshes
+    from .boundary import supported
 
     case.check_names(grouped.sides, grouped.points, grouped.unusable)
     where = f"load {case.name!r}"
@@ -57,63 +58,7 @@ def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
         if quantity.of in grouped.points and not _in_body(grouped.mesh, grouped.points[quantity.of]):
             raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
     held = supported(grouped, case)[0]
-    components = connected(grouped.mesh)
-    count = components.max() + 1
-    for number in range(count):
-        free = _free_motion(grouped.mesh.points[components == number], held[components == number])
-        if free:
-            x, y = 1e3 * grouped.mesh.points[components == number].mean(axis=0)
-            body = (
-                "the body"
-                if count == 1
-                else f"one of the {count} bodies that are not joined, at ({x:.6g}, {y:.6g}) mm,"
-            )
-            raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
-
-
-def connected(mesh: "Mesh") -> np.ndarray:
-    """Number of the body that each particle belongs to; cells that share particles belong to one.
-
-    Parameters
-    ----------
-    mesh : Mesh
-
-    Returns
-    -------
-    ndarray of int, shape (n_points,)
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> connected(st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")).max().item()
-    0
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(mesh.points)
-    joined = coo_array((np.ones(len(mesh.edges)), mesh.edges.T), shape=(count, count))
-    return np.asarray(connected_components(joined, directed=False)[1])
-
-
-def _free_motion(points: np.ndarray, held: np.ndarray) -> str:
-    """Rigid motion that is free where particles are held along x and y, in words; empty where none is."""
-    middle = points.mean(axis=0)
-    x, y = ((points - middle) / np.ptp(points, axis=0).max()).T
-    one, none = np.ones_like(x), np.zeros_like(x)
-    rows = np.concatenate([np.stack([one, none, -y], axis=1)[held[:, 0]], np.stack([none, one, x], axis=1)[held[:, 1]]])
-    sizes, motions = np.linalg.eigh(rows.T @ rows)
-    if sizes[0] > 1e-12 * max(sizes[-1], 1.0):
-        return ""
-    if sizes[1] <= 1e-12 * max(sizes[-1], 1.0):
-        return "move and turn"
-    u, v, turn = motions[:, 0]
-    if abs(turn) > 1e-6:
-        size = np.ptp(points, axis=0).max()
-        about = middle + np.array([-v, u]) / turn * size
-        x0, y0 = 1e3 * np.where(np.abs(about) > 1e-9 * size, about, 0.0)
-        return f"turn about ({x0:.6g}, {y0:.6g}) mm"
-    return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")
+    check_held(grouped.mesh.points, grouped.mesh.edges, held, where)
 
 
 def _in_body(mesh: "Mesh", point: np.ndarray) -> bool:

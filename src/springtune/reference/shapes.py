@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import spatial
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import coo_array
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
+from ..mesh.parts import check_held
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
@@ -188,6 +188,42 @@ def solve_shape(
     """
     by_part = materials if isinstance(materials, Mapping) else {"": materials}
     return converge(shape, load, by_part, grouped, tolerance)
+
+
+def solve_each(
+    shape: Shape,
+    load: LoadCase,
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    grouped: GroupedMesh | None = None,
+) -> tuple[list[ShapeReference], dict[str, str]]:
+    """References that between them have all quantities of interest that have one.
+
+    One that has none, such as the stress at a corner, does not cost the others theirs.
+
+    Parameters
+    ----------
+    shape, load, materials, grouped
+        As in `solve_shape`.
+
+    Returns
+    -------
+    references : list of ShapeReference
+        One where all quantities converge together.
+    lacking : dict of str to str
+        Why others have none, by name; by ``""`` where the load asks for none.
+    """
+    try:
+        return [solve_shape(shape, load, materials, grouped)], {}
+    except (ReferenceNotConvergedError, ValueError) as error:
+        if len(load.quantities) < 2:
+            return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
+    found: list[ShapeReference] = []
+    lacking: dict[str, str] = {}
+    for one in load.quantities:
+        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
+        found += more
+        lacking |= why
+    return found, lacking
 
 
 def converge(
@@ -704,27 +740,9 @@ class _Level:
                 straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
                 values[functions[2:]] = inverse @ (wanted[2:] - straight)
                 held[functions] = True
-        self._check_rigid(held)
+        where = f"load {problem.load.name!r} of shape {problem.shape.name!r}"
+        check_held(space.mesh.points, space.edges, held[: len(space.mesh.points)], where)
         return held, values
-
-    def _check_rigid(self, held: np.ndarray) -> None:
-        """Refuse supports that leave a piece of the body free to move."""
-        space, problem = self.space, self.problem
-        n = len(space.mesh.points)
-        ends = space.edges
-        count, piece = connected_components(csr_array((np.ones(len(ends)), ends.T), shape=(n, n)), directed=False)
-        middle, extent = space.mesh.points.mean(axis=0), np.ptp(space.mesh.points, axis=0).max()
-        x, y = ((space.mesh.points - middle) / extent).T
-        ones, zeros = np.ones(n), np.zeros(n)
-        modes = np.stack([[ones, zeros], [zeros, ones], [-y, x]]).transpose(2, 1, 0)  # points, axes, modes
-        for number in range(count):
-            rows = modes[(piece == number)][held[:n][piece == number]]
-            if len(rows) < 3 or np.linalg.matrix_rank(rows, tol=1e-9 * np.sqrt(len(rows))) < 3:
-                what = "the body" if count == 1 else f"a piece of the body that is joined to no other, of {count},"
-                raise ValueError(
-                    f"load {problem.load.name!r} of shape {problem.shape.name!r}: supports leave {what} free to move "
-                    "or turn; hold it in both directions, at two points at least"
-                )
 
     def _solve(
         self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray

@@ -131,13 +131,8 @@ def curve_key(study, curve):
 
 def scene_key(study: "Study", scene: "SceneSpec") -> str:
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
-    return completed_key(study, scene, _common(study, scene)["key"])
-
-
-def completed_key(study, scene, common):
-    """Key of a scene by that of what scenes like it share."""
     return hash_of(
-        common,
+        _commons(study).of(scene)["key"],
         scene.force,
         _given_stiffness(study, scene),
         _thickness_ratio(study, scene),
@@ -148,40 +143,25 @@ def completed_key(study, scene, common):
 @once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
 def scene_keys(study):
     """Keys of a study's scenes by their mesh, in the order of `by_mesh`: tasks and the dataset both want them."""
-    found = {}
-    for mesh, scenes in by_mesh(study.scenes).items():
-        commons, keys = _Commons(study), []
-        for scene in scenes:
-            keys.append(completed_key(study, scene, commons.of(scene)["key"]))
-        found[mesh] = keys
-    return found
+    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in by_mesh(study.scenes).items()}
 
 
 class _Commons:
-    """What scenes of one mesh share, asked for once: hashing materials for each of 100,000 scenes is no way to it."""
+    """What scenes share that differ in force or by a factor on the stiffness, asked for once."""
 
     def __init__(self, study):
-        self.study, self.known = study, {}
+        self._study, self._known = study, {}
 
     def of(self, scene):
-        """As `_common`."""
-        place = id(scene.material), scene.load, scene.definition, scene.kinematics
-        if place not in self.known:
-            self.known[place] = _common(self.study, scene)
-        return self.known[place]
+        """A part of a scene's task, and its key."""
+        # By their places: hashing materials for each of 100,000 scenes is no way to know them.
+        place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
+        if place not in self._known:
+            # The scene is kept with it, so that nothing else comes to be in these places.
+            self._known[place] = self._found(scene), scene
+        return self._known[place][0]
 
-
-@once_a_study("grids", "outputs")
-def _parts(study):
-    """What `_common` has found of a study so far."""
-    return {}
-
-
-def _common(study, scene):
-    """What scenes share that differ in force or by a factor on the stiffness: a part of their tasks, and its key."""
-    known = _parts(study)
-    place = scene.mesh, scene.material, scene.load, scene.definition, scene.kinematics
-    if place not in known:
+    def _found(self, scene):
         load, mesh = LOADS[scene.load], scene.mesh
         task = {
             "material": material_key(scene.material),
@@ -191,13 +171,14 @@ def _common(study, scene):
             "definition": scene.definition,
             "kinematics": scene.kinematics,
         }
-        reference = reference_of(study, mesh.beam, scene.material, scene.load)
+        reference = reference_of(self._study, mesh.beam, scene.material, scene.load)
         if "interpolant" not in reference:  # which has no field, all that a scene wants of it
             task["reference"] = reference
         code = stage_key("kinds.scenes.solve"), definition_key(scene.definition)
-        key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
-        known[place] = {"task": task, "key": key}
-    return known[place]
+        return {"task": task, "key": hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)}
+
+
+_commons = once_a_study("grids", "outputs")(_Commons)
 
 
 @once_a_study("grids")
@@ -385,7 +366,7 @@ def _solve(study, folder, members):
 def _scenes(study, mesh):
     """Tasks of a mesh's scenes."""
     scenes, keys = by_mesh(study.scenes)[mesh], scene_keys(study)[mesh]
-    commons, kept = _Commons(study), shown_scenes(study)
+    commons, kept = _commons(study), shown_scenes(study)
     return [_scene(study, scene, commons.of(scene)["task"], key, kept) for scene, key in zip(scenes, keys)]
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...output.dataset import NO_NODE, Group
+from ...output.dataset import NO_NODE, OF_PARTICLES, OF_SPRINGS, UGRID, Group
 from ...output.selection import OF_FIELDS
 from ...problem.parameters import OF_BODIES, SWEPT
 
@@ -265,23 +265,9 @@ FIELDS = Group(
         "reference_displacement_x": (OUTLINE, "m", "displacement along x, reference", np.nan),
         "reference_displacement_y": (OUTLINE, "m", "displacement along y, reference", np.nan),
     },
-    further={
-        "mesh": {
-            "cf_role": "mesh_topology",
-            "topology_dimension": np.int32(2),
-            "node_coordinates": "x y",
-            "edge_node_connectivity": "spring_nodes",
-            "face_node_connectivity": "cell_nodes",
-            "node_dimension": "particle",
-            "edge_dimension": "spring",
-            "face_dimension": "cell",
-        },
-        "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
-        "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
-        **{name: {"mesh": "mesh", "location": "node"} for name in ("displacement_x", "displacement_y")},
-        **{name: {"mesh": "mesh", "location": "node"} for name in ("particle_reference_x", "particle_reference_y")},
-        **{name: {"mesh": "mesh", "location": "edge"} for name in ("stiffness", "spring_force")},
-    },
+    further=UGRID
+    | dict.fromkeys(("displacement_x", "displacement_y", "particle_reference_x", "particle_reference_y"), OF_PARTICLES)
+    | dict.fromkeys(("stiffness", "spring_force"), OF_SPRINGS),
 )
 """Whole fields, of each beam's and mesh type's coarsest mesh: they are there to be looked at.
 

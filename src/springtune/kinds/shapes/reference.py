@@ -1,14 +1,12 @@
 """Stage `shape_reference`: one finite-element solution each shape, material and load, on the shape itself."""
 
 import time
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from ...jobs import store
-from ...reference.shapes import solve_shape
-from ...reference.small_strain import ReferenceNotConvergedError
+from ...reference.shapes import solve_each
 from .described import ONE_LOAD, by_key, materials_of, quantity_key, shape_of
 from .mesh import make
 
@@ -58,10 +56,9 @@ def _solved(task):
     grouped = make(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
     case = shape.loads[ONE_LOAD]
-    try:
-        found, lacking = _converged(shape, case, materials, grouped)
-    except (ReferenceNotConvergedError, ValueError) as error:  # groups that are not there, bodies that are not held
-        return _hole(str(error))
+    found, lacking = solve_each(shape, case, materials, grouped)
+    if not found:
+        return _hole("; ".join(dict.fromkeys(lacking.values())))
     values, estimates = {}, {}
     for one in found:
         values |= by_key(one.values, case)
@@ -72,7 +69,7 @@ def _solved(task):
         "message": "",
         "values": values,
         "error_estimates": estimates,
-        "lacking": lacking,
+        "lacking": {quantity_key(one): lacking[one.name] for one in case.quantities if one.name in lacking},
         "unknowns": max(int(one.unknowns) for one in found),
         "energy": float(found[0].energy),
         "rotation": float(found[0].rotation),
@@ -81,27 +78,6 @@ def _solved(task):
         "outline_displacements": found[0].at(points),
         "outline_lengths": np.array([len(one) for one in rounds]),
     }
-
-
-def _converged(shape, case, materials, grouped):
-    """References that between them have all quantities that converge, and why others have none, by their keys.
-
-    One that does not converge, such as the stress at a corner, does not cost the others.
-    """
-    try:
-        return [solve_shape(shape, case, materials, grouped)], {}
-    except ReferenceNotConvergedError:
-        if len(case.quantities) == 1:
-            raise
-    found, lacking = [], {}
-    for quantity in case.quantities:
-        try:
-            found.append(solve_shape(shape, replace(case, quantities=(quantity,)), materials, grouped))
-        except ReferenceNotConvergedError as error:
-            lacking[quantity_key(quantity)] = str(error)
-    if not found:
-        raise ReferenceNotConvergedError("; ".join(dict.fromkeys(lacking.values())))
-    return found, lacking
 
 
 def _rounds(shape, grouped):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...output.dataset import NO_NODE, Group
+from ...output.dataset import NO_NODE, OF_PARTICLES, OF_SPRINGS, UGRID, Group
 
 MESH_AXES = ("shape", "mesh_type", "mesh_size")
 CASE_AXES = ("shape", "material", "load")
@@ -108,22 +108,7 @@ SHAPE_FIELDS = Group(
     dimensions={
         "case": "shape and load",
     },
-    further={
-        "mesh": {
-            "cf_role": "mesh_topology",
-            "topology_dimension": np.int32(2),
-            "node_coordinates": "x y",
-            "edge_node_connectivity": "spring_nodes",
-            "face_node_connectivity": "cell_nodes",
-            "node_dimension": "particle",
-            "edge_dimension": "spring",
-            "face_dimension": "cell",
-        },
-        "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
-        "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
-        **{name: {"mesh": "mesh", "location": "node"} for name in ("displacement_x", "displacement_y")},
-        "spring_force": {"mesh": "mesh", "location": "edge"},
-    },
+    further=UGRID | dict.fromkeys(("displacement_x", "displacement_y"), OF_PARTICLES) | {"spring_force": OF_SPRINGS},
 )
 """Networks that are drawn, each shape's and load's on its finest mesh of a size that can be: they are there to be
 looked at, their displacements and forces with seven digits."""

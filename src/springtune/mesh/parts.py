@@ -1,0 +1,79 @@
+"""Parts of a mesh that no edge joins, and whether they are held against rigid motions."""
+
+import numpy as np
+
+
+def connected(edges: np.ndarray, count: int) -> np.ndarray:
+    """Number of the part that each of so many points belongs to, where edges join those of a part.
+
+    Parameters
+    ----------
+    edges : ndarray of int, shape (n_edges, 2)
+    count : int
+
+    Returns
+    -------
+    ndarray of int, shape (count,)
+
+    Examples
+    --------
+    >>> connected(np.array([[0, 2], [3, 1]]), 5).tolist()
+    [0, 1, 0, 1, 2]
+    """
+    from scipy.sparse import coo_array  # here, since studies are read without scipy
+    from scipy.sparse.csgraph import connected_components
+
+    joined = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
+    return np.asarray(connected_components(joined, directed=False)[1])
+
+
+def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
+    """Refuse supports that leave a body free to move; what no edge joins are bodies of their own.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        Coordinates [m].
+    edges : ndarray of int, shape (n_edges, 2)
+    held : ndarray of bool, shape (n_points, 2)
+        Whether a point is held along x and y.
+    where : str
+        What the supports are of, for the message.
+
+    Raises
+    ------
+    ValueError
+    """
+    components = connected(edges, len(points))
+    count = components.max() + 1
+    for number in range(count):
+        of_body = components == number
+        free = _free_motion(points[of_body], held[of_body])
+        if free:
+            x, y = 1e3 * points[of_body].mean(axis=0)
+            body = (
+                "the body"
+                if count == 1
+                else f"one of the {count} bodies that are not joined, at ({x:.6g}, {y:.6g}) mm,"
+            )
+            raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
+
+
+def _free_motion(points: np.ndarray, held: np.ndarray) -> str:
+    """Rigid motion that is free where particles are held along x and y, in words; empty where none is."""
+    middle = points.mean(axis=0)
+    x, y = ((points - middle) / np.ptp(points, axis=0).max()).T
+    one, none = np.ones_like(x), np.zeros_like(x)
+    rows = np.concatenate([np.stack([one, none, -y], axis=1)[held[:, 0]], np.stack([none, one, x], axis=1)[held[:, 1]]])
+    sizes, motions = np.linalg.eigh(rows.T @ rows)
+    if sizes[0] > 1e-12 * max(sizes[-1], 1.0):
+        return ""
+    if sizes[1] <= 1e-12 * max(sizes[-1], 1.0):
+        return "move and turn"
+    u, v, turn = motions[:, 0]
+    if abs(turn) > 1e-6:
+        size = np.ptp(points, axis=0).max()
+        about = middle + np.array([-v, u]) / turn * size
+        x0, y0 = 1e3 * np.where(np.abs(about) > 1e-9 * size, about, 0.0)
+        return f"turn about ({x0:.6g}, {y0:.6g}) mm"
+    return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")
