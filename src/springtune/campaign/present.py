@@ -16,6 +16,9 @@ from ..output.dataset import small_cache
 if TYPE_CHECKING:
     from ..kinds.base import Output
 
+MANY_PANELS = 16
+"""Panels of a figure beyond which what it leaves behind is given back before the next one is drawn."""
+
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     """Draw the figures of outputs into ``folder/figures``, and write their tables and other files into their folders.
@@ -79,12 +82,16 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
             atomic.write_bytes(folder / f"{stem}.{ending}", content)
             yield folder / f"{stem}.{ending}"
         plt.close(figure)
+        panels = len(figure.axes)
+        del figure
+        if panels > MANY_PANELS:
+            gc.collect()
 
 
 if __name__ == "__main__":
     import os
 
     os.environ["MPLBACKEND"] = "Agg"
-    # What figures leave behind is less than looking for it costs.
+    # What small figures leave behind is less than looking for it costs; large ones are looked for one by one.
     gc.disable()
     main(*sys.argv[1:])
