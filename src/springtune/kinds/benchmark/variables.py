@@ -58,7 +58,7 @@ BENCHMARK = Group(
         "curve_message": ((), "1", "why there are no seconds of curves", ""),
         "explicit_steps": (EXPLICIT_AXES, "s-1", "explicit steps a second of nonlinear springs", np.nan),
         "spring_updates": (EXPLICIT_AXES, "s-1", "springs that these steps advance, each step counted anew", np.nan),
-        "explicit_bandwidth": (EXPLICIT_AXES, "byte s-1", "what these steps read and write, from a cache or from memory", np.nan),
+        "explicit_bandwidth": (EXPLICIT_AXES, "byte s-1", "what these steps read and write, be it in a cache", np.nan),
         "explicit_error": (
             ("mesh_size", "precision"),
             "1",
