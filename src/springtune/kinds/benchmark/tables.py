@@ -180,7 +180,7 @@ def _explicit(data):
         for threads in data.thread_count.values
     )
     lines = ["Nonlinear springs that steps advance, in millions a second, and what they read and write, be it in a "
-             f"cache, in GB/s. A plain copy of memory moves {copies}. The numbers of a run do not depend on its threads; "
+             f"cache, in GB/s. A plain copy of memory moves {copies}. The numbers of a run do not depend on threads; "
              "errors are those of displacements against double precision, over the largest.", ""]  # fmt: skip
     told = zip(data.mesh_size.values, data.explicit_message.values)
     lost = [f"- {1e3 * size:g} mm: {word}" for size, word in told if word]
