@@ -128,13 +128,13 @@ def advance_springs(
     keep: float,
     step: float,
     size: int,
-    depth: int,
     bandwidth: int,
     force: np.ndarray,
     room: np.ndarray,
     u: np.ndarray,
     v: np.ndarray,
     steps: int,
+    depth: int,
     progress: np.ndarray,
 ) -> None:
     """Steps of springs that keep their length law, each with a damper along it, in the passes of a thread.
@@ -158,15 +158,16 @@ def advance_springs(
         g [s-1] and load [m].
     keep, step : float
         d [1] and step [s].
-    size, depth, bandwidth : int
-        Particles of a block, steps of a pass, largest difference between the numbers of a spring's ends.
+    size, bandwidth : int
+        Particles of a block, largest difference between the numbers of a spring's ends.
     force : ndarray, shape (n_points, 2)
         Loads, and loads again at the end [m].
     room : ndarray, shape (4, most springs of a block)
         Of the thread, for what is between the loops.
     u, v : ndarray, shape (1, n_points, 2)
         State [m, m/s].
-    steps : int
+    steps, depth : int
+        All of them, and those of a pass.
     progress : ndarray of int64, shape (n_threads + 1, STRIDE)
         Blocks that each thread has done, zeros; the last row is not zero where a thread has failed.
     """
@@ -226,11 +227,11 @@ def advance_matrix(
     keep: float,
     step: float,
     size: int,
-    depth: int,
     bandwidth: int,
     u: np.ndarray,
     v: np.ndarray,
     steps: int,
+    depth: int,
     progress: np.ndarray,
 ) -> None:
     """Steps of a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
@@ -243,13 +244,14 @@ def advance_matrix(
     stiffness, dampers : ndarray, shape (n_entries,)
         Entries [1] and [s]; no dampers have length 0.
     gain, load : ndarray, shape (unknowns,)
-    keep, step, size, depth : float or int
+    keep, step, size : float or int
         As of `advance_springs`, blocks being of unknowns.
     bandwidth : int
         Largest difference between the row and the column of an entry.
     u, v : ndarray, shape (2, unknowns) and (1 or 2, unknowns)
         State, from one to the other in turns where there are two: v needs two if there are dampers.
-    steps : int
+    steps, depth : int
+        All of them, and those of a pass.
     progress : ndarray of int64, shape (n_threads + 1, STRIDE)
         As of `advance_springs`.
     """

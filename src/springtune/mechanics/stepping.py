@@ -165,10 +165,10 @@ class ExplicitSteps(Stepper):
         pointers = np.searchsorted(first, np.arange(len(gain) + 1))
         bandwidth = int((second - first).max(initial=1))
         number = load.itemsize
-        threads, *pace = passes_of(pointers, bandwidth, 10 * number, 4 * number + 8, threads)
-        most = int((pointers[pace[0] :] - pointers[: -pace[0]]).max(initial=0))
+        threads, size, self._depth = passes_of(pointers, bandwidth, 10 * number, 4 * number + 8, threads)
+        most = int((pointers[size:] - pointers[:-size]).max(initial=0))
         force, index = load.copy(), (values.astype(np.uint32) for values in (pointers, first, second))
-        arrays = *index, *of_springs, gain, load, *self._numbers, *pace, bandwidth, force
+        arrays = *index, *of_springs, gain, load, *self._numbers, size, bandwidth, force
         self.function = advance_springs
         self._threads = [(*arrays, np.empty((4, most), dtype=self.kind)) for _ in range(threads)]
         self._as, self._back = lambda values: values[order], lambda values: values[place]
@@ -191,9 +191,9 @@ class ExplicitSteps(Stepper):
         arrays = *index, *(np.ascontiguousarray(values, dtype=self.kind) for values in numbers)
         rows = np.repeat(np.arange(len(order)), np.diff(matrix.indptr))
         bandwidth, number = int(np.abs(matrix.indices - rows).max(initial=1)), self.kind(0).nbytes
-        threads, *pace = passes_of(matrix.indptr, bandwidth, 6 * number, number + 4, threads)
+        threads, size, self._depth = passes_of(matrix.indptr, bandwidth, 6 * number, number + 4, threads)
         self.function = advance_matrix
-        self._threads = [(*arrays, *self._numbers, *pace, bandwidth)] * threads
+        self._threads = [(*arrays, *self._numbers, size, bandwidth)] * threads
         self._as = lambda values: network.reduce(values)[order]
         self._back = lambda values: network.expand(values[place])
         self._states = 2, 1 + (len(damping) > 0)
@@ -257,10 +257,13 @@ class ExplicitSteps(Stepper):
         from .kernels import STRIDE
 
         progress = np.zeros((len(self._threads) + 1, STRIDE), dtype=np.int64)
+        # Passes of one depth for all threads, so that none waits for another's longer one at the end.
+        rounds = max(1, -(-steps // (len(self._threads) * self._depth)))
+        depth = max(1, -(-steps // (len(self._threads) * rounds)))
         function = self.function
         assert function is not None
         return [
-            partial(function, number, *arguments, self._u, self._v, steps, progress)
+            partial(function, number, *arguments, self._u, self._v, steps, depth, progress)
             for number, arguments in enumerate(self._threads)
         ], progress
 
@@ -315,7 +318,7 @@ def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, 
     size : int
         Rows of a block.
     depth : int
-        Steps of a pass.
+        Steps of a pass at most.
     """
     rows, entries = len(pointers) - 1, int(pointers[-1])
     each = of_row + of_entry * entries / max(1, rows)
