@@ -11,7 +11,6 @@ import xarray as xr
 
 from ..jobs import atomic, records
 from ..kinds import outputs
-from ..output.dataset import small_cache
 from ..output.reading import lazily
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     made: list[Path] = []
     figures = Path(folder) / "figures"
     # Arrays are read when something is shown of them: most are not.
-    with small_cache(), lazily(dataset) as tree:
+    with lazily(dataset) as tree:
         for output in (outputs()[name] for name in names):
             if output.plot:
                 made += _draw(output, tree, figures)

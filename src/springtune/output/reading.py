@@ -107,6 +107,7 @@ def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
 
     class Store(NetCDF4DataStore):
         def open_store_variable(self, name: str, var: Any) -> Any:
+            var.set_var_chunk_cache(0)  # no chunk is read twice
             found = super().open_store_variable(name, var)
             if found.encoding["dtype"] is str and found.nbytes > LARGE_ARRAY:
                 found.encoding["dtype"] = np.dtype(object)
