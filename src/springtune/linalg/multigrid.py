@@ -204,7 +204,8 @@ class Multigrid:
         random vector, M being the preconditioner: of a direction of stiffness ``-l``, over that in M, it has a share
         of about ``l / n**0.5``. So with `RESIDUAL` and a million unknowns a direction of ``l > 1e-4`` is overlooked in
         one case of 10 000, one of ``l < 1e-8`` mostly; and so is one of no stiffness at all that bears no load: of
-        such only those of single particles are looked for here, and those of parts that are not held by the network.
+        such only those of single particles are looked for here, and those of parts that nothing holds by the network; a
+        part that turns about one particle, or hangs on a spring or two, is told as solved.
         """
         solution, scale = np.zeros(len(missing)), np.linalg.norm(missing)
         if scale == 0.0:
