@@ -22,9 +22,11 @@ from cf import complaints
 from springtune.campaign import provenance
 from springtune.jobs import atomic
 from springtune.kinds import KINDS, load_study
+from springtune.kinds.scenes.tables import tables
 from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.output import dataset
 from springtune.output.dataset import CHUNK, Group
+from springtune.output.reading import lazily
 
 AXES = {
     "beam": ("a", "b"),
@@ -85,6 +87,23 @@ def test_arrays_are_read_when_needed_and_by_chunks(tmp_path):
     with st.open(tmp_path) as tree:
         assert "..." in repr(tree.displacement.variable) or "values with dtype" in repr(tree.displacement.variable)
         assert tree.displacement.sel(beam="c").equals(curves.displacement.sel(beam="c"))
+
+
+def test_tables_of_a_few_scenes_among_many_cells_read_no_more_than_they_show(tmp_path):
+    root = ROOT.empty(AXES | {"beam": tuple(f"b{n}" for n in range(40)), "mesh_size": tuple(1e-3 * np.arange(1, 4001))})
+    asked = {"beam": slice(3, 6), "mesh_size": slice(None, 4)}
+    root.status[asked] = 1
+    root.message[asked] = "what buckles, \u03bb < 1"
+    root.displacement[asked] = np.random.default_rng(1).random(root.displacement[asked].shape)
+    dataset.write(tmp_path / "dataset.nc", {"/": root}, {"springtune_version": "0"})
+    with lazily(tmp_path / "dataset.nc") as tree:
+        found = tables(tree)
+        unread = {name for name, array in tree.variables.items() if "values with dtype" in repr(array)}
+    assert {"message", "solver", "displacement", "residual", "solve_seconds"} <= unread
+    assert not unread & {"beam", "mesh_size", "status", "reference_displacement"}
+    # Holes are NaN, which is no other NaN.
+    assert repr(found) == repr(tables(xr.DataTree(root))) and len(found[0]["rows"]) == 12
+    assert found[0]["rows"][0]["paper_linear_message"] == "what buckles, \u03bb < 1"
 
 
 def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..jobs import atomic, records
 from ..kinds import outputs
-from ..output.dataset import small_cache
+from ..output.reading import lazily
 
 if TYPE_CHECKING:
     from ..kinds.base import Output
@@ -35,20 +35,20 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     list of Path
         Files written.
     """
-    with small_cache(), xr.open_datatree(dataset, engine="netcdf4") as tree:
-        tree.load()
     made: list[Path] = []
     figures = Path(folder) / "figures"
-    for output in (outputs()[name] for name in names):
-        if output.plot:
-            made += _draw(output, tree, figures)
-        into = Path(folder) / output.into
-        if output.page:
-            from . import page  # here: few jobs write the page
+    # Arrays are read when something is shown of them: most are not.
+    with lazily(dataset) as tree:
+        for output in (outputs()[name] for name in names):
+            if output.plot:
+                made += _draw(output, tree, figures)
+            into = Path(folder) / output.into
+            if output.page:
+                from . import page  # here: few jobs write the page
 
-            made += [into / name for name in page.write(tree, into)]
-        elif output.write:
-            made += [into / name for name in import_module(f"springtune.{output.write}").write(tree, into)]
+                made += [into / name for name in page.write(tree, into)]
+            elif output.write:
+                made += [into / name for name in import_module(f"springtune.{output.write}").write(tree, into)]
     return made
 
 

@@ -31,6 +31,9 @@ COARSEST = 500
 MOST_BORROWED = 50
 """Iterations with the grids of another matrix from which on those of its own take less time."""
 
+IN_LINE = 1e-14
+"""Determinant of a particle's own stiffness, over the product of its two diagonal entries, that is but rounding."""
+
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
@@ -181,6 +184,8 @@ class Multigrid:
             If a direction without stiffness is met, and there is no factor that takes over.
         NotPositiveError
             If it does not end, likewise.
+        SingularError
+            If a particle moves without any stiffness, whatever would take over.
         """
         if self._direct is None:
             try:
@@ -198,7 +203,9 @@ class Multigrid:
         gradients make no residual in a direction of negative stiffness smaller. What is random is ``A M^-1`` of a
         random vector, M being the preconditioner: of a direction of stiffness ``-l``, over that in M, it has a share
         of about ``l / n**0.5``. So with `RESIDUAL` and a million unknowns a direction of ``l > 1e-4`` is overlooked in
-        one case of 10 000, one of ``l < 1e-8`` mostly; and so is one of no stiffness at all that bears no load.
+        one case of 10 000, one of ``l < 1e-8`` mostly; and so is one of no stiffness at all that bears no load: of
+        such only those of single particles are looked for here, and those of parts that nothing holds by the network; a
+        part that turns about one particle, or hangs on a spring or two, is told as solved.
         """
         solution, scale = np.zeros(len(missing)), np.linalg.norm(missing)
         if scale == 0.0:
@@ -207,6 +214,7 @@ class Multigrid:
             raise IndefiniteError("a coarse matrix without stiffness: the tangent is singular or unstable")
         proves = not self._certain and tolerance <= CERTAIN
         if proves:
+            self._check_particles()
             random = np.random.default_rng(0).standard_normal(len(missing))
             solution = self._precondition(scale / np.linalg.norm(random) * random)
             missing -= self._matrix @ solution
@@ -232,6 +240,14 @@ class Multigrid:
             direction *= weight / before
             direction += better
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
+
+    def _check_particles(self) -> None:
+        """Refuse a matrix in which a particle alone moves without any stiffness: all its springs are in one line."""
+        stiffness, coupling = self._matrix.diagonal(), self._matrix.diagonal(1)
+        x = np.flatnonzero(np.diff(self._places // 2) == 0)  # of particles that are free along y, too
+        both = stiffness[x] * stiffness[x + 1]
+        if not stiffness.all() or (abs(both - coupling[x] ** 2) <= IN_LINE * abs(both)).any():
+            raise SingularError("a particle is free to move: its springs, if any, are in one line")
 
     def step(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, so far as a step of Newton's method goes."""

@@ -19,6 +19,7 @@ from scipy.sparse import csc_array
 from ..linalg import SOLVERS
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor
 from ..mesh.cells import Mesh
+from ..mesh.parts import check_held
 from .energies import Energy
 from .follower import FollowerPressure
 from .pattern import Pattern
@@ -391,9 +392,21 @@ class Network:
         Raises
         ------
         SingularError
-            If the tangent is singular.
+            If the tangent is singular; multigrid does not see that of a body that is not held, so it is looked for.
         """
+        if self._by_multigrid and self._loose:
+            raise SingularError(self._loose)
         return self.factorize_matrix(self.tangent(displacements, follower), symmetric=follower is None)
+
+    @cached_property
+    def _loose(self) -> str:
+        """Which body is free to move, of those that neither springs nor energies join, and how; empty if none is."""
+        edges, whole = self.mesh.edges, self.energies or self.stiffness.all()
+        try:
+            check_held(self.mesh.points, edges if whole else edges[self.stiffness != 0], self.held, "the network")
+        except ValueError as error:
+            return str(error)
+        return ""
 
     def factorize_matrix(self, matrix: csc_array, symmetric: bool = True) -> Factor:
         """Factor of a matrix over the unknowns with the tangent's sparsity, such as `stiffness_of` gives or a sum of.
@@ -418,9 +431,7 @@ class Network:
             factor = self._cholesky(matrix)
             if factor is not None:
                 return factor
-        if self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE:
-            return self._multigrid(matrix, symmetric)
-        return self._superlu(matrix)
+        return self._multigrid(matrix, symmetric) if self._by_multigrid else self._superlu(matrix)
 
     def _superlu(self, matrix: csc_array) -> SuperLUFactor:
         order, places, indices, pointers = self._pattern.elimination
@@ -453,6 +464,11 @@ class Network:
             return CHOLESKY and self.unknowns <= LARGEST
         return self.solver == "Cholesky"
 
+    @property
+    def _by_multigrid(self) -> bool:
+        """Whether multigrid solves what is not factorized by Cholesky's method."""
+        return self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE
+
     def is_stable(self, displacements: np.ndarray) -> bool:
         """Whether the tangent at displacements is positive definite; asks less than a factorization for use.
 
@@ -461,11 +477,10 @@ class Network:
         displacements : ndarray of float, shape (n_points, 2)
             [m]
         """
-        matrix = self.tangent(displacements)
         if self._by_cholesky:
-            return self._pattern.analysis.factorize(matrix.data) is not None
+            return self._pattern.analysis.factorize(self.tangent(displacements).data) is not None
         try:
-            return self.factorize_matrix(matrix).negative_pivots == 0
+            return self.factorize_tangent(displacements).negative_pivots == 0
         except SingularError:
             return False
 

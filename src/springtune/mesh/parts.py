@@ -23,12 +23,22 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
     from scipy.sparse import coo_array  # here, since studies are read without scipy
     from scipy.sparse.csgraph import connected_components
 
+    below = np.zeros(count, dtype=bool)
+    below[np.maximum(*edges.T)] = True
+    if below.sum() == count - 1:  # each point but the first is joined to one before it, as in rows
+        return np.zeros(count, dtype=np.int32)
+    below = np.zeros(count, dtype=bool)
+    below[np.maximum(*edges.T)] = True
+    if below.sum() == count - 1:  # each point but the first is joined to one before it, as where they stand in rows
+        return np.zeros(count, dtype=np.int32)
     joined = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
 
 
 def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
     """Refuse supports that leave a body free to move; what no edge joins are bodies of their own.
+
+    Nothing is asked of a body whose points are all held.
 
     Parameters
     ----------
@@ -47,8 +57,8 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
     components = connected(edges, len(points))
     count = components.max() + 1
     for number in range(count):
-        of_body = components == number
-        free = _free_motion(points[of_body], held[of_body])
+        of_body = components == number if count > 1 else slice(None)
+        free = "" if held[of_body].all() else _free_motion(points[of_body], held[of_body])
         if free:
             x, y = 1e3 * points[of_body].mean(axis=0)
             body = (
@@ -62,9 +72,10 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
 def _free_motion(points: np.ndarray, held: np.ndarray) -> str:
     """Rigid motion that is free where particles are held along x and y, in words; empty where none is."""
     middle = points.mean(axis=0)
-    x, y = ((points - middle) / np.ptp(points, axis=0).max()).T
-    one, none = np.ones_like(x), np.zeros_like(x)
-    rows = np.concatenate([np.stack([one, none, -y], axis=1)[held[:, 0]], np.stack([none, one, x], axis=1)[held[:, 1]]])
+    x, y = ((points - middle) / (np.ptp(points, axis=0).max() or 1.0)).T
+    across, along = -y[held[:, 0]], x[held[:, 1]]
+    rows = np.zeros((len(across) + len(along), 3))
+    rows[: len(across), 0], rows[len(across) :, 1], rows[:, 2] = 1.0, 1.0, np.concatenate([across, along])
     sizes, motions = np.linalg.eigh(rows.T @ rows)
     if sizes[0] > 1e-12 * max(sizes[-1], 1.0):
         return ""

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import xarray
@@ -27,6 +27,9 @@ DEFLATED = 1100.0
 
 OPENED_WITHIN = 4
 """Seconds of the processor after which a file that is not open yet is taken to be damaged."""
+
+LARGE_ARRAY = 2**20
+"""Bytes beyond which an array is not read before something of it is asked for."""
 
 LONGEST_REASON = 200
 """Most characters of an error that are shown."""
@@ -85,6 +88,40 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         tree.close()
         raise
     return tree
+
+
+@contextmanager
+def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
+    """Context of a dataset as this version writes it, of whose large arrays is read what is asked of them.
+
+    Small ones are in memory. `open` reads texts whatever their number: xarray makes arrays of one width of them.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+    import netCDF4
+    import numpy as np
+    import xarray as xr
+    from xarray.backends import NetCDF4DataStore
+
+    class Store(NetCDF4DataStore):
+        def open_store_variable(self, name: str, var: Any) -> Any:
+            var.set_var_chunk_cache(0)  # no chunk is read twice
+            found = super().open_store_variable(name, var)
+            if found.encoding["dtype"] is str and found.nbytes > LARGE_ARRAY:
+                found.encoding["dtype"] = np.dtype(object)
+            return found
+
+    store: Any = Store
+    with netCDF4.Dataset(path) as file:
+        groups = {"/": file, **{f"/{name}": group for name, group in file.groups.items()}}
+        tree = xr.DataTree.from_dict({name: xr.open_dataset(store(group)) for name, group in groups.items()})
+        for node in tree.subtree:
+            for array in node.variables.values():
+                if array.nbytes <= LARGE_ARRAY:
+                    array.load()
+        yield tree
 
 
 def check_opens(path: str | os.PathLike[str]) -> None:

@@ -34,6 +34,29 @@ def tables(tree):
     return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree]
 
 
+OF_ROWS = (
+    *("status", "message", "stiffness", "displacement", "deformation_error", "force"),
+    *("reference_displacement", "reference_message", "reference_applies"),
+    *("finite_reference_displacement", "finite_deformation_error", "finite_reference_message"),
+    *(
+        "paper_stiffness",
+        "paper_reference_displacement",
+        "paper_displacement",
+        "paper_deformation_error",
+        "paper_remark",
+    ),
+)
+"""Variables that the rows are made of."""
+
+
+def _read(array):
+    """An array in memory; texts are read a beam at a time: netCDF's library takes ten times their room meanwhile."""
+    if array.dtype != object or "beam" not in array.dims:
+        return array.variable
+    each = [array.variable.isel(beam=[number]).values for number in range(array.sizes["beam"])]
+    return array.variable.copy(data=np.concatenate(each, axis=array.dims.index("beam")))
+
+
 def _selections(root):
     requested = (root.status != 0).any([dimension for dimension in root.status.dims if dimension not in TABLE])
     requested = requested.stack(cell=TABLE)
@@ -57,7 +80,8 @@ def _table(cells, selection, finite=None):
     swept = [name for name in SWEPT if name in cells.status.dims]
     cells = cells if finite is None else cells.merge(finite.sel(selection), join="exact", compat="override")
     order = (*ROW, *swept, "kinematics", "definition")
-    arrays = {name: array.transpose(..., *(one for one in order if one in array.dims)) for name, array in cells.items()}
+    shown = (cells[name] for name in OF_ROWS if name in cells)
+    arrays = {array.name: _read(array).transpose(..., *(one for one in order if one in array.dims)) for array in shown}
     values = {name: (array.dims, array.values) for name, array in arrays.items()}
     labels = {name: cells[name].values.tolist() for name in order}
     requested = values["status"][1] != 0
