@@ -393,7 +393,9 @@ def test_a_network_fills_in_less_than_in_orders_of_narrow_bands(mesh_type):
         assert network.rest_factor.fill < 0.9 * SuperLUFactor(banded, order).fill
 
 
-@pytest.mark.parametrize("mesh_type", ["structured", "free", "braced", "isosceles-0.3"])
-def test_a_large_network_fills_in_less_than_in_an_order_of_minimum_degree(mesh_type):
-    network = sheet(mesh_type, 1e-3)  # squares with one diagonal have to be larger still
+@pytest.mark.parametrize(
+    ("mesh_type", "size"), [("structured", 1e-3), ("free", 0.8e-3), ("braced", 1e-3), ("isosceles-0.3", 1e-3)]
+)
+def test_a_large_network_fills_in_less_than_in_an_order_of_minimum_degree(mesh_type, size):
+    network = sheet(mesh_type, size)  # squares with one diagonal have to be larger still
     assert network.rest_factor.fill < SuperLUFactor(network.tangent()).fill

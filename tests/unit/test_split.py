@@ -69,7 +69,9 @@ def check_division(study, count, by):
         assert once(parts, name)[0] == {*getattr(study, name)}
     shaped = [one for part in parts if part.parts["shapes"] for one in part.parts["shapes"].scenes]
     assert sorted(map(str, shaped)) == sorted(map(str, study.parts["shapes"].scenes if study.parts["shapes"] else ()))
-    for kind in ("laying", "stability", "benchmark", "refinement", "moduli"):
+    tried = [one for part in parts for one in part.parts["stability"]]
+    assert sorted(map(str, tried)) == sorted(map(str, study.parts["stability"]))
+    for kind in ("laying", "benchmark", "refinement", "moduli"):
         assert sum(bool(part.parts[kind]) for part in parts) == bool(study.parts[kind])
     shares = [share for share, _ in dealt(study, count, by)]
     assert sum(shares) == pytest.approx(1)
@@ -90,6 +92,7 @@ def check_division(study, count, by):
         "quick",
         "shapes",
         "sobol",
+        "stability",
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("paper", "block", "definitions")),
     ],
 )
@@ -101,7 +104,9 @@ def test_parts_of_our_studies_are_all_of_them(name, by):
         with pytest.raises(StudyError, match=r"1 grids and sections cannot be 2 parts.*--by mesh"):
             dealt(study, 2, "grid")
         return
-    check_division(study, count, by)
+    parts = check_division(study, count, by)
+    if by == "mesh" and name == "stability":
+        assert sum(bool(part.parts["stability"]) for part in parts) > 1  # which nearly all of its cost is
 
 
 def few(*values):

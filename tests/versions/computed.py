@@ -18,7 +18,7 @@ from springtune.jobs.spent import Spent
 from springtune.kinds import load_study
 from springtune.kinds.scenes import stored_mesh
 from springtune.kinds.scenes.solve import stored_key
-from springtune.kinds.scenes.stored_scene import fields_key
+from springtune.kinds.scenes.stored_scene import fields_key, unpacked
 
 PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "netgen-mesher", "pyamg", "scikit-fem", "h5py", "meshio")
 
@@ -53,7 +53,7 @@ def computed(study, folder):
         calibration = sealed.read(folder / "calibration.json")
         results = {key: one for path in job.products if path.endswith(".h5") for key, one in stored(path).items()}
         for place, key in enumerate(keys(job.content, calibration)):
-            one = results[key] | results.get(fields_key(key), {})
+            one = results[key] | unpacked(results.get(fields_key(key), {}))
             found |= {(job.stage.name, place, name): value for name, value in one.items()}
     return found
 

@@ -3,6 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
+from types import NoneType
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
@@ -571,7 +572,7 @@ def study_model(kinds: Sequence[StudyKind], given: Container[object] | None = No
             absent = given is not None and name not in given and field.default is None
             if isinstance(annotation, Later) and not absent:
                 annotation = annotation.type()
-            study_fields[name] = None if absent else annotation, field
+            study_fields[name] = NoneType if absent else annotation, field
         outputs += kind.outputs
     grid = create_model("GridConfig", __base__=GridConfig, **grid_fields)
     grid.__doc__ = GridConfig.__doc__

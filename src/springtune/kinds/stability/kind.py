@@ -133,6 +133,7 @@ KIND = Kind(
     axes=_axes,
     stages=STAGES,
     outputs=OUTPUTS,
+    division="division",
     costs={
         "limits": (10.0, 0.0),
         "maps": (8.0, 0.0),

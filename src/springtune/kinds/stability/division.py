@@ -1,0 +1,46 @@
+"""Pieces of the experiments on stability, see `springtune.kinds.division`."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ...jobs.bundles import Costs
+
+if TYPE_CHECKING:
+    from ...study.model import Study
+    from ..division import Division, Name
+
+
+def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, float]":
+    """Seconds of each piece: of an experiment with a definition, or of all.
+
+    Parameters
+    ----------
+    study : Study
+    costs : Costs
+    division : Division
+
+    Returns
+    -------
+    dict of tuple to float
+    """
+    found: dict[Name, float] = {(one.name, one.definition): costs.of(one.name) for one in study.parts["stability"]}
+    return {(): sum(found.values())} if division.by == "grid" else found
+
+
+def take(study: "Study", names: "Iterable[Name]") -> "Study":
+    """The study with some of its pieces alone.
+
+    Parameters
+    ----------
+    study : Study
+    names : iterable of tuple
+        Of pieces.
+
+    Returns
+    -------
+    Study
+    """
+    wanted = set(names)
+    chosen = tuple(one for one in study.parts["stability"] if wanted & {(), (one.name, one.definition)})
+    return replace(study, parts=study.parts | {"stability": chosen})
