@@ -55,6 +55,15 @@ def differ(found, wanted):
     return np.abs(found - wanted).max() / np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("material", [Material(3.0, 0.2), PLY, PLY.rotated("90 deg")])
+@pytest.mark.parametrize("name", ["delingette", "delingette-tensile", "element-fit", "energy-fit", "orthotropic"])
+def test_stiffnesses_are_multiples_of_the_membranes(name, material):
+    """E t, or the largest stiffness in plane stress times the thickness."""
+    mesh = braced(1.0) if name == "orthotropic" else MESH_TYPES["right"](0.02, 0.01, 2e-3)
+    largest = 3.0 if material.isotropic else material.plane_stress.max()
+    assert DEFINITIONS[name].springs(mesh, material, THICKNESS).reference == pytest.approx(largest * THICKNESS)
+
+
 # -- exact constructions -----------------------------------------------------------------------------------------------
 
 
@@ -277,10 +286,16 @@ def test_orthotropic_names_the_bound_and_the_rectangles_that_serve():
     ) as caught:
         DEFINITIONS["orthotropic"].springs(braced(1.0), stiff, THICKNESS)
     assert "these have 1" in str(caught.value)
+    for size in (0.1, 10.0):
+        with pytest.raises(DefinitionError, match=r"rectangles 1\.155 to 3\.279"):
+            scaled = AnisotropicMaterial(9 * size, size, 1.2 * size, 0.8 * size)
+            DEFINITIONS["orthotropic"].springs(braced(1.0), scaled, THICKNESS)
     for ratio in (1.156, 3.278):
         assert differ(affine("orthotropic", braced(ratio), stiff), stiff.plane_stress) <= 1e-12
-    with pytest.raises(DefinitionError, match="no rectangle serves; choose 'delingette'"):
-        DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(9.0, 1.0, 1.5, 0.4), THICKNESS)
+    # C12 - C66 above C22; below both, with (C11 - K) (C22 - K) below C66^2.
+    for constants in ((9.0, 1.0, 1.5, 0.4), (1.2, 0.9, 1.0, 0.15)):
+        with pytest.raises(DefinitionError, match="no rectangle serves; choose 'delingette'"):
+            DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(*constants), THICKNESS)
     with pytest.raises(
         DefinitionError, match="axes of the material along the sides.*C16 = .*'delingette' on triangles"
     ):
@@ -429,6 +444,16 @@ def test_energies_of_different_parts_are_told_apart():
         for one, other in ((third, fifth), (fifth, third))
     }
     assert len(keys) == 2
+
+
+def test_energies_of_one_kind_are_one_of_all_parts():
+    mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
+    far = mesh.points[mesh.triangles][..., 0].mean(axis=1) > 0.03  # fewer cells than the other part
+    grouped = GroupedMesh(mesh, parts={"far": {3: far}})
+    materials = {"": Material(1.0, 0.2), "far": Material(2.0, 0.4)}
+    for name in ("area", "delingette"):
+        (energy,) = derive_by_parts(DEFINITIONS[name], grouped, materials, THICKNESS).energies
+        assert np.array_equal(energy.corners, mesh.triangles)
 
 
 def test_beams_refuse_what_is_not_isotropic_by_name():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
@@ -14,6 +15,7 @@ from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.adjoint import springs as adjoint
+from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 
 HEIGHT, SIZE = 20e-3, 2e-3
@@ -175,6 +177,16 @@ def test_free_meshes_are_a_few_percent_off(name):
     assert ratio == pytest.approx(0.3 if name in ("area", "angular") else 1 / 3, abs=0.025)
 
 
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**31), springs=st.integers(1, 6))
+def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
+    generator = np.random.default_rng(seed)
+    columns, goals = generator.standard_normal((20, 7, springs)), generator.standard_normal((20, 7))
+    found = least_squares(columns.transpose(0, 2, 1) @ columns, np.einsum("nij,ni->nj", columns, goals))
+    expected = [nnls(one, goal)[0] for one, goal in zip(columns, goals)]
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
 # -- patch tests -------------------------------------------------------------------------------------------------------
 
 
@@ -213,8 +225,15 @@ def test_slender_rectangles_are_refused():
     for name in ("baudet", "flechon", "lattice", "axis-exact"):
         with pytest.raises(DefinitionError, match="negative stiffness"):
             DEFINITIONS[name].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
-    with pytest.raises(DefinitionError, match="needs squares"):
+    with pytest.raises(DefinitionError, match=r"needs squares.*of 5 x 2 mm"):
         DEFINITIONS["lloyd"].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
+
+
+def test_axis_exact_refuses_rectangles_that_are_turned():
+    mesh = patch("braced")
+    turned = Mesh(mesh.points @ [[0.8, 0.6], [-0.6, 0.8]], mesh.triangles, mesh.quads)
+    with pytest.raises(DefinitionError, match="sides along x and y"):
+        DEFINITIONS["axis-exact"].springs(turned, Material(1.0, 0.3, name="unit"), 1.0)
 
 
 def test_obtuse_triangles_are_refused_where_they_make_a_spring_negative():
@@ -246,9 +265,14 @@ def test_gradient_of_the_misfit_is_exact():
     assert difference == pytest.approx(slope @ direction, rel=1e-7)
 
 
-def test_patch_cases_are_met_by_linear_triangles():
-    """Their displacements are linear, so a network equal to linear triangles has no misfit."""
+STANDING = {"on a side": [[1, 0], [0, 1]], "on a corner": [[0.5, 1], [-0.5, 1]], "leaning": [[-0.2, 1], [-0.6, 0.9]]}
+
+
+@pytest.mark.parametrize("sides", STANDING.values(), ids=STANDING)
+def test_patch_cases_are_met_by_linear_triangles(sides):
+    """Their displacements are linear, so a network equal to linear triangles has no misfit, however the body stands."""
     mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material(5.0, 0.45, name="any")
+    mesh = Mesh(mesh.points @ sides + [0.05, 0.0], mesh.triangles)
     springs = DEFINITIONS["delingette"].springs(mesh, material, 2.0)
     for case in patch_cases(mesh, material, 2.0):
         network = Network(mesh, case.held, springs.relative, springs.energies)
