@@ -251,6 +251,16 @@ def test_axis_exact_names_the_rows_that_it_needs():
         DEFINITIONS["axis-exact"].springs(patch("braced"), Material(1.0, 0.0, name="unit"), 1.0)
 
 
+def test_axis_exact_names_the_row_that_is_furthest_off():
+    """One row of another height: of nu = 0.2 among rows of 0.45."""
+    mesh = lattice(5, 4, 1e-3)
+    rows = np.rint(mesh.points[:, 1] / mesh.points[:, 1].max() * 4).astype(int)
+    heights = 0.5e-3 / np.sqrt([0.46, 0.2, 0.45, 0.44])
+    uneven = Mesh(np.stack([mesh.points[:, 0], np.append(0, np.cumsum(heights))[rows]], axis=1), mesh.triangles)
+    with pytest.raises(DefinitionError, match=r"nu = 0.2 and the material 0.45;.*for bases of 1 mm"):
+        DEFINITIONS["axis-exact"].springs(uneven, Material(1.0, 0.45, name="unit"), 1.0)
+
+
 # -- identification ----------------------------------------------------------------------------------------------------
 
 
