@@ -64,6 +64,15 @@ def test_stiffnesses_are_multiples_of_the_membranes(name, material):
     assert DEFINITIONS[name].springs(mesh, material, THICKNESS).reference == pytest.approx(largest * THICKNESS)
 
 
+@pytest.mark.parametrize("ratio", [0.8, 1.0, 1.2])
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
+def test_flechons_areas_complete_the_bulk_modulus(ratio, nu):
+    """E / (2 (1 - nu)), and G."""
+    found = affine("flechon", braced(ratio), Material(3.0, nu))
+    assert (found[0, 0] + found[1, 1] + 2 * found[0, 1]) / 4 == pytest.approx(3 / (2 * (1 - nu)), rel=1e-9)
+    assert found[2, 2] == pytest.approx(3 / (2 * (1 + nu)), rel=1e-9)
+
+
 # -- exact constructions -----------------------------------------------------------------------------------------------
 
 
@@ -297,9 +306,14 @@ def test_orthotropic_names_the_bound_and_the_rectangles_that_serve():
         with pytest.raises(DefinitionError, match="no rectangle serves; choose 'delingette'"):
             DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(*constants), THICKNESS)
     with pytest.raises(
-        DefinitionError, match="axes of the material along the sides.*C16 = .*'delingette' on triangles"
-    ):
+        DefinitionError, match="axes of the material along the sides.*'delingette' on triangles"
+    ) as caught:
         DEFINITIONS["orthotropic"].springs(braced(1.0), PLY.rotated("30 deg"), THICKNESS)
+    for coupled in ((0.1, 0.0), (0.0, 0.1)):
+        with pytest.raises(DefinitionError, match="axes of the material along the sides"):
+            DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(3, 3, 1, 1, *coupled), THICKNESS)
+    c16, c26 = PLY.rotated("30 deg").plane_stress[:2, 2]
+    assert f"C16 = {c16:.4g} Pa, C26 = {c26:.4g} Pa" in str(caught.value)
 
 
 # -- several materials -------------------------------------------------------------------------------------------------

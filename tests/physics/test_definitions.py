@@ -11,12 +11,14 @@ from springtune.jobs.spent import Spent
 from springtune.kinds.moduli import stage as moduli
 from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice
-from springtune.problem.materials import Material
+from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.adjoint import springs as adjoint
 from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
+from springtune.springs.lattice import predicted_stiffness
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
@@ -70,6 +72,64 @@ def test_springs_alone_on_the_lattice(name, nu):
 def test_any_poisson_ratio_is_exact_on_the_lattice(name, nu):
     young, ratio, shear = errors(name, patch("structured"), nu)
     assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name", sorted({name for name, one in DEFINITIONS.items() if one.needs != "cases"} - {"adjoint"})
+)
+@pytest.mark.parametrize("factor", [2.0**-12, 2.0**12])
+def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
+    """In the plane no length enters E t; powers of two round nothing."""
+    law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 1 / 3, name="unit")
+    mesh = MESH_TYPES["structured" if 3 in DEFINITIONS[name].cells else "braced"](0.03, 0.01, 2.5e-3)
+    if name == "axis-exact":
+        mesh = MESH_TYPES["braced"](0.03, 0.01, 2.5e-3)
+    one, other = (
+        DEFINITIONS[name].springs(Mesh(size * mesh.points, mesh.triangles, mesh.quads), law, 1.0, 1.0)
+        for size in (1.0, factor)
+    )
+    assert other.reference == pytest.approx(one.reference, rel=1e-12)
+    np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
+
+
+def test_ends_of_rows_carry_what_a_strip_of_their_area_does():
+    """Half triangles at the ends of rows: each gives its edge across its area over the square of it."""
+    mesh = MESH_TYPES["isosceles-0.3"](0.03, 0.01, 2e-3)
+    relative = DEFINITIONS["axis-exact"].springs(mesh, Material(1.0, 0.3, name="unit"), 1.0).relative
+    across = np.abs(np.diff(mesh.points[mesh.edges, 0])[:, 0]) < 1e-9
+    areas = mesh.sum_to_edges({3: np.repeat(signed_areas(mesh.points, mesh.triangles)[:, None], 3, axis=1)})
+    assert across.sum() > 4 and mesh.on_outline[across].all()
+    np.testing.assert_allclose(relative[across], (areas / mesh.edge_lengths**2)[across], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delingette", "delingette-tensile"])
+def test_delingettes_springs_are_those_of_the_lattice_where_nothing_couples(name):
+    """At nu = 1/3 on equilateral triangles; 2 L^2 k are spring constants at rest."""
+    mesh, material = patch("structured"), Material(3.0, 1 / 3, name="any")
+    ours, theirs = (DEFINITIONS[one].springs(mesh, material, 2.0) for one in (name, "lattice"))
+    np.testing.assert_allclose(ours.reference * ours.linear_springs, theirs.reference * theirs.relative, rtol=1e-9)
+
+
+def test_definitions_are_what_they_are_declared_to_be():
+    """One stiffness, a stress across the load, the law at finite strain: asked of the springs themselves."""
+    uniform, lateral, lawful = set(), set(), set()
+    for name, definition in DEFINITIONS.items():
+        if definition.needs == "cases":
+            continue
+        mesh = MESH_TYPES["braced" if 4 in definition.cells else "alternating"](0.03, 0.01, 2.5e-3)
+        law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 0.3, name="unit")
+        found = definition.springs(mesh, law, 1.0, 1.0)
+        if not found.energies and np.ptp(found.relative) == 0:
+            uniform.add(name)
+        if found.lateral:
+            lateral.add(name)
+        # Of all, a law of rubber alone has no energy inside out.
+        if any(not np.isfinite(energy.value(-2.0 * mesh.points * [1, 0])) for energy in found.energies):
+            lawful.add(name)
+    asked = {name: one for name, one in DEFINITIONS.items() if one.needs != "cases"}
+    assert uniform == {name for name, one in asked.items() if one.uniform}
+    assert lateral == {name for name, one in asked.items() if one.uniaxial}
+    assert lawful == {name for name, one in asked.items() if one.finite_strain}
 
 
 @pytest.mark.parametrize("nu", EVERY_RATIO)
@@ -259,6 +319,15 @@ def test_axis_exact_names_the_row_that_is_furthest_off():
     uneven = Mesh(np.stack([mesh.points[:, 0], np.append(0, np.cumsum(heights))[rows]], axis=1), mesh.triangles)
     with pytest.raises(DefinitionError, match=r"nu = 0.2 and the material 0.45;.*for bases of 1 mm"):
         DEFINITIONS["axis-exact"].springs(uneven, Material(1.0, 0.45, name="unit"), 1.0)
+
+
+@pytest.mark.parametrize(("load", "excess"), [("traction", 1), ("compression", 1), ("bending", 3)])
+def test_predicted_stiffness_is_that_of_the_lattice_less_the_full_outlines(load, excess):
+    beam, material = Beam(0.2, 0.04, 1e-3, "200x40"), Material(3e9, 0.3, name="any")
+    inside = np.sqrt(3) / 2 * 3e9 * 1e-3
+    expected = inside / (1 + excess * np.sqrt(3) / 2 * 5e-3 / 0.04)
+    assert predicted_stiffness(material, beam, 5e-3, load) == pytest.approx(expected, rel=1e-12)
+    assert all(np.isnan(predicted_stiffness(material, beam, 5e-3, one)) for one in ("pressure", "follower-pressure"))
 
 
 # -- identification ----------------------------------------------------------------------------------------------------
