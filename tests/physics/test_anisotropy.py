@@ -350,6 +350,9 @@ def test_parts_of_equal_materials_are_one_body(name):
     wrong = np.linalg.norm(ours - theirs) / np.linalg.norm(theirs)
     assert wrong <= (0.5 if name in NOT_ADDITIVE else 1e-12)
     assert (parts.linear_springs is None) == (whole.linear_springs is None)
+    if whole.linear_springs is not None:
+        linear = (one.reference * one.linear_springs for one in (parts, whole))
+        np.testing.assert_allclose(*linear, rtol=1e-12, atol=1e-12 * THICKNESS)
     same = derive_by_parts(DEFINITIONS[name], halves(mesh, 1), {"": one, "far": one}, THICKNESS)
     assert (same.relative == whole.relative).all() and same.reference == whole.reference
 
