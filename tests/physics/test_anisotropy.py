@@ -445,6 +445,13 @@ def test_definitions_that_know_one_body_refuse_parts():
         derive_by_parts(DEFINITIONS["lattice"], grouped, two | {"far": BOARD}, THICKNESS)
 
 
+def test_parts_of_one_material_are_told_what_the_whole_body_is():
+    grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
+    one = Material(1.0, 0.3)
+    springs = derive_by_parts(DEFINITIONS["paper"], grouped, {"": one, "far": one}, THICKNESS, 1e6)
+    assert springs.reference == 1e6 and (springs.relative == 1).all()
+
+
 def test_cells_that_are_in_no_part_are_the_main_one():
     grouped = halves(MESH_TYPES["braced"](0.02, 0.01, 5e-3), 0)
     found = cells_of_parts(grouped)

@@ -22,7 +22,7 @@ from springtune.springs.lattice import predicted_stiffness
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
-EVERY_RATIO = (0.0, 0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5)
+EVERY_RATIO = (0.0, 0.2, 0.25, 0.3, 1 / 3, 0.45, 0.49, 0.5)
 
 
 def patch(mesh_type, length=0.1):
@@ -287,6 +287,17 @@ def test_slender_rectangles_are_refused():
             DEFINITIONS[name].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
     with pytest.raises(DefinitionError, match=r"needs squares.*of 5 x 2 mm"):
         DEFINITIONS["lloyd"].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
+
+
+@pytest.mark.parametrize(("ratio", "taken"), [(1.015, True), (1.025, False), (0.975, False)])
+def test_lloyds_squares_may_be_off_by_two_percent(ratio, taken):
+    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    nearly = Mesh(mesh.points * [ratio, 1], mesh.triangles, mesh.quads)
+    if taken:
+        assert DEFINITIONS["lloyd"].springs(nearly, Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
+    else:
+        with pytest.raises(DefinitionError, match="needs squares"):
+            DEFINITIONS["lloyd"].springs(nearly, Material(1.0, 0.3, name="unit"), 1.0)
 
 
 def test_axis_exact_refuses_rectangles_that_are_turned():
