@@ -90,6 +90,7 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
     )
     assert other.reference == pytest.approx(one.reference, rel=1e-12)
     np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
+    assert one.evaluations == other.evaluations and (one.evaluations > 0) == name.startswith("patch")
 
 
 def test_ends_of_rows_carry_what_a_strip_of_their_area_does():
@@ -353,6 +354,14 @@ def test_gradient_of_the_misfit_is_exact():
     _, slope = misfit.evaluate(here)
     difference = (misfit(here + 1e-5 * direction) - misfit(here - 1e-5 * direction)) / 2e-5
     assert difference == pytest.approx(slope @ direction, rel=1e-7)
+
+
+def test_a_network_that_does_not_move_misses_half_of_each_case():
+    """J = 1/2 sum |u - u*|^2 / |u*|^2 at u = 0, which springs 1e12 times as stiff as asked come near to."""
+    mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material(5.0, 0.45, name="any")
+    misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
+    assert misfit(np.full(len(mesh.edges), np.log(1e12))) == pytest.approx(3 / 2, rel=1e-9)
+    assert misfit.evaluations == 1
 
 
 STANDING = {"on a side": [[1, 0], [0, 1]], "on a corner": [[0.5, 1], [-0.5, 1]], "leaning": [[-0.2, 1], [-0.6, 0.9]]}
