@@ -69,6 +69,11 @@ class Noted:
 
     def __init__(self, coverage=None):
         self.coverage, self.seconds, self.failed, self.first = coverage, {}, set(), None
+        self.broken = False
+
+    def pytest_collectreport(self, report):
+        """After a file of tests was imported."""
+        self.broken = self.broken or report.failed
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item):
@@ -245,7 +250,7 @@ def tried(file, source, tests, seconds):
         else:
             plugin = Noted()
             code = call_pytest(tests, plugin, "-x", "--no-summary", "-o", "tmp_path_retention_policy=none")
-            told = f"{int(code)} {plugin.first or ''}"
+            told = "import" if plugin.broken else f"{int(code)} {plugin.first or ''}"
         os.write(writing, told.encode())
     finally:
         os._exit(0)

@@ -55,6 +55,24 @@ def differ(found, wanted):
     return np.abs(found - wanted).max() / np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("material", [Material(3.0, 0.2), PLY, PLY.rotated("90 deg")])
+@pytest.mark.parametrize("name", ["delingette", "delingette-tensile", "element-fit", "energy-fit", "orthotropic"])
+def test_stiffnesses_are_multiples_of_the_membranes(name, material):
+    """E t, or the largest stiffness in plane stress times the thickness."""
+    mesh = braced(1.0) if name == "orthotropic" else MESH_TYPES["right"](0.02, 0.01, 2e-3)
+    largest = 3.0 if material.isotropic else material.plane_stress.max()
+    assert DEFINITIONS[name].springs(mesh, material, THICKNESS).reference == pytest.approx(largest * THICKNESS)
+
+
+@pytest.mark.parametrize("ratio", [0.8, 1.0, 1.2])
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
+def test_flechons_areas_complete_the_bulk_modulus(ratio, nu):
+    """E / (2 (1 - nu)), and G."""
+    found = affine("flechon", braced(ratio), Material(3.0, nu))
+    assert (found[0, 0] + found[1, 1] + 2 * found[0, 1]) / 4 == pytest.approx(3 / (2 * (1 - nu)), rel=1e-9)
+    assert found[2, 2] == pytest.approx(3 / (2 * (1 + nu)), rel=1e-9)
+
+
 # -- exact constructions -----------------------------------------------------------------------------------------------
 
 
@@ -277,14 +295,25 @@ def test_orthotropic_names_the_bound_and_the_rectangles_that_serve():
     ) as caught:
         DEFINITIONS["orthotropic"].springs(braced(1.0), stiff, THICKNESS)
     assert "these have 1" in str(caught.value)
+    for size in (0.1, 10.0):
+        with pytest.raises(DefinitionError, match=r"rectangles 1\.155 to 3\.279"):
+            scaled = AnisotropicMaterial(9 * size, size, 1.2 * size, 0.8 * size)
+            DEFINITIONS["orthotropic"].springs(braced(1.0), scaled, THICKNESS)
     for ratio in (1.156, 3.278):
         assert differ(affine("orthotropic", braced(ratio), stiff), stiff.plane_stress) <= 1e-12
-    with pytest.raises(DefinitionError, match="no rectangle serves; choose 'delingette'"):
-        DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(9.0, 1.0, 1.5, 0.4), THICKNESS)
+    # C12 - C66 above C22; below both, with (C11 - K) (C22 - K) below C66^2.
+    for constants in ((9.0, 1.0, 1.5, 0.4), (1.2, 0.9, 1.0, 0.15)):
+        with pytest.raises(DefinitionError, match="no rectangle serves; choose 'delingette'"):
+            DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(*constants), THICKNESS)
     with pytest.raises(
-        DefinitionError, match="axes of the material along the sides.*C16 = .*'delingette' on triangles"
-    ):
+        DefinitionError, match="axes of the material along the sides.*'delingette' on triangles"
+    ) as caught:
         DEFINITIONS["orthotropic"].springs(braced(1.0), PLY.rotated("30 deg"), THICKNESS)
+    for coupled in ((0.1, 0.0), (0.0, 0.1)):
+        with pytest.raises(DefinitionError, match="axes of the material along the sides"):
+            DEFINITIONS["orthotropic"].springs(braced(1.0), AnisotropicMaterial(3, 3, 1, 1, *coupled), THICKNESS)
+    c16, c26 = PLY.rotated("30 deg").plane_stress[:2, 2]
+    assert f"C16 = {c16:.4g} Pa, C26 = {c26:.4g} Pa" in str(caught.value)
 
 
 # -- several materials -------------------------------------------------------------------------------------------------
@@ -321,6 +350,9 @@ def test_parts_of_equal_materials_are_one_body(name):
     wrong = np.linalg.norm(ours - theirs) / np.linalg.norm(theirs)
     assert wrong <= (0.5 if name in NOT_ADDITIVE else 1e-12)
     assert (parts.linear_springs is None) == (whole.linear_springs is None)
+    if whole.linear_springs is not None:
+        linear = (one.reference * one.linear_springs for one in (parts, whole))
+        np.testing.assert_allclose(*linear, rtol=1e-12, atol=1e-12 * THICKNESS)
     same = derive_by_parts(DEFINITIONS[name], halves(mesh, 1), {"": one, "far": one}, THICKNESS)
     assert (same.relative == whole.relative).all() and same.reference == whole.reference
 
@@ -413,6 +445,13 @@ def test_definitions_that_know_one_body_refuse_parts():
         derive_by_parts(DEFINITIONS["lattice"], grouped, two | {"far": BOARD}, THICKNESS)
 
 
+def test_parts_of_one_material_are_told_what_the_whole_body_is():
+    grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
+    one = Material(1.0, 0.3)
+    springs = derive_by_parts(DEFINITIONS["paper"], grouped, {"": one, "far": one}, THICKNESS, 1e6)
+    assert springs.reference == 1e6 and (springs.relative == 1).all()
+
+
 def test_cells_that_are_in_no_part_are_the_main_one():
     grouped = halves(MESH_TYPES["braced"](0.02, 0.01, 5e-3), 0)
     found = cells_of_parts(grouped)
@@ -429,6 +468,16 @@ def test_energies_of_different_parts_are_told_apart():
         for one, other in ((third, fifth), (fifth, third))
     }
     assert len(keys) == 2
+
+
+def test_energies_of_one_kind_are_one_of_all_parts():
+    mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
+    far = mesh.points[mesh.triangles][..., 0].mean(axis=1) > 0.03  # fewer cells than the other part
+    grouped = GroupedMesh(mesh, parts={"far": {3: far}})
+    materials = {"": Material(1.0, 0.2), "far": Material(2.0, 0.4)}
+    for name in ("area", "delingette"):
+        (energy,) = derive_by_parts(DEFINITIONS[name], grouped, materials, THICKNESS).energies
+        assert np.array_equal(energy.corners, mesh.triangles)
 
 
 def test_beams_refuse_what_is_not_isotropic_by_name():

@@ -4,21 +4,25 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from springtune.jobs import store
 from springtune.jobs.spent import Spent
 from springtune.kinds.moduli import stage as moduli
 from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice
-from springtune.problem.materials import Material
+from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.springs.adjoint import springs as adjoint
+from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
+from springtune.springs.lattice import predicted_stiffness
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
-EVERY_RATIO = (0.0, 0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5)
+EVERY_RATIO = (0.0, 0.2, 0.25, 0.3, 1 / 3, 0.45, 0.49, 0.5)
 
 
 def patch(mesh_type, length=0.1):
@@ -68,6 +72,65 @@ def test_springs_alone_on_the_lattice(name, nu):
 def test_any_poisson_ratio_is_exact_on_the_lattice(name, nu):
     young, ratio, shear = errors(name, patch("structured"), nu)
     assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name", sorted({name for name, one in DEFINITIONS.items() if one.needs != "cases"} - {"adjoint"})
+)
+@pytest.mark.parametrize("factor", [2.0**-12, 2.0**12])
+def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
+    """In the plane no length enters E t; powers of two round nothing."""
+    law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 1 / 3, name="unit")
+    mesh = MESH_TYPES["structured" if 3 in DEFINITIONS[name].cells else "braced"](0.03, 0.01, 2.5e-3)
+    if name == "axis-exact":
+        mesh = MESH_TYPES["braced"](0.03, 0.01, 2.5e-3)
+    one, other = (
+        DEFINITIONS[name].springs(Mesh(size * mesh.points, mesh.triangles, mesh.quads), law, 1.0, 1.0)
+        for size in (1.0, factor)
+    )
+    assert other.reference == pytest.approx(one.reference, rel=1e-12)
+    np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
+    assert one.evaluations == other.evaluations and (one.evaluations > 0) == name.startswith("patch")
+
+
+def test_ends_of_rows_carry_what_a_strip_of_their_area_does():
+    """Half triangles at the ends of rows: each gives its edge across its area over the square of it."""
+    mesh = MESH_TYPES["isosceles-0.3"](0.03, 0.01, 2e-3)
+    relative = DEFINITIONS["axis-exact"].springs(mesh, Material(1.0, 0.3, name="unit"), 1.0).relative
+    across = np.abs(np.diff(mesh.points[mesh.edges, 0])[:, 0]) < 1e-9
+    areas = mesh.sum_to_edges({3: np.repeat(signed_areas(mesh.points, mesh.triangles)[:, None], 3, axis=1)})
+    assert across.sum() > 4 and mesh.on_outline[across].all()
+    np.testing.assert_allclose(relative[across], (areas / mesh.edge_lengths**2)[across], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delingette", "delingette-tensile"])
+def test_delingettes_springs_are_those_of_the_lattice_where_nothing_couples(name):
+    """At nu = 1/3 on equilateral triangles; 2 L^2 k are spring constants at rest."""
+    mesh, material = patch("structured"), Material(3.0, 1 / 3, name="any")
+    ours, theirs = (DEFINITIONS[one].springs(mesh, material, 2.0) for one in (name, "lattice"))
+    np.testing.assert_allclose(ours.reference * ours.linear_springs, theirs.reference * theirs.relative, rtol=1e-9)
+
+
+def test_definitions_are_what_they_are_declared_to_be():
+    """One stiffness, a stress across the load, the law at finite strain: asked of the springs themselves."""
+    uniform, lateral, lawful = set(), set(), set()
+    for name, definition in DEFINITIONS.items():
+        if definition.needs == "cases":
+            continue
+        mesh = MESH_TYPES["braced" if 4 in definition.cells else "alternating"](0.03, 0.01, 2.5e-3)
+        law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 0.3, name="unit")
+        found = definition.springs(mesh, law, 1.0, 1.0)
+        if not found.energies and np.ptp(found.relative) == 0:
+            uniform.add(name)
+        if found.lateral:
+            lateral.add(name)
+        # Of all, a law of rubber alone has no energy inside out.
+        if any(not np.isfinite(energy.value(-2.0 * mesh.points * [1, 0])) for energy in found.energies):
+            lawful.add(name)
+    asked = {name: one for name, one in DEFINITIONS.items() if one.needs != "cases"}
+    assert uniform == {name for name, one in asked.items() if one.uniform}
+    assert lateral == {name for name, one in asked.items() if one.uniaxial}
+    assert lawful == {name for name, one in asked.items() if one.finite_strain}
 
 
 @pytest.mark.parametrize("nu", EVERY_RATIO)
@@ -175,6 +238,16 @@ def test_free_meshes_are_a_few_percent_off(name):
     assert ratio == pytest.approx(0.3 if name in ("area", "angular") else 1 / 3, abs=0.025)
 
 
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**31), springs=st.integers(1, 6))
+def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
+    generator = np.random.default_rng(seed)
+    columns, goals = generator.standard_normal((20, 7, springs)), generator.standard_normal((20, 7))
+    found = least_squares(columns.transpose(0, 2, 1) @ columns, np.einsum("nij,ni->nj", columns, goals))
+    expected = [nnls(one, goal)[0] for one, goal in zip(columns, goals)]
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
 # -- patch tests -------------------------------------------------------------------------------------------------------
 
 
@@ -213,8 +286,26 @@ def test_slender_rectangles_are_refused():
     for name in ("baudet", "flechon", "lattice", "axis-exact"):
         with pytest.raises(DefinitionError, match="negative stiffness"):
             DEFINITIONS[name].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
-    with pytest.raises(DefinitionError, match="needs squares"):
+    with pytest.raises(DefinitionError, match=r"needs squares.*of 5 x 2 mm"):
         DEFINITIONS["lloyd"].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
+
+
+@pytest.mark.parametrize(("ratio", "taken"), [(1.015, True), (1.025, False), (0.975, False)])
+def test_lloyds_squares_may_be_off_by_two_percent(ratio, taken):
+    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    nearly = Mesh(mesh.points * [ratio, 1], mesh.triangles, mesh.quads)
+    if taken:
+        assert DEFINITIONS["lloyd"].springs(nearly, Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
+    else:
+        with pytest.raises(DefinitionError, match="needs squares"):
+            DEFINITIONS["lloyd"].springs(nearly, Material(1.0, 0.3, name="unit"), 1.0)
+
+
+def test_axis_exact_refuses_rectangles_that_are_turned():
+    mesh = patch("braced")
+    turned = Mesh(mesh.points @ [[0.8, 0.6], [-0.6, 0.8]], mesh.triangles, mesh.quads)
+    with pytest.raises(DefinitionError, match="sides along x and y"):
+        DEFINITIONS["axis-exact"].springs(turned, Material(1.0, 0.3, name="unit"), 1.0)
 
 
 def test_obtuse_triangles_are_refused_where_they_make_a_spring_negative():
@@ -232,6 +323,25 @@ def test_axis_exact_names_the_rows_that_it_needs():
         DEFINITIONS["axis-exact"].springs(patch("braced"), Material(1.0, 0.0, name="unit"), 1.0)
 
 
+def test_axis_exact_names_the_row_that_is_furthest_off():
+    """One row of another height: of nu = 0.2 among rows of 0.45."""
+    mesh = lattice(5, 4, 1e-3)
+    rows = np.rint(mesh.points[:, 1] / mesh.points[:, 1].max() * 4).astype(int)
+    heights = 0.5e-3 / np.sqrt([0.46, 0.2, 0.45, 0.44])
+    uneven = Mesh(np.stack([mesh.points[:, 0], np.append(0, np.cumsum(heights))[rows]], axis=1), mesh.triangles)
+    with pytest.raises(DefinitionError, match=r"nu = 0.2 and the material 0.45;.*for bases of 1 mm"):
+        DEFINITIONS["axis-exact"].springs(uneven, Material(1.0, 0.45, name="unit"), 1.0)
+
+
+@pytest.mark.parametrize(("load", "excess"), [("traction", 1), ("compression", 1), ("bending", 3)])
+def test_predicted_stiffness_is_that_of_the_lattice_less_the_full_outlines(load, excess):
+    beam, material = Beam(0.2, 0.04, 1e-3, "200x40"), Material(3e9, 0.3, name="any")
+    inside = np.sqrt(3) / 2 * 3e9 * 1e-3
+    expected = inside / (1 + excess * np.sqrt(3) / 2 * 5e-3 / 0.04)
+    assert predicted_stiffness(material, beam, 5e-3, load) == pytest.approx(expected, rel=1e-12)
+    assert all(np.isnan(predicted_stiffness(material, beam, 5e-3, one)) for one in ("pressure", "follower-pressure"))
+
+
 # -- identification ----------------------------------------------------------------------------------------------------
 
 
@@ -246,9 +356,22 @@ def test_gradient_of_the_misfit_is_exact():
     assert difference == pytest.approx(slope @ direction, rel=1e-7)
 
 
-def test_patch_cases_are_met_by_linear_triangles():
-    """Their displacements are linear, so a network equal to linear triangles has no misfit."""
+def test_a_network_that_does_not_move_misses_half_of_each_case():
+    """J = 1/2 sum |u - u*|^2 / |u*|^2 at u = 0, which springs 1e12 times as stiff as asked come near to."""
     mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material(5.0, 0.45, name="any")
+    misfit = Misfit(mesh, material, 2.0, patch_cases(mesh, material, 2.0))
+    assert misfit(np.full(len(mesh.edges), np.log(1e12))) == pytest.approx(3 / 2, rel=1e-9)
+    assert misfit.evaluations == 1
+
+
+STANDING = {"on a side": [[1, 0], [0, 1]], "on a corner": [[0.5, 1], [-0.5, 1]], "leaning": [[-0.2, 1], [-0.6, 0.9]]}
+
+
+@pytest.mark.parametrize("sides", STANDING.values(), ids=STANDING)
+def test_patch_cases_are_met_by_linear_triangles(sides):
+    """Their displacements are linear, so a network equal to linear triangles has no misfit, however the body stands."""
+    mesh, material = MESH_TYPES["free"](0.03, 0.01, 2.5e-3), Material(5.0, 0.45, name="any")
+    mesh = Mesh(mesh.points @ sides + [0.05, 0.0], mesh.triangles)
     springs = DEFINITIONS["delingette"].springs(mesh, material, 2.0)
     for case in patch_cases(mesh, material, 2.0):
         network = Network(mesh, case.held, springs.relative, springs.energies)

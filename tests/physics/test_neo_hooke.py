@@ -9,7 +9,7 @@ import springtune
 from springtune.mechanics.energies import NeoHookeEnergy, YeohEnergy
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
-from springtune.mesh import Mesh
+from springtune.mesh import Mesh, signed_areas
 from springtune.problem.loads import AXIAL
 from springtune.reference.finite_strain import NeoHooke, solve_neo_hooke
 from springtune.springs import DEFINITIONS
@@ -127,6 +127,24 @@ def test_no_triangle_turns_inside_out(nu):
     if nu == 0.5:
         values = [energy.value(np.array([[0.0, 0.0], [0.0, 0.0], [0.0, h - 1]])) for h in (1e-1, 1e-2, 1e-3)]
         assert values[2] > 90 * values[1] > 90 * 90 * values[0]
+
+
+@pytest.mark.parametrize("name", ["neo-hooke", "yeoh"])
+def test_springs_of_zero_length_and_areas_are_the_energy(name):
+    """W = 1/2 sum k l^2 + mu/2 sum A0 (J^-2 - 3), of springs that a solver without the energy is given."""
+    mesh = springtune.make_mesh(springtune.Beam("20 mm", "10 mm"), "free", "5 mm")
+    rubber = springtune.Rubber((1e5,)) if name == "yeoh" else springtune.Material("0.6 MPa", 0.5)
+    springs = DEFINITIONS[name].springs(mesh, rubber, 2e-3)
+    assert springs.reference == pytest.approx(0.6e6 * 2e-3)
+    moved = 3e-4 * np.random.default_rng(1).standard_normal(mesh.points.shape)
+    rest, now = (signed_areas(points, mesh.triangles) for points in (mesh.points, mesh.points + moved))
+    first, second = (mesh.points + moved)[mesh.edges].transpose(1, 0, 2)
+    pulls = 0.5 * springs.linear_springs @ ((first - second) ** 2).sum(axis=1)
+    expected = pulls + 0.5 / 3 * (rest * ((rest / now) ** 2 - 3)).sum()
+    assert springs.energies[0].value(moved) == pytest.approx(expected, rel=1e-10)
+    if name == "yeoh":  # further terms bring areas and springs together
+        more = DEFINITIONS[name].springs(mesh, springtune.Rubber((1e5, -2e3, 50.0)), 2e-3)
+        np.testing.assert_allclose(more.linear_springs, springs.linear_springs, rtol=1e-12)
 
 
 def square(nu, law=law_of):

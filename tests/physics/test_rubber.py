@@ -128,6 +128,36 @@ def test_springs_alone_on_a_lattice():
     assert slopes[2] / slopes[0] == pytest.approx(9 / 8, rel=1e-4)
 
 
+def test_a_row_of_springs_gives_back_its_law():
+    """Three terms s - s^-p, of p = 2, 5 and 8, from a test that goes on after the lattice lies flat."""
+    terms, q = np.array([0.3e6, 0.2e6, 0.1e6]), np.linspace(1.02, 2.4, 70)
+    stress = terms @ [q - q**-2, q - q**-5, q - q**-8]
+    law = SpringLaw.fitted(TensileTest(q, stress))
+    assert law.coefficients == pytest.approx(terms, rel=1e-6) and law.largest == q[q < 2].max()
+    four, three = ([*range(count), -2, -1] for count in (4, 3))  # and two beyond
+    assert len(SpringLaw.fitted(TensileTest(q[four], stress[four])).coefficients) == 3
+    with pytest.raises(TestDataError, match="3 terms need more than 3 points below a stretch of 2,"):
+        SpringLaw.fitted(TensileTest(q[three], stress[three]))
+    with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
+        SpringLaw.fitted(TensileTest(q, 1e6 * np.exp(-3 * q)), 2)
+
+
+@pytest.mark.parametrize(("test", "across"), [("equibiaxial", 1.0), ("pure shear", 0.0)])
+def test_stress_of_a_lattice_is_the_derivative_of_its_springs_energy(test, across):
+    """A row spring and two oblique ones for each particle; the rows apart by the other stretch."""
+    law, q, step = SpringLaw((0.3, 0.2, 0.1)), np.linspace(1.1, 1.9, 5), 1e-5
+
+    def energy(along, other):
+        lengths = np.array([along, *2 * [np.sqrt(along**2 + 3 * other**2) / 2]])
+        return sum(
+            a * (lengths**2 / 2 + lengths ** (1 - p) / (p - 1)).sum(0) for a, p in zip((0.3, 0.2, 0.1), (2, 5, 8))
+        )
+
+    other = 1 + across * (q - 1)
+    slope = (energy(q + step, other) - energy(q - step, other)) / (2 * step)
+    assert law.stress(test, q) == pytest.approx(slope, rel=1e-8)
+
+
 HEAD = "stretch,nominal stress [MPa]\n"
 
 

@@ -72,7 +72,7 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[corner] = True
     other = np.argmax(x - y)  # the other end of the lower side
-    if x[other] - x[corner] < abs(y[other] - y[corner]):  # of a body that has none
+    if x[other] - x[corner] <= abs(y[other] - y[corner]):  # of a body that has none, or stands on its corner
         other = np.argmax(np.abs(x - x[corner]))
     held[other, 1] = True
     points = mesh.points - mesh.points[corner]

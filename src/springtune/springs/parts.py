@@ -202,9 +202,8 @@ def _part(mesh: Mesh, cells: Mapping[int, np.ndarray]) -> tuple[Mesh, np.ndarray
     """Mesh of some cells, its particles in the order of the whole one's, and the edge of that for each of its own."""
     chosen = {count: corners[cells[count]] for count, corners in mesh.cells.items()}
     particles = np.unique(np.concatenate([corners.ravel() for corners in chosen.values()]))
-    numbers = np.full(len(mesh.points), -1)
-    numbers[particles] = np.arange(len(particles))
-    part = Mesh(mesh.points[particles], *(numbers[chosen.get(count, no_cells(count))] for count in (3, 4)))
+    cells_of = (np.searchsorted(particles, chosen.get(count, no_cells(count))) for count in (3, 4))
+    part = Mesh(mesh.points[particles], *cells_of)
     codes = particles[part.edges] @ [len(mesh.points), 1]
     return part, np.searchsorted(mesh.edges @ [len(mesh.points), 1], codes)
 
