@@ -27,10 +27,6 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
     below[np.maximum(*edges.T)] = True
     if below.sum() == count - 1:  # each point but the first is joined to one before it, as in rows
         return np.zeros(count, dtype=np.int32)
-    below = np.zeros(count, dtype=bool)
-    below[np.maximum(*edges.T)] = True
-    if below.sum() == count - 1:  # each point but the first is joined to one before it, as where they stand in rows
-        return np.zeros(count, dtype=np.int32)
     joined = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
 
