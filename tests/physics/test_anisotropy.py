@@ -270,6 +270,11 @@ def test_definitions_of_isotropic_materials_refuse_others_by_name(name):
         DEFINITIONS[name].springs(mesh, PLY, THICKNESS, 1.0)
 
 
+def test_a_stiffness_that_is_given_is_for_any_material():
+    mesh = MESH_TYPES["right"](0.02, 0.01, 2e-3)
+    assert DEFINITIONS["paper"].springs(mesh, PLY, THICKNESS, 1e6).reference == 1e6
+
+
 def test_what_is_chosen_instead_fits_the_mesh():
     with pytest.raises(DefinitionError) as caught:
         DEFINITIONS["lattice"].springs(braced(1.0), PLY, THICKNESS)

@@ -14,8 +14,9 @@ from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
-from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
 from springtune.springs.adjoint import springs as adjoint
+from springtune.springs.base import not_negative
 from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
@@ -90,7 +91,7 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
     )
     assert other.reference == pytest.approx(one.reference, rel=1e-12)
     np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
-    assert one.evaluations == other.evaluations and (one.evaluations > 0) == name.startswith("patch")
+    assert one.evaluations == other.evaluations and (one.evaluations == 0) != name.startswith("patch")
 
 
 def test_ends_of_rows_carry_what_a_strip_of_their_area_does():
@@ -114,12 +115,12 @@ def test_delingettes_springs_are_those_of_the_lattice_where_nothing_couples(name
 def test_definitions_are_what_they_are_declared_to_be():
     """One stiffness, a stress across the load, the law at finite strain: asked of the springs themselves."""
     uniform, lateral, lawful = set(), set(), set()
-    for name, definition in DEFINITIONS.items():
-        if definition.needs == "cases":
+    for name, one in DEFINITIONS.items():
+        if one.needs == "cases":
             continue
-        mesh = MESH_TYPES["braced" if 4 in definition.cells else "alternating"](0.03, 0.01, 2.5e-3)
+        mesh = MESH_TYPES["braced" if 4 in one.cells else "alternating"](0.03, 0.01, 2.5e-3)
         law = Rubber((1 / 6,)) if name == "yeoh" else Material(1.0, 0.3, name="unit")
-        found = definition.springs(mesh, law, 1.0, 1.0)
+        found = one.springs(mesh, law, 1.0, 1.0)
         if not found.energies and np.ptp(found.relative) == 0:
             uniform.add(name)
         if found.lateral:
@@ -278,6 +279,25 @@ def test_cells_that_a_definition_cannot_have_are_refused(name):
     mesh = MESH_TYPES["braced" if definition.cells == (3,) else "structured"](0.03, 0.01, 2e-3)
     with pytest.raises(DefinitionError, match="needs (triangles|rectangles).*mesh type"):
         definition.springs(mesh, Material(1.0, 0.3, name="unit"), 1.0)
+
+
+@pytest.mark.parametrize("thickness", [0.0, -1.0, True, "1 mm", np.nan, np.inf])
+def test_what_is_no_thickness_is_refused(thickness):
+    with pytest.raises(DefinitionError, match="thickness: .* is not a number above zero"):
+        DEFINITIONS["lattice"].springs(lattice(2, 2), Material(1.0, 0.3), thickness)
+
+
+def test_springs_of_no_stiffness_are_springs_and_none_is_their_measure():
+    with pytest.raises(DefinitionError, match="reference stiffness 0.0 is not a number above zero"):
+        Springs(0.0, np.ones(3))
+    assert not_negative(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("wrong", [{"cells": (5,)}, {"cells": ()}, {"cells": "34"}, {"needs": "luck"}], ids=repr)
+def test_what_is_no_declaration_is_refused(wrong):
+    with pytest.raises(ValueError, match="definition 'none of ours': .*; give"):
+        definition("none of ours", **wrong)(lambda mesh, material, thickness: None)
+    assert "none of ours" not in DEFINITIONS
 
 
 def test_slender_rectangles_are_refused():
