@@ -44,7 +44,11 @@ def test_a_paper_without_its_numbers_says_which_and_studies_are_as_if_they_were_
     write(run)
     code, output = run.snakemake("paper.yaml", "--keep-going", "paper")
     assert code != 0
-    assert "has no group /sensitivity" in output and "give one that it has, or run the study again" in output
+    log = "results/paper/logs/paper.log"
+    said = (run.folder / log).read_text().splitlines()
+    why = "dataset.nc has no group /sensitivity; give one that it has, or run the study again"
+    assert any(line.endswith(why) for line in said)
+    assert said[-1] in output and f"its log: {log}" in output
     assert not (run.folder / "results/paper/paper.pdf").exists()
     times = run.times("results/*/dataset.nc")
     assert len(times) == len(STUDIES)
