@@ -30,7 +30,7 @@ from .newton import TOLERANCE
 from .stepping import make_stepper
 
 CHECK = 64
-"""Steps between looks at an explicit run: a look costs about two steps."""
+"""Steps between looks at an explicit run: a look costs about two steps, one for rest some twenty."""
 
 BLOWN_UP = 1e3
 """Displacement over the largest of the network's extents beyond which a run has left its model."""
@@ -406,9 +406,10 @@ class Motion:
         done = 0
         with closing(stepper):
             while True:
-                u, v = stepper.state()
+                u, v = stepper.state(exact=bool(sample) or rest is not None or done >= steps)
                 end = self._end(stepper.failed, u, v, name, step, done)
                 if end is not None:
+                    u, v = stepper.state()
                     break
                 if sample:
                     samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
@@ -497,7 +498,7 @@ class Motion:
         x, y = (network.mesh.points - network.mesh.points.mean(axis=0)).T / np.ptp(network.mesh.points)
         one, none = np.ones(len(x)), np.zeros(len(x))
         motions = np.stack([[one, none], [none, one], [-y, x]]).transpose(2, 1, 0)[network.held]
-        if np.linalg.matrix_rank(motions) < 3:
+        if not len(motions) or np.linalg.matrix_rank(motions) < 3:
             return "rest", "the body is free to move as a whole, so whether it is stable was not checked"
         try:
             pivots = (network.rest_factor if self.linear else network.factorize_tangent(displacements)).negative_pivots

@@ -102,8 +102,8 @@ class Stepper(ABC):
         """Start from displacements [m] and velocities [m/s], shape (n_points, 2)."""
         self.u, self.v = u, v
 
-    def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """Displacements [m] and velocities [m/s] of now, shape (n_points, 2)."""
+    def state(self, exact: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Displacements [m] and velocities [m/s] of now, shape (n_points, 2); or velocities of about now."""
         return self.u, self.v
 
     @abstractmethod
@@ -288,10 +288,10 @@ class ExplicitSteps(Stepper):
                 v += self._gain * motion.network.expand(missing)
                 u += step * v
 
-    def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `Stepper`."""
+    def state(self, exact: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """See `Stepper`; velocities are half a step behind where they need not be exact."""
         u, v = (self._back(values[0]).astype(float) for values in (self._u, self._v))
-        if self.half and np.isfinite(v).all() and np.isfinite(u).all():
+        if exact and self.half and np.isfinite(v).all() and np.isfinite(u).all():
             with np.errstate(over="ignore", invalid="ignore"):
                 v = v + 0.5 * self.step * self._acceleration(u, v)
         return u, v
