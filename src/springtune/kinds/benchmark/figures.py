@@ -115,8 +115,9 @@ def plot_benchmark(data, ax=None, *, scene=None):
     ('log', '|Error| [%]')
     """
     case = _scene(data, scene)
+    lost = _lost(case)
     figure, axes = style.panels(ax, figsize=(style.PAGE, 4.0))
-    place = dict(left=0.62, right=0.08, bottom=0.62, top=0.3)
+    place = dict(left=0.62, right=0.08, bottom=0.8 if lost else 0.62, top=0.3)
     style.arrange(figure, axes, **place)
     panel, shown, there, ends = axes[0, 0], named(case), set(), []
     rings = unbeaten(case.assured_error.values, case.seconds.values)
@@ -141,7 +142,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     if not there:
         labels.say(panel, f"No approach has an error: {_statuses(case)}.")
         return panel
-    labels.note(panel, _lost(case), below=-0.16)
+    labels.note(panel, lost, below=0.64)
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
         panel.plot([seconds], [estimate], "*", color="black", markersize=7)
