@@ -207,7 +207,7 @@ def body_of(scene, mesh, springs):
     for corners in mesh.cells.values():
         rest = long[corners]
         area = area_of(rest)
-        if scene.definition in ("area", "patch-area", "flechon"):
+        if scene.definition in ("area", "orthotropic", "patch-area", "flechon"):
             modulus = (3 * nu - 1) / (4 * (1 - nu) if scene.definition == "flechon" else 2 * (1 - nu**2))
             if scene.definition == "patch-area":  # its one scalar
                 modulus *= springs.reference / (2 / math.sqrt(3) / (1 + nu) * young * t)
