@@ -42,6 +42,10 @@ class Division:
         """Number of pieces that so many tasks of so many seconds make."""
         return min(tasks, ceil(seconds / self.most)) if self.most and seconds else 1
 
+    def of_section(self, found: Mapping[Name, float]) -> dict[Name, float]:
+        """Seconds of the pieces of a section of a study, all of which is one piece where grids stay together."""
+        return {(): sum(found.values())} if self.by == "grid" else dict(found)
+
 
 def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, list[Name]]]]:
     """Pieces of a study, dealt out.
@@ -128,9 +132,12 @@ def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
     for kind in kinds():
         if not study.parts[kind.name]:
             continue
+        names = share.get(kind.name, [])
+        if () in names:  # all of it
+            continue
         if kind.division:
-            study = kind.module(kind.division).take(study, share.get(kind.name, []))
-        elif kind.name not in share:
+            study = kind.module(kind.division).take(study, names)
+        else:
             study = replace(study, parts=study.parts | {kind.name: ()})
     return study
 

@@ -24,6 +24,7 @@ from scipy.sparse.linalg import eigsh
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
+from ..mesh.parts import free_motion
 from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
@@ -495,10 +496,7 @@ class Motion:
             Why it is unstable, or was not checked; else empty.
         """
         network = self.network
-        x, y = (network.mesh.points - network.mesh.points.mean(axis=0)).T / np.ptp(network.mesh.points)
-        one, none = np.ones(len(x)), np.zeros(len(x))
-        motions = np.stack([[one, none], [none, one], [-y, x]]).transpose(2, 1, 0)[network.held]
-        if not len(motions) or np.linalg.matrix_rank(motions) < 3:
+        if free_motion(network.mesh.points, network.held):
             return "rest", "the body is free to move as a whole, so whether it is stable was not checked"
         try:
             pivots = (network.rest_factor if self.linear else network.factorize_tangent(displacements)).negative_pivots

@@ -95,6 +95,12 @@ def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: 
 
 
 @_compiled
+def _passes(count: int, size: int, depth: int, bandwidth: int) -> tuple[int, int]:
+    """Blocks of a pass over so many rows, and those that the next pass stays behind."""
+    return (count + (depth - 1) * bandwidth + size - 1) // size, (depth * bandwidth + size - 1) // size
+
+
+@_compiled
 def _part(block: int, size: int, behind: int, count: int) -> tuple[int, int]:
     """Rows of a block, from one to before another, at a distance behind the first step."""
     first = block * size - behind
@@ -173,8 +179,7 @@ def advance_springs(
     """
     u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
     ax, ay, bx, by = room[0], room[1], room[2], room[3]
-    blocks = (count + (depth - 1) * bandwidth + size - 1) // size
-    distance = (depth * bandwidth + size - 1) // size
+    blocks, distance = _passes(count, size, depth, bandwidth)
     for number in range(thread, (steps + depth - 1) // depth, threads):
         for block in range(blocks):
             if not _follow(progress, thread, number, block, blocks, distance):
@@ -256,8 +261,7 @@ def advance_matrix(
         As of `advance_springs`.
     """
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
-    blocks = (count + (depth - 1) * bandwidth + size - 1) // size
-    distance = (depth * bandwidth + size - 1) // size
+    blocks, distance = _passes(count, size, depth, bandwidth)
     for number in range(thread, (steps + depth - 1) // depth, threads):
         for block in range(blocks):
             if not _follow(progress, thread, number, block, blocks, distance):

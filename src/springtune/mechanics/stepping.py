@@ -242,7 +242,7 @@ class ExplicitSteps(Stepper):
         try:
             for call in calls[1:]:
                 begun.append(self.threads.submit(take, call))
-            take(calls[0])
+            calls[0]()
         except BaseException:  # the system gives no more threads, or the user interrupts
             progress[-1] = 1
             raise
@@ -325,7 +325,7 @@ def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, 
     for count in range(min(threads, max(1, entries // FEWEST)), 1, -1):
         depth = int((rows / count - 2 * ROWS_AT_ONCE) / bandwidth)
         if depth >= 1:
-            return count, ROWS_AT_ONCE, max(1, min(depth, _deepest(each, bandwidth)))
+            return count, ROWS_AT_ONCE, min(depth, _deepest(each, bandwidth))
     if rows * each <= CACHE:
         return 1, rows, 1
     return 1, ROWS_AT_ONCE, _deepest(each, bandwidth)

@@ -54,7 +54,7 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
     count = components.max() + 1
     for number in range(count):
         of_body = components == number if count > 1 else slice(None)
-        free = "" if held[of_body].all() else _free_motion(points[of_body], held[of_body])
+        free = "" if held[of_body].all() else free_motion(points[of_body], held[of_body])
         if free:
             x, y = 1e3 * points[of_body].mean(axis=0)
             body = (
@@ -65,8 +65,25 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
             raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
 
 
-def _free_motion(points: np.ndarray, held: np.ndarray) -> str:
-    """Rigid motion that is free where particles are held along x and y, in words; empty where none is."""
+def free_motion(points: np.ndarray, held: np.ndarray) -> str:
+    """Rigid motion that supports leave a body, in words; empty where they leave none.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n_points, 2)
+        Coordinates [m].
+    held : ndarray of bool, shape (n_points, 2)
+        Whether a point is held along x and y.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> free_motion(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[True, True], [False, False]]))
+    'turn about (0, 0) mm'
+    """
     middle = points.mean(axis=0)
     x, y = ((points - middle) / (np.ptp(points, axis=0).max() or 1.0)).T
     across, along = -y[held[:, 0]], x[held[:, 1]]

@@ -247,7 +247,7 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
     encoding = {group: {name: _encoding(data, name) for name in data.variables} for group, data in own.items()}
     path = Path(path)
     try:
-        with replacing(path, synced=True) as unfinished, small_cache():
+        with replacing(path, synced=True) as unfinished, _small_cache():
             first.to_netcdf(unfinished, engine="netcdf4", encoding=encoding)
             for group, (_, *others) in runs.items():
                 for names in others:
@@ -262,8 +262,8 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
 
 
 @contextmanager
-def small_cache() -> Iterator[None]:
-    """Context in which netCDF's library keeps four chunks of each variable, not 64 MB: each is read or written once."""
+def _small_cache() -> Iterator[None]:
+    """Context in which netCDF's library keeps four chunks of each variable, not 64 MB: each is written once."""
     import netCDF4
 
     before = netCDF4.get_chunk_cache()

@@ -26,8 +26,7 @@ def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, fl
     dict of tuple to float
     """
     sample = study.parts["samples"]
-    found = {ends: seconds_of(sample, ends, costs) for ends in drawn_blocks(sample)}
-    return {(): sum(found.values())} if division.by == "grid" else found
+    return division.of_section({ends: seconds_of(sample, ends, costs) for ends in drawn_blocks(sample)})
 
 
 def take(study: "Study", names: "Iterable[Name]") -> "Study":
@@ -44,7 +43,5 @@ def take(study: "Study", names: "Iterable[Name]") -> "Study":
     Study
     """
     sample, wanted = study.parts["samples"], set(names)
-    if () in wanted:
-        return study
     blocks = tuple(ends for ends in drawn_blocks(sample) if ends in wanted)
     return replace(study, parts=study.parts | {"samples": replace(sample, blocks=blocks) if blocks else ()})

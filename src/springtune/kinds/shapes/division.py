@@ -30,11 +30,10 @@ def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, fl
     found: dict[Name, float] = defaultdict(float)
     for one in part.scenes:
         count = particles(part, one)
-        name: Name = () if division.by == "grid" else (one.shape, one.load)
-        found[name] += costs.of("shape_scene", count) + costs.of(one.definition, count)
+        found[one.shape, one.load] += costs.of("shape_scene", count) + costs.of(one.definition, count)
     for shape, _, load in part.referred:
-        found[() if division.by == "grid" else (shape, load)] += costs.of("shape_reference")
-    return dict(found)
+        found[shape, load] += costs.of("shape_reference")
+    return division.of_section(found)
 
 
 def take(study: "Study", names: "Iterable[Name]") -> "Study":
@@ -51,7 +50,7 @@ def take(study: "Study", names: "Iterable[Name]") -> "Study":
     Study
     """
     wanted = set(names)
-    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if wanted & {(), (one.shape, one.load)}})
+    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
 
 
 def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":

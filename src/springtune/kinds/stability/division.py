@@ -24,8 +24,7 @@ def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, fl
     -------
     dict of tuple to float
     """
-    found: dict[Name, float] = {(one.name, one.definition): costs.of(one.name) for one in study.parts["stability"]}
-    return {(): sum(found.values())} if division.by == "grid" else found
+    return division.of_section({(one.name, one.definition): costs.of(one.name) for one in study.parts["stability"]})
 
 
 def take(study: "Study", names: "Iterable[Name]") -> "Study":
@@ -42,5 +41,5 @@ def take(study: "Study", names: "Iterable[Name]") -> "Study":
     Study
     """
     wanted = set(names)
-    chosen = tuple(one for one in study.parts["stability"] if wanted & {(), (one.name, one.definition)})
+    chosen = tuple(one for one in study.parts["stability"] if (one.name, one.definition) in wanted)
     return replace(study, parts=study.parts | {"stability": chosen})
