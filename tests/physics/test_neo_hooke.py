@@ -231,7 +231,7 @@ def test_a_limit_point_is_an_answer():
     """A pressure that pulls on a long face and grows with it has a largest value, as in a balloon."""
     beam, rubber = springtune.Beam("100 mm", "20 mm"), springtune.Material("1 MPa", 0.5)
     mesh = springtune.make_mesh(beam, "structured", "5 mm")
-    from springtune.mechanics.continuation import limit_load
+    from springtune.mechanics.continuation import continued
     from springtune.problem.loads import FACE
     from springtune.scene.sheet import Sheet
 
@@ -245,7 +245,7 @@ def test_a_limit_point_is_an_answer():
     assert found.load_share < found.limit_share < found.load_share + 1 / 16
     # Shortly below there is an equilibrium, from which the path leads to the same limit.
     before, last = (problem.nonlinear(share * found.limit_share * s).displacements for share in (0.96, 0.98))
-    assert limit_load(problem, 0.98 * found.limit_share * s, last, before) == pytest.approx(
+    assert continued(problem, 0.98 * found.limit_share * s, last, before, s).limit == pytest.approx(
         found.limit_share * s, rel=0.01
     )
 

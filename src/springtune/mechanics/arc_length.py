@@ -6,12 +6,9 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..linalg.factors import Factor
-from .continuation import Point, next_point
+from .continuation import FEW, MANY, Point, next_point
 from .network import Network
 from .statics import StaticProblem
-
-FEW, MANY = 3, 8
-"""Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
 
 
 @dataclass(frozen=True)

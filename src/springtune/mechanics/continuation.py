@@ -9,10 +9,16 @@ from .network import Network
 from .newton import TOLERANCE
 
 BEYOND = 0.25
-"""Increment beyond the last load step, over that step."""
+"""First increment beyond the last load step, over that step, which is the longest one."""
 
 MOST_BEYOND = 24
 """Points of a path beyond the last load step that are looked at for a limit point."""
+
+MOST_BEHIND = 60
+"""Points of a path behind a limit point that are looked at for a stable one that carries the load."""
+
+FEW, MANY = 3, 8
+"""Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
 
 
 class Continued(Protocol):
@@ -106,8 +112,26 @@ def _correct(problem: Continued, last: Point, du: np.ndarray, ds: float, scale: 
     return None
 
 
-def limit_load(problem: Continued, load: float, last: np.ndarray, before: np.ndarray) -> float:
-    """Load at which a path turns back shortly beyond an equilibrium: the largest that it carries.
+class Continuation(NamedTuple):
+    """Where a path leads beyond an equilibrium.
+
+    Attributes
+    ----------
+    limit : float
+        Largest load before the path turns back, with one more negative eigenvalue behind it [m]; NaN where it does not.
+    end : Point or None
+        Stable point at or beyond the load that was asked for: before a limit point, or where the path comes back to
+        that load behind it. None where none was found.
+    """
+
+    limit: float
+    end: Point | None
+
+
+def continued(
+    problem: Continued, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
+) -> Continuation:
+    """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
 
     Parameters
     ----------
@@ -116,12 +140,15 @@ def limit_load(problem: Continued, load: float, last: np.ndarray, before: np.nda
         Of the equilibrium, over the reference stiffness [m].
     last, before : ndarray of float, shape (n_points, 2)
         Displacements there, and in equilibrium shortly before [m].
+    target : float
+        Load to reach [m].
+    farthest : float, optional
+        Length of an increment behind a limit point, norm of the displacements of all unknowns [m]; the path is not
+        followed behind it without.
 
     Returns
     -------
-    float
-        Largest load of the points that were found, where the tangent has one more negative eigenvalue behind it [m];
-        NaN where the path does not turn back within `MOST_BEYOND` increments.
+    Continuation
 
     Examples
     --------
@@ -135,22 +162,32 @@ def limit_load(problem: Continued, load: float, last: np.ndarray, before: np.nda
     >>> network = Network(mesh, held, (mesh.edges != [0, 1]).any(axis=1).astype(float))
     >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
     >>> before, last = (problem.nonlinear(-share * 3.83e-4).displacements for share in (0.9, 0.95))
-    >>> print(f"{limit_load(problem, -0.95 * 3.83e-4, last, before):.3g}")
+    >>> print(f"{continued(problem, -0.95 * 3.83e-4, last, before, -5e-4).limit:.3g}")
     -0.000383
     """
-    network = problem.network
+    network, limit = problem.network, np.nan
     direction = network.reduce(last - before)
     point = Point(network.reduce(last), load, 0, 0)
-    length = increment = BEYOND * float(np.linalg.norm(direction))  # near a limit point two paths may be near
+    increment = float(np.linalg.norm(direction))
+    length = BEYOND * increment  # near a limit point two paths may be near
     try:
         pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
     except SingularError:
-        return np.nan
-    for _ in range(MOST_BEYOND):
-        found, length = next_point(problem, load, point, direction, length, 1e-6 * increment)
+        return Continuation(limit, None)
+    most = MOST_BEYOND
+    while most:
+        most -= 1
+        found, length = next_point(problem, target, point, direction, length, 1e-6 * increment)
         if found is None or network.inverted(problem.moved(found.load, network.expand(found.u))):
-            return np.nan
-        if abs(found.load) < abs(point.load) and found.negative_pivots > pivots:
-            return point.load
+            break
+        if np.isnan(limit) and abs(found.load) < abs(point.load) and found.negative_pivots > pivots:
+            limit = point.load
+            if not farthest:
+                break
+            most, increment = MOST_BEHIND, max(increment, farthest)
         direction, point = found.u - point.u, found
-    return np.nan
+        if abs(point.load) >= abs(target) and point.negative_pivots <= pivots:
+            return Continuation(limit, point)
+        if point.steps <= FEW:
+            length = min(1.5 * length, increment)
+    return Continuation(limit, None)

@@ -1,5 +1,8 @@
 """Loads that follow the edges that they act on."""
 
+import copy
+from functools import cached_property
+
 import numpy as np
 
 from ..mesh.cells import Mesh
@@ -48,6 +51,13 @@ class FollowerPressure:
         wanted = 1 if axis == 0 else -1
         turned = np.where((wanted * along < 0)[:, None], edges[:, ::-1], edges)
         return cls(mesh, turned, 1.0 / np.abs(along).sum())
+
+    @cached_property
+    def symmetric(self) -> "FollowerPressure":
+        """A load with the symmetric part of the derivative."""
+        load = copy.copy(self)
+        load.derivative = 0.5 * (self.derivative + self.derivative.swapaxes(1, 2))
+        return load
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
         """Forces on the particles.

@@ -469,18 +469,23 @@ class Network:
         """Whether multigrid solves what is not factorized by Cholesky's method."""
         return self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE
 
-    def is_stable(self, displacements: np.ndarray) -> bool:
-        """Whether the tangent at displacements is positive definite; asks less than a factorization for use.
+    def is_stable(self, displacements: np.ndarray, follower: tuple[float, FollowerPressure] | None = None) -> bool:
+        """Whether the symmetric part of the tangent is positive definite; cheaper than a factorization for use.
 
         Parameters
         ----------
         displacements : ndarray of float, shape (n_points, 2)
             [m]
+        follower : tuple of float and FollowerPressure, optional
+            As in `tangent`. No real eigenvalue is negative where the symmetric part is positive definite (Bendixson).
         """
+        if follower is not None:
+            follower = follower[0], follower[1].symmetric
+        matrix = self.tangent(displacements, follower)
         if self._by_cholesky:
-            return self._pattern.analysis.factorize(self.tangent(displacements).data) is not None
+            return self._pattern.analysis.factorize(matrix.data) is not None
         try:
-            return self.factorize_tangent(displacements).negative_pivots == 0
+            return self.factorize_matrix(matrix).negative_pivots == 0
         except SingularError:
             return False
 

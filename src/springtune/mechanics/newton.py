@@ -65,6 +65,8 @@ class Equilibrium:
     limit_share : float
         Share of the load at which the path from rest turns back, unstable from there on [1]; NaN where no such place
         is known.
+    snapped : bool
+        Whether the path comes back to the load behind that place, in a stable equilibrium.
     """
 
     displacements: np.ndarray
@@ -78,6 +80,7 @@ class Equilibrium:
     load_share: float = 1.0
     last: np.ndarray | None = None
     limit_share: float = np.nan
+    snapped: bool = False
 
 
 class Iterate(NamedTuple):

@@ -1,0 +1,93 @@
+"""Nothing is `solved` behind a snap: shallow arches and trusses beyond their limit load, and right ones next to it."""
+
+import numpy as np
+import pytest
+
+import springtune as st
+from arches import Arch, draw, limit
+from springtune.mechanics.arc_length import follow
+from springtune.problem.status import Status
+
+ARCHES = draw()
+
+
+def statuses(arch, shares):
+    """Status and message at shares of the load at which the path loses its stability, and how it does."""
+    problem = arch.problem()
+    load, how = limit(problem)
+    return {share: problem.judge(share * load, problem.nonlinear(share * load))[:2] for share in shares}, how
+
+
+def check(arch, shares):
+    found, how = statuses(arch, shares)
+    for share, (status, message) in found.items():
+        if share < 1:
+            assert (status, message) == (Status.SOLVED, ""), (arch, share)
+        else:
+            assert status in (Status.UNSTABLE, Status.NOT_CONVERGED) and message, (arch, share)
+            if how == "limit point" and status is Status.UNSTABLE:
+                assert f"turns back, unstable, at {100 / share:.2g}" in message or "negative pivot" in message, message
+
+
+@pytest.mark.parametrize("arch", ARCHES[::7], ids=lambda arch: f"{arch.form}-{arch.ends}-{arch.load}-{arch.definition}")
+def test_an_arch_beyond_its_limit_load_is_not_solved(arch):
+    check(arch, (0.9, 1.05, 5.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arch", ARCHES, ids=lambda arch: f"{arch.form}-{arch.ends}-{arch.load}-{arch.definition}")
+def test_no_arch_beyond_its_limit_load_is_solved(arch):
+    check(arch, (0.9, 1.05, 1.5, 2.5, 5.0))
+
+
+def sine_arch(sides=40, rise=0.03, strip=0.01):
+    """Sine arch of span 1 m as a shape of straight sides, clamped at both ends."""
+    x = np.linspace(0.0, 1.0, sides + 1)
+    y = rise * np.sin(np.pi * x)
+    lower = [st.Segment((a, b), group="lower") for a, b in zip(x[:-1], y[:-1], strict=True)]
+    upper = [st.Segment((a, b + strip), group="upper") for a, b in zip(x[:0:-1], y[:0:-1], strict=True)]
+    return st.Shape(
+        "arch",
+        "1 mm",
+        [*lower, st.Segment((1.0, 0.0), group="right"), *upper, st.Segment((0.0, strip), group="left")],
+        points={"crown": (0.5, rise + strip)},
+        loads={
+            "push": st.LoadCase(
+                "push",
+                [st.Support("left", x=0, y=0), st.Support("right", x=0, y=0)],
+                [st.Traction("crown", (0, "-1 N"))],
+                quantities=[st.Quantity("crown", "displacement", "crown", "y")],
+            )
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    shape = sine_arch()
+    mesh = st.mesh_shape(shape, "5 mm")
+    material = st.Material("1 MPa", 1 / 3, name="soft")
+    return lambda force: st.Scene(shape, mesh, material, "push", definition="lattice", scale=force).solve()
+
+
+def test_a_shape_that_snaps_is_unstable_and_says_where(pushed):
+    """0.00636 N is carried, 0.0064 N is not; 0.01 N is carried 52 mm below, behind the snap."""
+    below, beyond = pushed(6.3e-3), pushed(10e-3)
+    assert below.status == "solved" and below.values["crown"] == pytest.approx(-12.4e-3, rel=0.1)
+    assert beyond.status == "unstable" and "limit point: the path from rest turns back" in beyond.message
+    assert "behind the snap it comes to a stable equilibrium that carries the load" in beyond.message
+    assert np.isnan(beyond.displacement)
+
+
+@pytest.mark.parametrize("definition", ["uniform", "neo-hooke", "delingette"])
+@pytest.mark.parametrize("share", [0.5, 0.75, 1.0])
+def test_an_arch_that_only_softens_is_solved(definition, share):
+    """So low that its path does not turn back, though the straight way from rest is unstable in its middle."""
+    problem = Arch("truss", "mixed", "point", definition, 1.1).problem()
+    guess = 0.02 / np.abs(problem.slope).max()
+    path = follow(problem, 3 * guess, increment=float(np.linalg.norm(guess * problem.slope)) / 20)
+    assert not path.negative_pivots.any() and (np.diff(path.loads) > 0).all() and not path.message
+    place = int(share * (len(path.loads) - 1))
+    found = problem.nonlinear(path.loads[place])
+    assert problem.judge(path.loads[place], found)[:2] == (Status.SOLVED, "")
+    assert np.abs(found.displacements - path.displacements[place]).max() <= 1e-6 * np.abs(found.displacements).max()
