@@ -14,6 +14,9 @@ BEYOND = 0.25
 MOST_BEYOND = 24
 """Points of a path beyond the last load step that are looked at for a limit point."""
 
+SHORTEST_BEYOND = 1e-6
+"""Shortest increment beyond the last load step, over that step."""
+
 MOST_BEHIND = 60
 """Points of a path behind a limit point that are looked at for a stable one that carries the load."""
 
@@ -119,12 +122,15 @@ class Continuation(NamedTuple):
     ----------
     limit : float
         Largest load before the path turns back, with one more negative eigenvalue behind it [m]; NaN where it does not.
+    lost : float
+        First load at which the path was found unstable before it turns back [m]; NaN where it was not.
     end : Point or None
         Stable point at or beyond the load that was asked for: before a limit point, or where the path comes back to
         that load behind it. None where none was found.
     """
 
     limit: float
+    lost: float
     end: Point | None
 
 
@@ -165,7 +171,7 @@ def continued(
     >>> print(f"{continued(problem, -0.95 * 3.83e-4, last, before, -5e-4).limit:.3g}")
     -0.000383
     """
-    network, limit = problem.network, np.nan
+    network, limit, lost = problem.network, np.nan, np.nan
     direction = network.reduce(last - before)
     point = Point(network.reduce(last), load, 0, 0)
     increment = float(np.linalg.norm(direction))
@@ -173,21 +179,27 @@ def continued(
     try:
         pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
     except SingularError:
-        return Continuation(limit, None)
+        return Continuation(limit, lost, None)
     most = MOST_BEYOND
     while most:
         most -= 1
-        found, length = next_point(problem, target, point, direction, length, 1e-6 * increment)
-        if found is None or network.inverted(problem.moved(found.load, network.expand(found.u))):
+        found, length = next_point(problem, target, point, direction, length, SHORTEST_BEYOND * increment)
+        if found is None:
             break
-        if np.isnan(limit) and abs(found.load) < abs(point.load) and found.negative_pivots > pivots:
+        if network.inverted(problem.moved(found.load, network.expand(found.u))):
+            length *= BEYOND  # cells that collapse snap just before
+            continue
+        falls, unstable = abs(found.load) < abs(point.load), found.negative_pivots > pivots
+        if np.isnan(limit) and falls and unstable:
             limit = point.load
             if not farthest:
                 break
             most, increment = MOST_BEHIND, max(increment, farthest)
+        elif np.isnan(lost) and unstable:
+            lost = found.load
         direction, point = found.u - point.u, found
-        if abs(point.load) >= abs(target) and point.negative_pivots <= pivots:
-            return Continuation(limit, point)
+        if abs(point.load) >= abs(target) and not unstable:
+            return Continuation(limit, lost, point)
         if point.steps <= FEW:
             length = min(1.5 * length, increment)
-    return Continuation(limit, None)
+    return Continuation(limit, lost, None)

@@ -449,8 +449,10 @@ class StaticProblem:
             apart = looked_at and not leaves and not self._joined(here, last, there, found, guess, bend)
             limit, failed = np.nan, apart or not found.converged
             if failed and step <= SMALLEST_STEP and last_step:
-                limit, end = continued(self, here, last, before, there)
-                if np.isnan(limit) and end is not None:
+                limit, lost, end = continued(self, here, last, before, there)
+                if np.isnan(unstable) and not limit / s <= lost / s:
+                    unstable = lost / s
+                if np.isnan(limit) and np.isnan(lost) and end is not None:
                     guess = self.network.expand(end.u)
                     near = self.newton(there, guess)
                     if near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISE:
