@@ -1,6 +1,7 @@
 """Shallow arches, which snap: meshes of a bent strip, how they are held and loaded, and 36 of them."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,9 +17,12 @@ FORMS = {
     "sine": lambda x: np.sin(np.pi * x),
     "truss": lambda x: 1 - np.abs(2 * x - 1),  # von Mises
     "parabola": lambda x: 4 * x * (1 - x),
+    "circle": lambda x: np.sqrt(1.5625 - (2 * x - 1) ** 2) / 0.5 - 1.5,  # a dome: rise to half-span as 1 to 2
+    "straight": lambda x: 0 * x,
 }
 ENDS = {"clamped": (True, True), "pinned": (False, False), "mixed": (True, False)}
 LOADS = ("point", "pressure", "follower-pressure", "gravity")
+SNAPPING = ("sine", "truss", "parabola")
 NAMES = ("uniform", "lattice", "patch", "area", "angular", "delingette", "van-gelder", "neo-hooke")
 
 
@@ -35,9 +39,11 @@ class Arch:
     rows: int = 2
     mesh_type: str = "structured"
     poisson_ratio: float = 1 / 3
+    thickness: ClassVar[float] = 1.0
+    young_modulus: ClassVar[float] = 1e6
 
     def parts(self):
-        """Mesh, directions held, forces of total 1 and edges of the upper side, the body to the left."""
+        """Mesh, directions held, forces of total 1, displacements given, edges of the upper side (body to the left)."""
         flat = MESH_TYPES[self.mesh_type](1.0, self.strip, self.strip / self.rows)
         x, y = flat.points.T
         mesh = Mesh(
@@ -50,26 +56,33 @@ class Arch:
         top = np.flatnonzero(np.isclose(y, self.strip))
         top = top[np.argsort(x[top])]
         edges = np.stack([top[1:], top[:-1]], axis=1)
-        pattern = np.zeros(mesh.points.shape)
-        if self.load == "point":
+        pattern, given = np.zeros(mesh.points.shape), None
+        if self.load == "shortening":
+            given = np.zeros(mesh.points.shape)
+            given[np.isclose(x, 1.0) & held[:, 0], 0] = -1.0
+        elif self.load == "point":
             pattern[top[np.argmin(np.abs(x[top] - 0.5))], 1] = -1.0
         elif self.load == "gravity":
             pattern[:, 1] = -mesh.particle_areas / mesh.area
         else:
             pattern = FollowerPressure(mesh, edges, 1.0).forces(pattern)
-        return mesh, held, pattern, edges
+        return mesh, held, pattern, given, edges
 
     def springs(self, mesh):
-        """Springs of E t = 1e6 N/m."""
-        return DEFINITIONS[self.definition].springs(mesh, Material(1e6, self.poisson_ratio, name="arch"), 1.0)
+        """Springs of its definition; a uniform stiffness is 0.85 E t."""
+        material = Material(self.young_modulus, self.poisson_ratio, name="arch")
+        definition = DEFINITIONS[self.definition]
+        return definition.springs(
+            mesh, material, self.thickness, 0.85 * self.young_modulus if definition.needs else None
+        )
 
     def problem(self):
         """The arch as the library has it."""
-        mesh, held, pattern, edges = self.parts()
+        mesh, held, pattern, given, edges = self.parts()
         springs = self.springs(mesh)
         network = Network(mesh, held, springs.relative, springs.energies)
         follower = FollowerPressure(mesh, edges, 1.0) if self.load == "follower-pressure" else None
-        return StaticProblem(network, pattern, follower)
+        return StaticProblem(network, pattern, follower, given=given)
 
 
 def draw():
@@ -77,7 +90,7 @@ def draw():
     rng = np.random.default_rng(5)
     return [
         Arch(form, ends, load, NAMES[number % len(NAMES)], float(rng.uniform(2.0, 3.6)))
-        for number, (load, ends, form) in enumerate((a, b, c) for a in LOADS for b in ENDS for c in FORMS)
+        for number, (load, ends, form) in enumerate((a, b, c) for a in LOADS for b in ENDS for c in SNAPPING)
     ]
 
 

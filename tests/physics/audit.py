@@ -1,6 +1,7 @@
 """Random scenes solved as a study solves them, and each answer checked by the mechanics of `mechanics`.
 
     python tests/physics/audit.py --scenes 2000 --seed 1
+    python tests/physics/audit.py --scenes 500 --seed 1 --snaps
 
 prints how many scenes ended in which status, and every one whose answer is wrong. A ``solved`` scene is wrong where
 
@@ -16,13 +17,15 @@ depend on seed and number alone, so ``--only 17`` shows one of them again.
 """
 
 import argparse
+import copy
 import math
 import time
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
+from arches import ENDS, Arch
 from mechanics import (
     LONG,
     Body,
@@ -38,10 +41,11 @@ from mechanics import (
     squares_forces,
 )
 from springtune.kinds.scenes.solve import solve as solve_scene
+from springtune.mechanics.follower import FollowerPressure
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.scene.sheet import Sheet
+from springtune.scene.sheet import Loading, Sheet, solved
 from springtune.springs import DEFINITIONS, DefinitionError
 
 PROMISED = 1e-6
@@ -147,6 +151,50 @@ def draw(seed, number):
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Snap:
+    """One draw of an arch, a truss, a dome or a column; `level` is over the load that the path carries, or a guess."""
+
+    arch: Arch
+    way: str
+    level: float
+    kinematics = "nonlinear"
+    load = property(lambda self: f"{self.arch.form} {self.arch.load}")
+    mesh_type = property(lambda self: self.arch.mesh_type)
+
+
+def draw_snap(seed, number):
+    """Arch of a seed and a number."""
+    rng = np.random.default_rng([seed, number, 1])
+    form = str(rng.choice(["sine", "truss", "parabola", "circle", "straight"], p=[0.2, 0.25, 0.2, 0.2, 0.15]))
+    load = str(rng.choice(["point", "pressure", "follower-pressure", "gravity"]))
+    if form == "circle" and rng.random() < 0.7:
+        load = "follower-pressure"
+    if form == "straight":
+        load = "shortening"
+    names = [
+        name
+        for name, definition in DEFINITIONS.items()
+        if 3 in definition.cells
+        and not definition.uniaxial
+        and definition.needs in ("", "stiffness")
+        and name not in ("yeoh", "axis-exact", "adjoint", "annealed", "evolved")
+    ]
+    arch = Arch(
+        form, str(rng.choice(list(ENDS))), load, str(rng.choice(names)), float(rng.uniform(0.8, 4.0)),
+        float(rng.uniform(0.05, 0.1)), int(rng.integers(2, 4)),
+        str(rng.choice(["structured", "alternating", "right", "free"])), float(rng.choice([0.0, 0.3, 1 / 3, 0.49])),
+    )  # fmt: skip
+    way = str(rng.choice(WAYS, p=[0.25, 0.35, 0.4]))
+    if way == "moderate":
+        level = rng.uniform(0.2, 0.95)
+    elif way == "critical":
+        level = 1 + 10 ** rng.uniform(-2.5, -1) * rng.choice([-1.0, 1.0])
+    else:
+        level = rng.uniform(1.05, 5)
+    return Snap(arch, way, float(level))
+
+
 def unit_force(scene):
     """Force whose mean stress is E; in bending that of F L^2 = E I. Of the sign of the load."""
     kind, side = LOADS[scene.load].kind.name, scene.height
@@ -168,7 +216,7 @@ def column(scene):
 def body_of(scene, mesh, springs):
     """The scene's body in the mechanics of the audit: energies from the definitions' formulas."""
     x, height, length = mesh.points, scene.height, scene.length
-    kind, t, young, nu = LOADS[scene.load].kind.name, scene.thickness, scene.young_modulus, scene.poisson_ratio
+    kind, nu = LOADS[scene.load].kind.name, scene.poisson_ratio
     left, right = np.abs(x[:, 0]) < 1e-9 * length, np.abs(x[:, 0] - length) < 1e-9 * length
     bottom, top = np.abs(x[:, 1]) < 1e-9 * height, np.abs(x[:, 1] - height) < 1e-9 * height
     held = np.zeros(x.shape, bool)
@@ -198,8 +246,13 @@ def body_of(scene, mesh, springs):
         ends = np.stack([order[:-1], order[1:]], axis=1)
         follower = Part(ends, follower_forces, np.full(len(ends), 1 / length))
 
-    long = x.astype(LONG)
-    parts = []
+    return Body(x, held, pattern, parts_of(scene, mesh, springs), follower)
+
+
+def parts_of(scene, mesh, springs):
+    """Springs and energies of a scene's definition, from the formulas."""
+    long, parts = mesh.points.astype(LONG), []
+    t, young, nu = scene.thickness, scene.young_modulus, scene.poisson_ratio
     k = springs.reference * springs.relative
     if np.any(k):
         d = long[mesh.edges[:, 1]] - long[mesh.edges[:, 0]]
@@ -237,7 +290,7 @@ def body_of(scene, mesh, springs):
             parts.append(Part(corners, squares_forces, stiffness, (opposite**2).sum(axis=2)))
         elif springs.energies:
             raise ValueError(f"the energies of '{scene.definition}' are not in the audit; write them in mechanics.py")
-    return Body(x, held, pattern, parts, follower)
+    return parts
 
 
 def masses_of(mesh):
@@ -333,6 +386,52 @@ def audit(scene, path=True):
     return verdict
 
 
+def audit_snap(scene, path=True):
+    """As `audit`, of an arch: solved as scenes of shapes are."""
+    verdict, arch = Verdict(scene), scene.arch
+    mesh, held, pattern, given, edges = arch.parts()
+    try:
+        springs = arch.springs(mesh)
+    except DefinitionError as error:
+        verdict.status, verdict.message = "no network", str(error)
+        return verdict
+    follower = pressure = None
+    if arch.load == "follower-pressure":
+        follower = Part(edges, follower_forces, np.ones(len(edges)))
+        pressure = FollowerPressure(mesh, edges, 1.0)
+    body = Body(mesh.points, held, pattern, parts_of(arch, mesh, springs), follower, 0.0 if given is None else given)
+    verdict.unknowns, masses = body.size, masses_of(mesh)
+
+    def upright(unknowns, force):
+        values = body.modes(unknowns, force, masses)
+        return not ((values.real < 0) & (np.abs(values.imag) <= MERGED * np.abs(values) + ROUNDING)).any()
+
+    judge = upright if follower is not None else None
+    # The load that would move it by three times its rise, were it linear, or shorten it by four times what buckles it.
+    rest = np.zeros(body.size, LONG)
+    soft = np.abs(body.solve(body.tangent(rest, 0.0), body.missing(rest, LONG(1.0)))).max()
+    guess = 2 * arch.strip**2 if given is not None else 3 * arch.rise * arch.strip / float(soft)
+    share = body.follow(guess, judge=judge)[1]
+    verdict.force = force = float(guess * share * scene.level)
+    loading = Loading(("arch",), held, pattern, given, pressure)
+    problem = Sheet(mesh, arch.thickness).stated(replace_scale(loading, force), springs)
+    found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
+    verdict.status, verdict.message = str(found.status), found.message
+    result = {"displacements": found.equilibrium.displacements}
+    _check_nonlinear(verdict, body, force, result, mesh, masses, judge, path)
+    return verdict
+
+
+def replace_scale(loading, factor):
+    """A loading times a factor."""
+    follower = loading.follower
+    if follower is not None:
+        follower = copy.copy(follower)
+        follower.half, follower.derivative = factor * follower.half, factor * follower.derivative
+    given = None if loading.given is None else factor * loading.given
+    return replace(loading, pattern=factor * loading.pattern, given=given, follower=follower)
+
+
 def _distance(found, exact):
     return float(np.linalg.norm((found - exact).astype(float)) / (np.linalg.norm(exact.astype(float)) or 1.0))
 
@@ -360,7 +459,7 @@ def _check_nonlinear(verdict, body, force, result, mesh, masses, judge, path):
         if verdict.status == "failed":
             return
         end, share, why = body.follow(force, judge=judge)
-        if not why and not body.inside_out(end, mesh.cells.values()):
+        if not why and not body.inside_out(end, mesh.cells.values(), force):
             verdict.lowest = float(body.lowest(end, force)[0]) if body.follower is None else math.nan
             flutters = body.follower is not None and merged_modes(body, end, force, masses)[0]
             if not flutters and not verdict.lowest <= 0:  # by less than what ends a path
@@ -374,7 +473,7 @@ def _check_nonlinear(verdict, body, force, result, mesh, masses, judge, path):
     verdict.error = _distance(found, exact)
     if verdict.error > PROMISED:
         verdict.wrong.append(f"error {verdict.error:.1e}")
-    if body.inside_out(exact, mesh.cells.values()):
+    if body.inside_out(exact, mesh.cells.values(), force):
         verdict.wrong.append("cells inside out")
     if body.follower is None:
         verdict.lowest = body.lowest(exact, force)[0]
@@ -397,6 +496,7 @@ def main():
     """Audit random scenes and print what came of them."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--scenes", type=int, default=60)
+    parser.add_argument("--snaps", action="store_true", help="audit arches, trusses, domes and columns, not rectangles")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="audit this scene alone")
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
@@ -404,7 +504,10 @@ def main():
     numbers = range(asked.first, asked.first + asked.scenes) if asked.only is None else [asked.only]
     begin, verdicts = time.perf_counter(), []
     for number in numbers:
-        verdict = audit(draw(asked.seed, number), path=number % 3 == 0)
+        if asked.snaps:
+            verdict = audit_snap(draw_snap(asked.seed, number))
+        else:
+            verdict = audit(draw(asked.seed, number), path=number % 3 == 0)
         verdicts.append(verdict)
         if verdict.wrong or verdict.refused or verdict.held or asked.only is not None:
             said = "; ".join(verdict.wrong) or verdict.refused or "higher modes merged" * bool(verdict.held)

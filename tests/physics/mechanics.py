@@ -198,10 +198,13 @@ class Body:
         Dead forces of total 1; not used where there is a follower.
     parts : list of Part
     follower : Part, optional
+    given : ndarray of float, shape (n, 2), optional
+        Displacements of held directions for a force of 1; zero without.
     """
 
-    def __init__(self, points, held, pattern, parts, follower=None):
+    def __init__(self, points, held, pattern, parts, follower=None, given=0.0):
         self.rest, self.pattern, self.parts, self.follower = points.astype(LONG), pattern, parts, follower
+        self.given = given
         along = int(np.argmax(np.ptp(points, axis=0)))
         free = np.flatnonzero(~held.ravel())
         place = np.repeat(points, 2, axis=0)[free]
@@ -233,9 +236,12 @@ class Body:
         field[self.free] = unknowns
         return field.reshape(-1, 2)
 
+    def positions(self, unknowns, force):
+        return self.rest + force * self.given + self.field(unknowns)
+
     def missing(self, unknowns, force):
         """Load less resistance, shape (unknowns,), in the precision of the unknowns."""
-        positions = self.rest + self.field(unknowns)
+        positions = self.positions(unknowns, force)
         inner = self.sum(positions, self.parts)[self.free]
         if self.follower is None:
             return force * self.pattern.ravel()[self.free] - inner
@@ -249,7 +255,7 @@ class Body:
 
     def tangent(self, unknowns, force):
         """Tangent in LAPACK's form of band matrices, shape (2 band + 1, unknowns)."""
-        positions = (self.rest + self.field(unknowns)).astype(float)
+        positions = self.positions(unknowns, force).astype(float)
         total = np.zeros((2 * self.band + 1) * self.size)
         parts = [(part, 1.0) for part in self.parts] + ([(self.follower, force)] if self.follower else [])
         for (part, factor), (kept, places) in zip(parts, self.places):
@@ -363,8 +369,8 @@ class Body:
                 largest = max(largest, float(np.sqrt((moved**2).sum(axis=1) / (here**2).sum(axis=1)).max()))
         return largest
 
-    def inside_out(self, unknowns, cells):
-        positions = (self.rest + self.field(unknowns)).astype(float)
+    def inside_out(self, unknowns, cells, force=0.0):
+        positions = self.positions(unknowns, force).astype(float)
         return any((area_of(positions[corners]) <= 0).any() for corners in cells)
 
     def follow(self, force, judge=None):
