@@ -412,7 +412,7 @@ def audit_snap(scene, path=True):
     soft = np.abs(body.solve(body.tangent(rest, 0.0), body.missing(rest, LONG(1.0)))).max()
     guess = 2 * arch.strip**2 if given is not None else 3 * arch.rise * arch.strip / float(soft)
     share = body.follow(guess, judge=judge)[1]
-    verdict.force = force = float(guess * share * scene.level)
+    verdict.force = force = float(guess * (share or 1e-3) * scene.level)
     loading = Loading(("arch",), held, pattern, given, pressure)
     problem = Sheet(mesh, arch.thickness).stated(replace_scale(loading, force), springs)
     found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)

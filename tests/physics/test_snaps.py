@@ -6,6 +6,7 @@ import pytest
 import springtune as st
 from arches import Arch, draw, limit
 from springtune.mechanics.arc_length import follow
+from springtune.mechanics.dynamics import relax
 from springtune.problem.status import Status
 
 ARCHES = draw()
@@ -78,6 +79,16 @@ def test_a_shape_that_snaps_is_unstable_and_says_where(pushed):
     assert "behind the snap it comes to a stable equilibrium that carries the load" in beyond.message
     assert 5.5e-3 < 1e-4 * float(beyond.message.split("at ")[1].split(" %")[0]) < 6.5e-3
     assert np.isnan(beyond.displacement)
+
+
+@pytest.mark.parametrize("share, says", [(0.8, ""), (3.0, "limit point: the path from rest turns back")])
+def test_a_motion_that_snaps_says_so_where_it_comes_to_rest(share, says):
+    arch = Arch("truss", "clamped", "point", "lattice", 3.0)
+    problem = arch.problem()
+    load = share * limit(problem)[0]
+    run = relax(problem.network, load * problem.network.expand(problem.load))
+    assert run.status == "rest" and (says in run.message if says else run.message == "")
+    assert ("at rest where a load that grows slowly does not lead" in run.message) == bool(says)
 
 
 @pytest.mark.parametrize("definition", ["uniform", "neo-hooke", "delingette"])

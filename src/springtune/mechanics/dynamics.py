@@ -28,6 +28,7 @@ from ..mesh.parts import free_motion
 from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
+from .statics import StaticProblem
 from .stepping import make_stepper
 
 CHECK = 64
@@ -493,7 +494,7 @@ class Motion:
         status : str
             ``"rest"`` or ``"unstable"``.
         message : str
-            Why it is unstable, or was not checked; else empty.
+            Why it is unstable, or was not checked, or that it lies behind a snap; else empty.
         """
         network = self.network
         if free_motion(network.mesh.points, network.held):
@@ -502,8 +503,11 @@ class Motion:
             pivots = (network.rest_factor if self.linear else network.factorize_tangent(displacements)).negative_pivots
         except SingularError as error:
             return "unstable", f"at rest on a limit point, where the tangent is singular ({error}); use another load"
-        if not pivots:
+        if not pivots and self.linear:
             return "rest", ""
+        if not pivots:
+            why = StaticProblem(network, self.load).departure(1.0, displacements)
+            return "rest", f"at rest where a load that grows slowly does not lead: {why}" if why else ""
         many = "s" if pivots > 1 else ""
         return "unstable", (
             f"at rest on an unstable equilibrium: the tangent has {pivots} negative pivot{many}, and the least push "

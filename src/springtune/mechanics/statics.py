@@ -318,18 +318,36 @@ class StaticProblem:
             if found.converged:
                 change = self.network.largest_change(found.displacements)  # never below the stretch
                 near = change <= FAR or change <= TURNED and self.network.largest_stretch(found.displacements) <= FAR
-                if near and (change <= SMALL or self._reached(s, found)):
+                if near and (change <= SMALL or self._reached(s, found.displacements) or self._unstable(s, found)):
                     return replace(found, iterations=iterations)
                 break
         return self._in_steps(s, found, iterations)
 
-    def _reached(self, s: float, found: Equilibrium) -> bool:
-        """Whether no snap lies between rest and an equilibrium; one that is unstable is not asked for more."""
-        rest = np.zeros(found.displacements.shape)
-        return self._joined(0.0, rest, s, found, s * self.slope) or self._unstable(s, found)
+    def departure(self, s: float, displacements: np.ndarray) -> str:
+        """How a stable equilibrium differs from the one that the path from rest leads to; empty where it does not.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            [m]
+        """
+        if self.network.largest_change(displacements) <= SMALL or self._reached(s, displacements):
+            return ""
+        found = self.nonlinear(s)
+        status, message, _ = self.judge(s, found)
+        if status is not Status.SOLVED:
+            return message
+        apart = self.network.largest_change(displacements - found.displacements) > SURPRISE
+        return "the path from rest leads to another stable equilibrium" if apart else ""
+
+    def _reached(self, s: float, displacements: np.ndarray) -> bool:
+        """Whether no snap lies between rest and an equilibrium."""
+        return self._joined(0.0, np.zeros(displacements.shape), s, displacements, s * self.slope)
 
     def _joined(
-        self, s: float, here: np.ndarray, to: float, found: Equilibrium, guess: np.ndarray, bend: float = 0.25
+        self, s: float, here: np.ndarray, to: float, there: np.ndarray, guess: np.ndarray, bend: float = 0.25
     ) -> bool:
         """Whether the way from one equilibrium to the next one is stable in its middle: no snap lies between.
 
@@ -337,7 +355,7 @@ class StaticProblem:
         extended from here: that of the parabola through both. Where that is much the path is no parabola, and the
         straight way is taken. Where the guess was good, and the middle is all but in balance, nothing has snapped.
         """
-        there, network = found.displacements, self.network
+        network = self.network
         middle, off, way = 0.5 * (here + there), there - guess, there - here
         if bend * np.linalg.norm(off) <= BENT * np.linalg.norm(way):
             middle = middle - bend * off
@@ -446,7 +464,7 @@ class StaticProblem:
             looked_at = found.converged and np.isnan(unstable)
             leaves = looked_at and self._unstable(there, found)
             bend = 0.25 * step / (step + last_step)
-            apart = looked_at and not leaves and not self._joined(here, last, there, found, guess, bend)
+            apart = looked_at and not leaves and not self._joined(here, last, there, found.displacements, guess, bend)
             limit, failed = np.nan, apart or not found.converged
             if failed and step <= SMALLEST_STEP and last_step:
                 limit, lost, end = continued(self, here, last, before, there)
