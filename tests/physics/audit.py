@@ -41,6 +41,7 @@ from mechanics import (
     squares_forces,
 )
 from springtune.kinds.scenes.solve import solve as solve_scene
+from springtune.linalg.factors import SingularError
 from springtune.mechanics.follower import FollowerPressure
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
@@ -392,7 +393,7 @@ def audit_snap(scene, path=True):
     mesh, held, pattern, given, edges = arch.parts()
     try:
         springs = arch.springs(mesh)
-    except DefinitionError as error:
+    except (DefinitionError, SingularError) as error:
         verdict.status, verdict.message = "no network", str(error)
         return verdict
     follower = pressure = None

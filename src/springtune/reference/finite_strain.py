@@ -16,6 +16,7 @@ break the symmetry. Elements shrink towards the corners, and the load grows in s
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,9 @@ MOST_LONG = 10
 """Most elements along a bent beam over those of half the height: where it is slender, it bends evenly."""
 
 SMALLEST_STEP = 1 / 64
+
+BENT = 0.1
+"""As `springtune.mechanics.statics.BENT`."""
 
 
 class IncompressibleError(ValueError):
@@ -241,11 +245,12 @@ class _Sheet:
             done = path[-1][0]
             step = min(step, 1 - done)
             found = self._newton(_extrapolated(path, done + step), stress * (done + step))
-            if found is not None:
-                moved, uncertain = found
+            if found is not None and self._joined(path, done + step, found, stress):
+                moved, uncertain, _ = found
                 path, step = [*path[-2:], (done + step, moved)], 1.5 * step
             elif step <= SMALLEST_STEP:
-                raise FiniteStrainError(f"reference of {name}: no equilibrium beyond {100 * done:.3g} % of the load")
+                what = "equilibrium" if found is None else "stable path"
+                raise FiniteStrainError(f"reference of {name}: no {what} beyond {100 * done:.3g} % of the load")
             else:
                 step /= 2
         profile = moved[self.nodes, self.component]
@@ -261,6 +266,41 @@ class _Sheet:
         displacement = float(np.interp(0.5, positions, profile)) if self.kind.pressed else mean
         return _Solved(displacement, mean, positions, profile, *self._field(moved), uncertain)
 
+    def _joined(
+        self, path: list[tuple[float, np.ndarray]], share: float, found: tuple[np.ndarray, float, bool], stress: float
+    ) -> bool:
+        """Whether an equilibrium is stable and no snap lies between it and the last one: the middle is stable, too."""
+        moved, _, stable = found
+        middle = 0.5 * (path[-1][0] + share)
+        if not stable:
+            return False
+        if self._is_stable(_extrapolated([*path, (share, moved)], middle), stress * middle):
+            return True
+        # The straight way from rest shortens what turns; the parabola that begins as the linear solution does not.
+        bent = 0.25 * (moved - stress * share * self._slope)
+        little = np.linalg.norm(bent) <= BENT * np.linalg.norm(moved)
+        return bool(len(path) == 1 and little and self._is_stable(0.5 * moved - bent, stress * middle))
+
+    def _is_stable(self, moved: np.ndarray, stress: float) -> bool:
+        """Whether the symmetric part of the tangent is positive definite: no real eigenvalue is negative then."""
+        gradient = self._gradient(moved)
+        with np.errstate(all="ignore"):
+            tangent = self._tangent(gradient, self.law.response(_strain(gradient))) - stress * self.turning
+        free = ~self.held.ravel()
+        try:
+            return not SuperLUFactor(csc_array((0.5 * (tangent + tangent.T))[free][:, free])).negative_pivots
+        except (SingularError, ValueError):
+            return False
+
+    @cached_property
+    def _slope(self) -> np.ndarray:
+        """Linear solution for a stress of 1."""
+        rest, free = np.zeros(self.load.shape), ~self.held.ravel()
+        gradient = self._gradient(rest)
+        tangent = self._tangent(gradient, self.law.response(_strain(gradient)))
+        rest[~self.held] = SuperLUFactor(csc_array(tangent[free][:, free])).solve(self.load.ravel()[free])
+        return rest
+
     def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
         places = self.nodes_at
@@ -275,8 +315,10 @@ class _Sheet:
         whole = np.concatenate([field, field[-2::-1] * [-1, 1]])
         return np.concatenate([x, 2 * x[-1] - x[-2::-1]]), y, whole
 
-    def _newton(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float] | None:
-        """Displacements in equilibrium and what rounding leaves open of the load's, relative; None without any.
+    def _newton(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float, bool] | None:
+        """Displacements in equilibrium, what rounding leaves open of the load's, relative, and whether they are stable.
+
+        None without any equilibrium.
 
         Strains in the points of integration are unknowns of their own, which Newton's method meets with those of the
         displacements in the end (Magisano, Leonetti and Garcea, Int. J. Numer. Meth. Engng 109:1237, 2017): else the
@@ -301,12 +343,14 @@ class _Sheet:
             except SingularError:
                 return None
             step[~self.held] = factor.solve(residual)
+            negative = factor.negative_pivots  # of a tangent that is not symmetric only an odd number says something
             if not np.abs(step).max() <= FARTHEST * self.extent:
                 return None
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
             if np.abs(step).max() <= TOLERANCE * np.abs(moved).max():
-                return moved, float(abs((self.load * step).sum() / (self.load * moved).sum()))
+                open_ = float(abs((self.load * step).sum() / (self.load * moved).sum()))
+                return moved, open_, not (negative % 2 if self.turning.nnz else negative)
         return None
 
     def _gradient(self, moved: np.ndarray) -> np.ndarray:
