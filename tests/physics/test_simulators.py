@@ -709,7 +709,7 @@ def test_equilibria_of_shapes_are_those_of_mujoco(load, definition, tmp_path):
     one = holed(load, definition)
     result = one.solve()
     if load == "pull" and definition == "delingette" and RELEASE < (3, 15):
-        # Forces on bodies of a flex with one joint were wrong: these releases refuse the file.
+        # Forces on bodies of a flex that move along y alone were wrong: these releases refuse the file.
         with pytest.raises(ValueError, match="attribute: 'enclosed'"):
             loaded(one, tmp_path)
         return

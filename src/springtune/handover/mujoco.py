@@ -15,8 +15,8 @@ modulus and Lame's first constant, times the thickness t, are
 
 as single triangles in MuJoCo 3.3.7, 3.5.0, 3.17.0 and 4.0.0 have it, to rounding. No pair of values serves both, so a
 file with a flex is for one version, and the other refuses it. Bodies of a flex may have no damping in their joints, so
-a fixed tendon for each joint has it. Before 3.15.0 forces were wrong on bodies of a flex with one joint: a file for
-version 3 that has such bodies is refused by these.
+a fixed tendon for each joint has it. Before 3.15.0 forces were wrong on bodies of a flex that move along y alone: a
+file for version 3 that has such bodies is refused there.
 """
 
 from collections.abc import Sequence
@@ -205,12 +205,12 @@ def _tendons(net: Net, simulation: Simulation, dampers: bool, version: int) -> l
 
 
 def _refused_before_3_15(net: Net) -> list[str]:
-    """Sensor that MuJoCo takes since 3.15, where older ones get forces wrong: on bodies of a flex with one joint."""
-    number = next(iter(np.flatnonzero(net.held.any(axis=1) & ~net.held.all(axis=1)).tolist()), None)
+    """Sensor that MuJoCo takes since 3.15, where older ones get forces wrong: on bodies of a flex that move along y."""
+    number = next(iter(np.flatnonzero(net.held[:, 0] & ~net.held[:, 1]).tolist()), None)
     if number is None:
         return []
     return [
-        "  <!-- MuJoCo 3.15 and later: before, forces on a flex were wrong at particles held in one direction. -->",
+        "  <!-- MuJoCo 3.15 and later: before, forces on a flex were wrong at particles held in x alone. -->",
         f'  <sensor><insidesite site="p{number}" objtype="site" objname="p{number}" enclosed="false"/></sensor>',
     ]
 
