@@ -165,6 +165,17 @@ def test_profile_is_symmetric_and_holds_both_displacements():
     assert found.profile.min() < found.mean_displacement < found.profile.max()
 
 
+def test_a_reference_is_on_the_stable_path():
+    """A pressure that pulls on a face and follows it has a largest value, some .2 E here, as in a balloon.
+
+    Newton's method finds an equilibrium under three times as much, behind it.
+    """
+    beam, rubber = Beam("100 mm", "40 mm"), Material("1 MPa", 0.5, name="rubber")
+    solve_neo_hooke(beam, rubber, 0.15 * 1e6 * 0.1 * 1e-3, FACE, follower=True)
+    with pytest.raises(FiniteStrainError, match="no stable path beyond 3[45]"):
+        solve_neo_hooke(beam, rubber, 0.6 * 1e6 * 0.1 * 1e-3, FACE, follower=True)
+
+
 def test_what_cannot_be_solved_says_so():
     with pytest.raises(ValueError, match="plane strain of 'rubber' needs a Poisson's ratio below 0.5"):
         solve_neo_hooke(BLOCK, Material(1e6, 0.5, name="rubber"), -20.0, plane="strain")

@@ -130,9 +130,9 @@ def environment(folder, python, packages):
     return folder / "bin/python"
 
 
-def physics(python):
+def physics(python, tests="tests/physics"):
     """Run the physics tests by a Python, and assert that they hold."""
-    call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider", "tests/physics"]
+    call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider", tests]
     here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(call, cwd=REPOSITORY, env=here, capture_output=True, text=True)
     print(done.stdout.splitlines()[-1:])
@@ -171,3 +171,11 @@ def test_every_python_agrees_with_the_newest_packages(version, study, usual, tmp
     print(f"Python {version}:", found["versions"])
     assert compared(found, usual) == ({}, [])
     physics(newest)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["3.3.7", "3.14.0", "3.17.0"])
+def test_files_for_mujoco_3_hold_in_it(version, tmp_path):
+    """The first that has a flex's elasticity, the last with wrong forces on its rollers, and the last of version 3."""
+    python = environment(tmp_path / "venv", sys.executable, [*NEEDED, f"mujoco=={version}"])
+    physics(python, "tests/physics/test_simulators.py")

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
     from .shape_options import AskedShape
 
-OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density)\b)")
+OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco)\b)")
 """Beginnings of messages that name an argument, which is an option here."""
 
 
@@ -76,6 +76,11 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
 @click.option(
+    "--mujoco",
+    type=int,
+    help="Version of MuJoCo that .xml is for: 3, or 4, the newest, without. Springs alone are the same in both.",
+)
+@click.option(
     "--out",
     "target",
     required=True,
@@ -98,6 +103,7 @@ def springs(
     load: str | None,
     force: str | None,
     scale: float,
+    mujoco: int | None,
     target: Path,
 ) -> None:
     """Write the springs of a mesh: their rest lengths and stiffnesses, masses, and energies besides them.
@@ -123,8 +129,8 @@ def springs(
             net = _net(sheet, solid, mesh, name, definition, stiffness, load, force)
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", EquilibriumWarning)
-            written = net.write(target)
-    click.echo(written_text(net, written))
+            written = net.write(target, mujoco=mujoco)
+    click.echo(written_text(net, written, mujoco))
     for one in heard:
         click.echo(str(one.message))
 
@@ -201,18 +207,23 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
         raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
-def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:
+def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:
     """What was written, and how far off it is.
 
     Parameters
     ----------
     net : SpringNet
     written : iterable of Path
+    mujoco : int, optional
+        Version of MuJoCo that was asked for.
 
     Returns
     -------
     str
     """
+    from ..handover.formats import for_mujoco
+    from ..handover.mujoco import for_versions
+
     header = net.header
     first, *others = written
     besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
@@ -220,6 +231,7 @@ def written_text(net: "SpringNet", written: "Iterable[Path]") -> str:
     counts = [f"{len(net.points)} particles", springs, *besides]
     lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
     lines += [f"beside it: {', '.join(str(other) for other in others)}"] if others else []
+    lines += [for_versions(net.energies, mujoco)] if for_mujoco(first) else []
     errors = header["expected_error"]
     if isinstance(errors, dict):
         known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]

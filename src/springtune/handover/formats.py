@@ -6,6 +6,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -57,7 +58,7 @@ class Content(NamedTuple):
     header: dict[str, Any]
 
 
-def write(path: str | Path, content: Content) -> list[Path]:
+def write(path: str | Path, content: Content, mujoco: int | None = None) -> list[Path]:
     """Write the content of a net in the format that the ending of a name says; files appear whole or not at all.
 
     Parameters
@@ -65,6 +66,8 @@ def write(path: str | Path, content: Content) -> list[Path]:
     path : str or Path
         Ending in one of `ENDINGS` or `FOR_SIMULATORS`.
     content : Content
+    mujoco : int, optional
+        Version of MuJoCo, for its files alone.
 
     Returns
     -------
@@ -74,13 +77,20 @@ def write(path: str | Path, content: Content) -> list[Path]:
     Raises
     ------
     ValueError
-        If the ending is another one, or the folder is not there.
+        If the ending is another one, the folder is not there, or the version is of no such file or unknown.
     OSError
         If the file cannot be written.
     """
     path = Path(path)
     check_target(path)
-    return _format_of(path).write(path, content)
+    form = _format_of(path)
+    if mujoco is not None:
+        if not for_mujoco(path):
+            raise ValueError(
+                f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
+            )
+        form = _for_simulator("MuJoCo", partial(mjcf, version=mujoco))
+    return form.write(path, content)
 
 
 def read(path: str | Path) -> Content:
@@ -132,6 +142,11 @@ def check_target(path: str | Path) -> None:
     """
     _format_of(Path(path))
     check_folder(path)
+
+
+def for_mujoco(path: Path) -> bool:
+    """Whether the ending of a name is that of a model for MuJoCo."""
+    return _format_of(path) is _MUJOCO
 
 
 def _checked(content: Content) -> Content:
@@ -604,9 +619,11 @@ _FORMATS = {
 ENDINGS = tuple(_FORMATS)
 """Endings of the names of files of nets."""
 
+_MUJOCO = _for_simulator("MuJoCo", mjcf)
+
 _SIMULATORS = {
-    ".xml": _for_simulator("MuJoCo", mjcf),
-    ".mjcf": _for_simulator("MuJoCo", mjcf),
+    ".xml": _MUJOCO,
+    ".mjcf": _MUJOCO,
     ".scn": _for_simulator("SOFA", sofa_xml),
     ".py": _for_simulator("SOFA", sofa_python),
     ".xpbd.json": _for_simulator("XPBD", xpbd),

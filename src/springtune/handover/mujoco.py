@@ -7,17 +7,19 @@ control added to it: whoever opens the file sees it move, and changes the load b
 joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
 
 Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
-and so is MuJoCo's flex of two dimensions (3.3.7 and later), but for what it calls young and poisson. Its shear modulus
-and Lame's first constant, times the thickness, are
+and so is MuJoCo's flex of two dimensions (3.3.7 and later), but for what version 3 calls young and poisson. Its shear
+modulus and Lame's first constant, times the thickness t, are
 
-    mu t = thickness young / (8 (1 + poisson)),
-    lambda t = thickness young poisson / (2 (1 + poisson) (1 - 2 poisson)),
+    MuJoCo 3: mu t = t young / (8 (1 + poisson)), lambda t = t young poisson / (2 (1 + poisson) (1 - 2 poisson));
+    MuJoCo 4: mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2), those of plane stress,
 
-as the stiffness matrices of single triangles in MuJoCo 3.5.0 and 3.17.0 have it, to rounding. The file has the young
-and poisson with which they are those of plane stress. Bodies of a flex may have no damping in their joints, so a
-fixed tendon for each joint has it.
+as single triangles in MuJoCo 3.3.7, 3.5.0, 3.17.0 and 4.0.0 have it, to rounding. No pair of values serves both, so a
+file with a flex is for one version, and the other refuses it. Bodies of a flex may have no damping in their joints, so
+a fixed tendon for each joint has it. Before 3.15.0 forces were wrong on bodies of a flex that move along y alone: a
+file for version 3 that has such bodies is refused there.
 """
 
+from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -26,19 +28,27 @@ from ..mesh import corner_angles, signed_areas
 from .simulation import Net, Simulation, about, commented, load_in_words, numbers, simulate
 from .terms import Terms
 
+VERSIONS = (3, 4)
+"""Versions of MuJoCo that files are written for; the last one where none is asked for."""
+
 LEAST_MASS = 1e-15
 """Mass below which MuJoCo takes no body that moves [kg]."""
+
+REFUSED_BY_4 = "for MuJoCo 3 alone, write the file with --mujoco 4"
+"""Name of a tendon that MuJoCo 4 refuses, which its message has."""
 
 LARGEST_ACCELERATION = 1e9
 """Acceleration beyond which MuJoCo may take a run for a diverged one, a tenth of its limit [m/s2]."""
 
 
-def mjcf(net: Net) -> str:
+def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
     """Model of a net for MuJoCo.
 
     Parameters
     ----------
     net : Net
+    version : int, optional
+        Of MuJoCo, of `VERSIONS`. Springs alone are the same in all.
 
     Returns
     -------
@@ -48,7 +58,8 @@ def mjcf(net: Net) -> str:
     Raises
     ------
     ValueError
-        If MuJoCo has no law of the net's energies, or the net has no masses, linear kinematics or a load that turns.
+        If MuJoCo has no law of the net's energies, the net has no masses, linear kinematics or a load that turns, or
+        the version is another one.
 
     Examples
     --------
@@ -59,6 +70,9 @@ def mjcf(net: Net) -> str:
     >>> next(line for line in path.read_text().splitlines() if "<spatial" in line).strip()
     '<spatial stiffness="90932667.39736606" springlength="0.02"><site site="p0"/><site site="p1"/></spatial>'
     """
+    if version not in VERSIONS:
+        known = " or ".join(map(str, VERSIONS))
+        raise ValueError(f"mujoco: {version!r} is no version of MuJoCo that files are written for; give {known}")
     simulation = simulate(net, "MuJoCo", ("biquadratic",))
     moving = ~net.held.all(axis=1)
     least = float(simulation.masses[moving].min())
@@ -75,10 +89,10 @@ def mjcf(net: Net) -> str:
     accelerations = np.abs(np.where(net.held, 0, net.forces)).max(axis=1) / simulation.masses
     keep = ' autoreset="disable"' if accelerations.max() > LARGEST_ACCELERATION else ""
     said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
-    flex = [_flex(net, terms, size) for terms in net.energies]
+    flex = [_flex(net, terms, size, version) for terms in net.energies]
     lines = [
         f"<mujoco model={quoteattr(_model(net))}>",
-        *commented(about(net, simulation, said), "  "),
+        *commented([*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."], "  "),
         f'  <option timestep="{simulation.step!r}" integrator="Euler" gravity="0 0 0">',
         f'    <flag contact="disable"{keep}/>',
         "  </option>",
@@ -100,11 +114,34 @@ def mjcf(net: Net) -> str:
         *_particles(net, simulation, bool(flex)),
         "  </worldbody>",
         *flex,
-        *_tendons(net, simulation, bool(flex)),
+        *_tendons(net, simulation, bool(flex), version),
         *_load(net, simulation),
+        *(_refused_before_3_15(net) if flex and version == 3 else []),
         "</mujoco>",
     ]
     return "\n".join(lines) + "\n"
+
+
+def for_versions(energies: Sequence[Terms], version: int | None = None) -> str:
+    """Which versions of MuJoCo a file is for.
+
+    Parameters
+    ----------
+    energies : sequence of Terms
+        Of the net.
+    version : int, optional
+        That the file was asked for.
+
+    Returns
+    -------
+    str
+    """
+    if not energies:
+        return f"for MuJoCo {' and '.join(map(str, VERSIONS))}: springs are the same in both"
+    version = version or VERSIONS[-1]
+    [other] = set(VERSIONS) - {version}
+    refused = f"MuJoCo {other}, whose flex has other constants, refuses it"
+    return f"for MuJoCo {version}; {refused}: write one with mujoco {other} for that"
 
 
 def _model(net: Net) -> str:
@@ -138,7 +175,7 @@ def _damping(simulation: Simulation, number: int, here: bool) -> str:
     return f' damping="{float(simulation.mass_damping * simulation.masses[number])!r}"' if here else ""
 
 
-def _tendons(net: Net, simulation: Simulation, dampers: bool) -> list[str]:
+def _tendons(net: Net, simulation: Simulation, dampers: bool, version: int) -> list[str]:
     """Tendons: springs, what spreads the load, and dampers of joints that may have none: of the bodies of a flex."""
     rows = zip(net.springs.tolist(), net.stiffness.tolist(), net.rest_lengths.tolist())
     lines = [
@@ -159,29 +196,49 @@ def _tendons(net: Net, simulation: Simulation, dampers: bool) -> list[str]:
             f'    <fixed{_damping(simulation, number, True)}><joint joint="{"xy"[axis]}{number}" coef="1"/></fixed>'
             for number, axis in np.argwhere(~net.held).tolist()
         ]
+    if dampers and version == 3:
+        # MuJoCo 3 takes it, and it does nothing there; MuJoCo 4 refuses a joint that is repeated, and says the name.
+        number, axis = np.argwhere(~net.held)[0].tolist()
+        twice = "".join(f'<joint joint="{"xy"[axis]}{number}" coef="{sign}"/>' for sign in (1, -1))
+        lines.append(f'    <fixed name="{REFUSED_BY_4}">{twice}</fixed>')
     return ["  <tendon>", *lines, "  </tendon>"] if lines else []
 
 
-def _flex(net: Net, terms: Terms, size: float) -> str:
+def _refused_before_3_15(net: Net) -> list[str]:
+    """Sensor that MuJoCo takes since 3.15, where older ones get forces wrong: on bodies of a flex that move along y."""
+    number = next(iter(np.flatnonzero(net.held[:, 0] & ~net.held[:, 1]).tolist()), None)
+    if number is None:
+        return []
+    return [
+        "  <!-- MuJoCo 3.15 and later: before, forces on a flex were wrong at particles held in x alone. -->",
+        f'  <sensor><insidesite site="p{number}" objtype="site" objname="p{number}" enclosed="false"/></sensor>',
+    ]
+
+
+def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
     """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
     first, second = _lame(net, terms)
     ratio = first / second
-    poisson = ratio / (4 + 2 * ratio)
-    young = 8 * (1 + poisson) * second
+    # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
+    poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))
+    young = (8 if version == 3 else 2) * (1 + poisson) * second
+    # An attribute that MuJoCo 3 does not know, and refuses; 0 is none.
+    only = "" if version == 3 else ' yield="0"'
     bodies = " ".join(f"b{number}" for number in range(len(net.points)))
     return "\n".join(
         [
             "  <deformable>",
             *commented(
                 [
-                    "Delingette's springs: young and poisson are those with which a flex has the Lame constants of",
-                    f"plane stress, times the thickness: lambda t = {first:.6g} N/m, mu t = {second:.6g} N/m.",
+                    f"Delingette's springs: young and poisson are those with which a flex of MuJoCo {version} has the",
+                    f"Lame constants of plane stress, times the thickness: lambda t = {first:.6g} N/m, mu t = "
+                    f"{second:.6g} N/m.",
                 ],
                 "    ",
             ),
             f'    <flex name="sheet" dim="2" radius="{size / 20:.6g}" rgba="0.2 0.45 0.7 1" body="{bodies}" '
             f'element="{" ".join(map(str, terms.cells.ravel().tolist()))}">',
-            f'      <elasticity young="{young!r}" poisson="{poisson!r}" thickness="1" elastic2d="stretch"/>',
+            f'      <elasticity young="{young!r}" poisson="{poisson!r}" thickness="1" elastic2d="stretch"{only}/>',
             "    </flex>",
             "  </deformable>",
         ]
@@ -200,7 +257,7 @@ def _lame(net: Net, terms: Terms) -> tuple[float, float]:
     (total, twice), *_ = np.linalg.lstsq(np.column_stack([factors, signs]), given, rcond=None)
     first = float(total - twice)
     away = np.abs(factors * total + signs * twice - given).max() / np.abs(given).max()
-    if away > 1e-9 or not (twice > 0 and first > -1e-9 * twice):
+    if away > 1e-9 or not (twice > 0 and -1e-9 * twice < first < (1 + 1e-9) * twice):
         raise ValueError(
             f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
             f"MuJoCo's flex has the law of a material alone; take 'delingette', or a definition of springs alone, "

@@ -273,7 +273,7 @@ class SpringNet:
         none = np.zeros(mesh.points.shape)
         return cls(**_parts(sheet, springs, inertia, none.astype(bool), none), header=header)
 
-    def write(self, path: str | Path) -> list[Path]:
+    def write(self, path: str | Path, *, mujoco: int | None = None) -> list[Path]:
         """Write the net in the format that the ending of a name says; files appear whole or not at all.
 
         Parameters
@@ -283,6 +283,9 @@ class SpringNet:
             beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
             ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.xpbd.json`` for XPBD.
+        mujoco : int, optional
+            Version of MuJoCo that its file is for, 3 or 4; 4 without. Springs alone are the same in both; squared
+            lengths (`delingette`) are not, and each version refuses the file for the other.
 
         Returns
         -------
@@ -292,8 +295,8 @@ class SpringNet:
         Raises
         ------
         ValueError
-            If the name has another ending, its folder is not there, or the load prescribes displacements, which no such
-            file tells.
+            If the name has another ending, its folder is not there, the version is unknown or the file is not for
+            MuJoCo, or the load prescribes displacements, which no such file tells.
         """
         load = self.header.get("load")
         if load and load.get("prescribed"):
@@ -301,7 +304,7 @@ class SpringNet:
                 f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
                 "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
             )
-        return write(path, content_of(self))
+        return write(path, content_of(self), mujoco)
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":

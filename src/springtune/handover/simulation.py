@@ -72,8 +72,8 @@ class Simulation:
     loaded_frequency : float
         Lowest frequency that the load excites [rad/s]; 0 without a load.
     mass_damping : float
-        Damping over mass that is critical for the lowest frequency [1/s]: all others oscillate, and none is later at
-        rest.
+        Damping over mass [1/s], critical for the loaded frequency, or as much less as lets no mode be later at rest
+        than the lowest one under its own critical damping: under small loads it is that.
     displacements : ndarray of float, shape (n_points, 2), or None
         Equilibrium under the load [m]; None where there is none that is stable.
     why : str
@@ -115,7 +115,8 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     Notes
     -----
     Frequencies are those at rest, see `springtune.mechanics.dynamics.Motion`; the equilibrium is that of springs which
-    keep their length law, as simulators have them.
+    keep their length law, as simulators have them. A mode of frequency w under a damping over mass c > 2 w comes to
+    rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
     """
     _check(net, program, laws)
     assert net.masses is not None
@@ -142,15 +143,17 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
         except SingularError as error:
             why = str(error)
         _warn(net, displacements, why)
-    stable = largest
+    damping, stable = 2 * lowest, largest
     if displacements is not None:
-        # The loaded mode swings beyond its place, as damping that is critical for the lowest one lets it.
+        stiffened = _lowest_frequency(motion, displacements)  # by tension
+        damping = max(damping, min(2 * loaded, lowest + stiffened**2 / lowest))
+        # Fronts of waves stretch springs as far as the loaded mode would swing under the damping of small loads.
         ratio = min(lowest / loaded, 1.0)
         beyond = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
         stiffest = max(_highest_frequency(motion, share * displacements) for share in (1.0, 1.0 + beyond))
         stable = min(stable, 2 / stiffest)
     step = STEP_SHARE * stable
-    return Simulation(net.masses, force, largest, step, lowest, loaded, 2 * lowest, displacements, why)
+    return Simulation(net.masses, force, largest, step, lowest, loaded, damping, displacements, why)
 
 
 def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
@@ -195,17 +198,17 @@ def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:
     return float(np.sqrt(square))
 
 
-def _lowest_frequency(motion: Motion) -> float:
-    """Lowest frequency at rest [rad/s], by Lanczos' method on the factorized tangent."""
-    size, mass = len(motion.mass), motion.mass
+def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -> float:
+    """Lowest frequency at rest or about displacements [rad/s], by Lanczos' method on the factorized tangent."""
+    size, mass, network = len(motion.mass), motion.mass, motion.network
+    matrix = network.tangent(displacements)
     if size < 10:
         root = 1 / np.sqrt(mass)
-        return float(np.sqrt(np.linalg.eigvalsh(root[:, None] * motion.stiffness_matrix.toarray() * root)[0]))
-    inverse = LinearOperator((size, size), matvec=motion.network.rest_factor.solve, dtype=float)
+        return float(np.sqrt(np.linalg.eigvalsh(root[:, None] * matrix.toarray() * root)[0]))
+    factor = network.rest_factor if displacements is None else network.factorize_matrix(matrix)
+    inverse = LinearOperator((size, size), matvec=factor.solve, dtype=float)
     start = np.random.default_rng(0).standard_normal(size)
-    (square,) = eigsh(
-        motion.stiffness_matrix, 1, diags_array(mass), sigma=0.0, OPinv=inverse, v0=start, return_eigenvectors=False
-    )
+    (square,) = eigsh(matrix, 1, diags_array(mass), sigma=0.0, OPinv=inverse, v0=start, return_eigenvectors=False)
     return float(np.sqrt(square))
 
 
@@ -298,9 +301,11 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
         f"The largest stable step of explicit schemes is {simulation.largest_step:.4g} s at rest; {integrator}."
     )
     if simulation.frequency:
+        share = simulation.mass_damping / (2 * simulation.frequency)
         lines.append(
-            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, critical for the lowest frequency; the one that "
-            f"the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} times as high."
+            f"Damping over mass is {simulation.mass_damping:.4g} 1/s, {share:.3g} of the critical one of the lowest "
+            f"frequency; the one that the load excites is {simulation.loaded_frequency / simulation.frequency:.3g} "
+            "times as high."
         )
     if simulation.force and simulation.why:
         lines.append(f"No equilibrium was found: {simulation.why}.")

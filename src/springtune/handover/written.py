@@ -20,7 +20,9 @@ FRAMES = 50
 """Files of a series, where no number is given."""
 
 
-def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: Any) -> list[Path]:
+def write_springs(
+    path: str | Path, scene: Scene, springs: Springs, *, mujoco: int | None = None, **options: Any
+) -> list[Path]:
     """Write springs of a scene, see `springtune.handover.net.SpringNet.write`.
 
     Parameters
@@ -29,6 +31,8 @@ def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: A
     scene : Scene
     springs : Springs
         The scene's, or others on its mesh.
+    mujoco : int, optional
+        Version of MuJoCo that its file is for.
     **options
         As `springtune.handover.net.SpringNet.from_scene` takes them.
 
@@ -38,7 +42,7 @@ def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: A
         What was written.
     """
     check_target(path)
-    return SpringNet.from_scene(scene, springs=springs, **options).write(path)
+    return SpringNet.from_scene(scene, springs=springs, **options).write(path, mujoco=mujoco)
 
 
 def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path]:

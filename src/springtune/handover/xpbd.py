@@ -19,8 +19,8 @@ CONTENT = {
     "constraints": "C = distance of the particles - rest_lengths [m], with compliance [m/N]; one list each",
     "time_step": "a fiftieth of the slowest period that the load excites [s]; XPBD is stable in any, and converges the "
     "sooner the shorter it is",
-    "mass_damping": "damping over mass that is critical for the lowest frequency [1/s]; velocities go down to their "
-    "share 1 / (1 + mass_damping * time_step) in each step",
+    "mass_damping": "damping over mass that is critical for the lowest frequency, or under large tension up to the "
+    "loaded one [1/s]; velocities go down to their share 1 / (1 + mass_damping * time_step) in each step",
     "displacements": "where the load brings the particles in the end [m]; null where there is no stable equilibrium",
 }
 """What each entry of a file is."""
