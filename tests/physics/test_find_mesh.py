@@ -5,7 +5,7 @@ import pytest
 
 import springtune as st
 from counting import counted
-from springtune.prediction.choices import in_order
+from springtune.prediction.choices import PREDICTED, in_order
 from springtune.prediction.search import NEED_ENERGIES, asked_error, find_mesh
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
@@ -162,6 +162,22 @@ class TestBetweenWholeDivisions:
                 # Those that are promised, and twelve others.
                 for part in (*BETWEEN, *np.random.default_rng(5).uniform(0.5, 1, 12)):
                     assert worst(beam, material, one, one.size * part, loads) <= asked_error(error), part
+
+    @pytest.mark.slow
+    def test_random_questions(self):
+        """Sizes are sampled, so a rare answer may fail; one in ten did without sizes in between."""
+        random, broken = np.random.default_rng(11), []
+        for _ in range(20):
+            aspect, nu = np.exp(random.uniform(0, np.log(10))), random.uniform(0, 0.49)
+            beam, material = st.Beam(0.1 * aspect, 0.1), st.Material("210 GPa", nu)
+            loads = [str(name) for name in random.permutation(PREDICTED)[: random.integers(1, 4)]]
+            error, types = float(random.choice([0.005, 0.01, 0.02, 0.05])), list(random.permutation([*st.MESH_TYPES]))
+            search = find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
+            for one in found_in(search):
+                if one.confirmed:
+                    sizes = one.size * random.uniform(0.5, 1, 12)
+                    broken.append(max(worst(beam, material, one, size, loads) for size in sizes) > error)
+        assert len(broken) >= 20 and np.mean(broken) <= 0.05
 
     def test_they_are_told(self, search):
         for one in found_in(search):
