@@ -165,7 +165,7 @@ class TestBetweenWholeDivisions:
 
     @pytest.mark.slow
     def test_random_questions(self):
-        """Sizes are sampled, so a rare answer may fail; one in ten did without sizes in between."""
+        """Sizes are sampled, so a rare answer may fail; one in eight did without sizes in between."""
         random, broken = np.random.default_rng(11), []
         for _ in range(20):
             aspect, nu = np.exp(random.uniform(0, np.log(10))), random.uniform(0, 0.49)
