@@ -5,6 +5,7 @@ import pytest
 
 import springtune as st
 from counting import counted
+from springtune.prediction.choices import PREDICTED, in_order
 from springtune.prediction.search import NEED_ENERGIES, asked_error, find_mesh
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
@@ -133,6 +134,85 @@ class TestRandomSearches:
         ratios = np.array([ratio for _ in range(100) for ratio in self.searched(random, 4000)])
         print(len(ratios), np.sort(ratios)[-5:])
         assert len(ratios) > 80 and (ratios > 1).mean() <= 0.05 and ratios.max() < 2
+
+
+BETWEEN = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
+
+QUESTIONS = {
+    "lattice": (BEAM, 0.3, "2 %", ["traction", "bending"], "structured"),
+    "area": (st.Beam("200 mm", "100 mm"), 0.2, "5 %", ["pressure", "bending"], "structured"),
+    "patch": (st.Beam("123 mm", "15.375 mm"), 0.0, "1 %", ["traction", "pressure"], "right"),
+    "van-gelder": (st.Beam("700 mm", "100 mm"), 0.0, "1 %", ["compression"], "structured"),
+    "free": (st.Beam("300 mm", "100 mm"), 0.0, "2 %", ["traction"], "free"),
+}
+"""Beam, Poisson's ratio, error, loads and mesh type; by the definition whose answer was broken in between."""
+
+
+class TestBetweenWholeDivisions:
+    """Cells are stretched there."""
+
+    @pytest.mark.parametrize("question", QUESTIONS)
+    def test_finer_sizes_keep_the_error(self, question):
+        beam, nu, error, loads, mesh_type = QUESTIONS[question]
+        material = st.Material("210 GPa", nu)
+        search = find_mesh(beam, material, error, loads=loads, mesh_types=[mesh_type], most=2000)
+        assert search.best.confirmed
+        for one in found_in(search):
+            if one.confirmed:
+                # Those that are promised, and twelve others.
+                for part in (*BETWEEN, *np.random.default_rng(5).uniform(0.5, 1, 12)):
+                    assert worst(beam, material, one, one.size * part, loads) <= asked_error(error), part
+
+    @pytest.mark.slow
+    def test_random_questions(self):
+        """Sizes are sampled, so a rare answer may fail; one in eight did without sizes in between."""
+        random, broken = np.random.default_rng(11), []
+        for _ in range(20):
+            aspect, nu = np.exp(random.uniform(0, np.log(10))), random.uniform(0, 0.49)
+            beam, material = st.Beam(0.1 * aspect, 0.1), st.Material("210 GPa", nu)
+            loads = [str(name) for name in random.permutation(PREDICTED)[: random.integers(1, 4)]]
+            error, types = float(random.choice([0.005, 0.01, 0.02, 0.05])), list(random.permutation([*st.MESH_TYPES]))
+            search = find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
+            for one in found_in(search):
+                if one.confirmed:
+                    sizes = one.size * random.uniform(0.5, 1, 12)
+                    broken.append(max(worst(beam, material, one, size, loads) for size in sizes) > error)
+        assert len(broken) >= 20 and np.mean(broken) <= 0.05
+
+    def test_they_are_told(self, search):
+        for one in found_in(search):
+            sizes = [finer.size for finer in one.finer]
+            meshes = {st.make_mesh(BEAM, one.mesh_type, size).points.tobytes() for size in (one.size, *sizes)}
+            for part in BETWEEN:
+                assert st.make_mesh(BEAM, one.mesh_type, one.size * part).points.tobytes() in meshes
+            assert any(finer.cells != int(finer.cells) for finer in one.finer)
+
+    def test_shapes_are_tried_there_too(self):
+        pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))],
+                           quantities=[st.Quantity("end", "displacement", "right", "x")])  # fmt: skip
+        plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pull})
+        search = find_mesh(plate, STEEL, "2 %")
+        one, known = search.best, search.known["end"].value
+        assert one.confirmed and any(finer.cells != int(finer.cells) for finer in one.finer)
+        for part in BETWEEN:
+            mesh, definition = st.mesh_shape(plate, one.size * part), one.choice.definition
+            scene = st.Scene(plate, mesh, STEEL, "pull", definition=definition, kinematics="linear")
+            assert abs(scene.solve().values["end"] / known - 1) <= 0.02
+
+
+class TestTies:
+    """Rounding decides nothing."""
+
+    def test_exact_ones_are_in_a_fixed_order(self):
+        """Under traction at nu = 0 several definitions are exact; springs alone come first, then names."""
+        search = find_mesh(st.Beam("800 mm", "100 mm"), st.Material("1 GPa", 0.0), "1 %", loads=["traction"],
+                           mesh_types=["alternating", "right"])  # fmt: skip
+        assert search.best.mesh_type == "alternating" and search.best.choice.definition == "patch"
+        assert search.best.choice.worst < 1e-9
+
+    def test_what_is_next_to_equal_is_equal(self):
+        worst = {"b": 1e-15, "a": 9e-7, "c": 0.0, "d": 2.1e-6, "e": np.inf, "f": 2e-6}
+        assert "".join(in_order("fedcba", worst.get, str, 1e-6)) == "abcdfe"
 
 
 class TestWhatIsNotFound:

@@ -235,8 +235,8 @@ def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", spri
         "",
         f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
         f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
-        "tried on, up to one with twice as many cells across, and would if its errors changed once more by as much as",
-        "over the last doubling. Meshes are ranked by their particles.",
+        "tried on, up to one with twice as many cells across, sizes between whole divisions included, and would if its",
+        "errors changed once more by as much as over the last doubling. Meshes are ranked by their particles.",
         meaning,
         f"{KINEMATICS_TEXT} (error estimate {_estimate(search.known)}).",
         "Static solve: of one load with its network assembled and factorized, measured here once.",
@@ -459,6 +459,7 @@ def _order(one: "MeshChoice | None") -> tuple[bool, int]:
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Why there is none: what came nearest to it."""
+    from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
     from ..prediction.search import SPRINGS_ALONE
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
@@ -466,7 +467,13 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     near = [(one.worst(name), one, name) for one, name in names if one.worst(name) < math.inf]
     if not near:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
-    worst, one, name = min(near, key=lambda found: found[0])
+    ordered = in_order(
+        near,
+        lambda found: found[0],
+        lambda found: (found[2] in NEED_ENERGIES, found[1].particles, found[2], found[1].size),
+        as_sure_as(search.known),
+    )
+    worst, one, name = ordered[0]
     most = max(other.particles for other, _ in names)
     where = f"{name} at {size_text(one.size)} ({one.particles:,} particles)"
     if worst <= search.error:

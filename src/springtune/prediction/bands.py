@@ -9,7 +9,7 @@ import numpy as np
 from ..mesh import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import Material
-from .choices import CASES, Choice, Number, References, check_beam, check_loads, predict, references
+from .choices import CASES, Choice, Number, References, best_first, check_beam, check_loads, predict, references
 
 BANDS_FROM = 10_000
 """Particles of the finest mesh that a band is from."""
@@ -90,7 +90,7 @@ def extrapolate(
     # The same springs may go by one name on one mesh and by two on another.
     names = [name for name in solved[0] if all(name in one for one in solved)]
     choices = [_band([one[name] for one in solved], sizes, size) for name in names]
-    return sorted(choices, key=lambda choice: choice.worst), sizes
+    return best_first(choices, known), sizes
 
 
 def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int) -> float:

@@ -7,7 +7,7 @@ of small strain; a patch test between rollers measures Young's modulus and Poiss
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -59,6 +59,11 @@ ALIKE = 1e-5
 SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
 """Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
 
+
+ROUNDED = 1e-9
+"""Error that rounding makes up to, at most [1]: references of closed form are surer than networks are solved."""
+
+_T = TypeVar("_T")
 
 Number = float | tuple[float, float]
 """A number, or the two bounds of a band."""
@@ -262,7 +267,8 @@ def predict(
     Returns
     -------
     list of Choice
-        Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. On a shape
+        Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. Errors that
+        differ by less than the reference's error estimate are equal: springs alone come first, then names. On a shape
         their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of
         strips.
 
@@ -327,7 +333,44 @@ def predict(
     choices += [tried.failed(name) for name in tried.failures]
     if not tried.names and all("springs" in found for found in tried.failures.values()):
         raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
-    return sorted(choices, key=lambda choice: choice.worst)
+    return best_first(choices, known)
+
+
+def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -> list[Choice]:
+    """Choices of a mesh, the best one by its worst error first.
+
+    Errors that differ by less than the references are sure of are equal. Of these come springs alone first, then names
+    in the order of the alphabet.
+
+    Parameters
+    ----------
+    choices : iterable of Choice
+    known : dict
+        References that their errors are against.
+
+    Returns
+    -------
+    list of Choice
+    """
+    return in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
+
+
+def as_sure_as(known: Mapping[str, Any]) -> float:
+    """Difference up to which errors against some references are equal [1]."""
+    return max([one.error_estimate for one in known.values() if not isinstance(one, str)] + [ROUNDED])
+
+
+def in_order(
+    those: Iterable[_T], worst: Callable[[_T], float], tie: Callable[[_T], tuple[Any, ...]], equal: float
+) -> list[_T]:
+    """Sort by an error, and by `tie` those whose errors are above the least of them by no more than `equal`."""
+    left, found = sorted(those, key=worst), []
+    while left:
+        limit = worst(left[0]) + equal
+        alike = [one for one in left if worst(one) <= limit]
+        left = left[len(alike) :]
+        found += sorted(alike, key=tie)
+    return found
 
 
 def _on_shape(
@@ -339,12 +382,13 @@ def _on_shape(
 ) -> list[Choice]:
     """As `predict`, of a shape."""
     statement = ShapeStatement(shape, mesh, material, only_load(shape, load), 1.0, "linear")
-    tried = TriedShape(statement, shape_references(statement) if known is None else known)
+    known = shape_references(statement) if known is None else known
+    tried = TriedShape(statement, known)
     choices = [tried.choice(name) for name in tried.names]
     choices += [tried.failed(name) for name in tried.failures]
     if not tried.names and all("springs" in found for found in tried.failures.values()):
         raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
-    return sorted(choices, key=lambda choice: choice.worst)
+    return best_first(choices, known)
 
 
 def only_load(shape: Shape, load: str | None) -> str:
@@ -413,6 +457,8 @@ class TriedShape:
         Of linear kinematics.
     known : dict
         What `shape_references` gave.
+    among : iterable of str, optional
+        As of `TriedMesh`.
 
     Attributes
     ----------
@@ -420,7 +466,7 @@ class TriedShape:
         As of `TriedMesh`.
     """
 
-    def __init__(self, statement: ShapeStatement, known: ShapeReferences) -> None:
+    def __init__(self, statement: ShapeStatement, known: ShapeReferences, among: Iterable[str] | None = None) -> None:
         self.statement, self.known = statement, known
         self._sheet = Sheet(statement.mesh, statement.thickness, networks=1)
         self._values: dict[str, dict[str, float] | str] = {}
@@ -428,6 +474,7 @@ class TriedShape:
             statement.mesh,
             lambda name: statement.springs(self._sheet, DEFINITIONS[name], None)[0],
             all(one.isotropic for one in statement.materials),
+            among,
         )
         self.names = list(self._springs)
 
@@ -541,6 +588,8 @@ class TriedMesh:
     material : Material
     known : dict
         References of the loads that count.
+    among : iterable of str, optional
+        Definitions that are asked for; all without.
 
     Attributes
     ----------
@@ -552,14 +601,18 @@ class TriedMesh:
         By definition that gives none: as `Choice.failures`.
     """
 
-    def __init__(self, mesh: Mesh, beam: Beam, material: Material, known: References) -> None:
+    def __init__(
+        self, mesh: Mesh, beam: Beam, material: Material, known: References, among: Iterable[str] | None = None
+    ) -> None:
         self.mesh, self.beam, self.material, self.known = mesh, beam, material, known
         # Loads that hold the same follow each other.
         self._sheet = Sheet(mesh, beam.thickness, networks=1)
         self._test = PatchTest(mesh)
         self._displacements: dict[tuple[LoadKind, tuple[bytes, ...]], float | str] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
-        self._springs, self.same, self.failures = _distinct(mesh, lambda name: self._sheet.derive(name, material)[0])
+        self._springs, self.same, self.failures = _distinct(
+            mesh, lambda name: self._sheet.derive(name, material)[0], among=among
+        )
         self.names = list(self._springs)
 
     def springs(self, name: str) -> Springs:
@@ -648,7 +701,7 @@ class TriedMesh:
 
 
 def _distinct(
-    mesh: Mesh, derive: Callable[[str], Springs], isotropic: bool = True
+    mesh: Mesh, derive: Callable[[str], Springs], isotropic: bool = True, among: Iterable[str] | None = None
 ) -> tuple[dict[str, Springs], dict[str, str], dict[str, dict[str, str]]]:
     """Springs of the definitions that are tried on a mesh, each once; by definition whose they are; and failures."""
     found: dict[str, Springs] = {}
@@ -658,6 +711,8 @@ def _distinct(
     quads = len(mesh.quads) > 0
     usual: tuple[str, ...] = ON_QUADS if quads else ON_TRIANGLES
     for name in usual if isotropic else ANISOTROPIC[4 if quads else 3]:
+        if among is not None and name not in among:
+            continue
         try:
             springs = derive(name)
         except DefinitionError as error:

@@ -4,7 +4,8 @@ Errors do not fall evenly with the mesh size: the error of one load may pass thr
 stretch a mesh now more, now less. So a mesh is not taken because it happens to keep the error. It is taken with a
 definition that keeps it there and on every finer mesh of its type that was tried, up to one with at least twice as many
 cells across the beam, two finer ones at least; and that would still keep it there if its error changed once more by as
-much as it did over the last doubling of the cells, so that it is not just passing by zero.
+much as it did over the last doubling of the cells, so that it is not just passing by zero. Finer meshes are those of
+whole numbers of cells across, and some of sizes between these, whose cells are stretched to fit.
 """
 
 import math
@@ -45,8 +46,10 @@ from .choices import (
     ShapeReferences,
     TriedMesh,
     TriedShape,
+    as_sure_as,
     check_beam,
     check_loads,
+    in_order,
     only_load,
     references,
     shape_references,
@@ -70,6 +73,16 @@ DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
 SPRINGS_ALONE = tuple(name for name in DEFINITIONS_TRIED if name not in NEED_ENERGIES)
 """Definitions that need nothing but springs."""
 
+BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
+"""Sizes between whole divisions that an answer is tried on, over its own."""
+
+FINER = tuple(0.5 ** (step / 120) for step in range(1, 120))
+"""Sizes over that of an answer. The two with the most stretched cells are tried, too; every fifth of them where the
+answer has less than `FEWEST_CELLS`."""
+
+ACROSS_DECIMALS = 3
+"""Decimals of the cells across a mesh between whole divisions."""
+
 SIZE_DIGITS = 4
 """Digits of a mesh size [mm], so that the one that is printed makes the same mesh."""
 
@@ -84,8 +97,8 @@ class SolvedMesh:
         Key of `springtune.MESH_TYPES`.
     size : float
         Length of an edge [m].
-    cells : int
-        Cells across the beam's smaller side, about.
+    cells : float
+        Cells across the beam's smaller side that its size is for; not whole between whole divisions.
     particles, springs : int
     errors : dict of str to dict of str to float
         By definition that was tried, the error under each load [1]; NaN where the network fails.
@@ -101,7 +114,7 @@ class SolvedMesh:
 
     mesh_type: str
     size: float
-    cells: int
+    cells: float
     particles: int
     springs: int
     errors: dict[str, dict[str, float]]
@@ -144,8 +157,8 @@ class MeshChoice:
     finer : tuple of SolvedMesh
         Finer meshes that were tried, on each of which the definition keeps the error, too.
     confirmed : bool
-        Whether these are enough: two at least, up to one with twice as many cells across, and the error would be kept
-        even if it changed once more by as much as over the last doubling.
+        Whether these are enough: two at least, up to one with twice as many cells across and sizes between whole
+        divisions, and the error would be kept even if it changed once more by as much as over the last doubling.
 
     Examples
     --------
@@ -153,13 +166,13 @@ class MeshChoice:
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
     >>> best = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).best
     >>> best.size, best.cells, best.particles, best.confirmed
-    (0.009238, 5, 141, True)
-    >>> [finer.cells for finer in best.finer]
-    [6, 7, 8, 9, 10]
+    (0.006599, 7, 252, True)
+    >>> [finer.cells for finer in best.finer][:6]
+    [7.142, 7.368, 7.502, 7.777, 8, 8.433]
     >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
     >>> print(f"{100 * best.choice.errors['bending']:.3f} %, {100 * scene.solve().error:.3f} %")
-    -3.675 %, -3.675 %
+    -3.325 %, -3.325 %
     """
 
     mesh_type: str
@@ -174,8 +187,8 @@ class MeshChoice:
     confirmed: bool
 
     @property
-    def _rank(self) -> tuple[bool, int, int, float]:
-        return not self.confirmed, self.particles, self.springs, self.choice.worst
+    def _rank(self) -> tuple[bool, int, int]:
+        return not self.confirmed, self.particles, self.springs
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,11 +219,11 @@ class MeshSearch:
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
     >>> search = st.find_mesh(beam, steel, "5 %", mesh_types=["structured", "right"])
     >>> search.best.mesh_type, search.best.choice.definition
-    ('structured', 'lattice')
+    ('structured', 'patch')
     >>> search.best_springs == search.best
     True
     >>> {name: found and found.choice.definition for name, found in search.springs_by_type.items()}
-    {'structured': 'lattice', 'right': None}
+    {'structured': 'patch', 'right': None}
     """
 
     error: float
@@ -231,10 +244,16 @@ class MeshSearch:
         """The one of least particles that has springs alone; None where none keeps the error."""
         return self._least(self.springs_by_type)
 
-    @staticmethod
-    def _least(found: dict[str, MeshChoice | None]) -> MeshChoice | None:
+    def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
         there = [one for one in found.values() if one]
-        return min(there, key=lambda one: one._rank) if there else None
+        least = [one for one in there if one._rank == min(other._rank for other in there)]
+        order = in_order(
+            least,
+            lambda one: one.choice.worst,
+            lambda one: (one.choice.energies, one.choice.definition, one.mesh_type),
+            as_sure_as(self.known),
+        )
+        return order[0] if order else None
 
 
 def asked_error(value: float | str) -> float:
@@ -317,10 +336,14 @@ def find_mesh(
     Of each type meshes are solved from one cell across the beam's smaller side on, every number of cells up to 16 and
     four for each doubling beyond, until a definition has kept the error on all meshes from one of them on up to another
     that has at least twice as many cells across, and would keep it if it changed once more by as much as over the last
-    doubling. Beyond 16 cells meshes between that one and the next coarser one are
-    tried, too, from the finer end. A definition is given up where its error, by its change over the last doubling, will
-    be too large on the finest mesh as well. Meshes are ranked by their particles, and to the size of each error the
-    error estimate of its reference is added. Kinematics are linear.
+    doubling. Then finer sizes between whole divisions are solved: .98, .95, .9, .83, .7 and .56 of the answer's; of a
+    beam the two down to half of it whose cells are stretched most; and 23 more where the answer has less than four
+    cells across. Where one of them does not keep the error, the search goes on to finer meshes. Beyond 16 cells meshes
+    between the answer and the next coarser one are tried, too, from the finer end. A definition is given up where its
+    error, by its change over the last doubling, will be too large on the finest mesh as well.
+
+    Meshes are ranked by their particles, and to the size of each error the error estimate of its reference is added.
+    Errors that differ by less than that are equal: springs alone come first, then names. Kinematics are linear.
 
     Examples
     --------
@@ -329,9 +352,9 @@ def find_mesh(
     >>> search = st.find_mesh(beam, steel, "2 %", loads=["traction", "bending"], mesh_types=["structured"])
     >>> best = search.best
     >>> print(f"{best.mesh_type} {1e3 * best.size:g} mm, {best.choice.definition}: {best.particles} particles")
-    structured 5.774 mm, lattice: 328 particles
+    structured 5.133 mm, patch-area: 405 particles
     >>> print(f"at worst {100 * best.choice.worst:.1f} %, steps up to {1e9 * best.step_limit:.0f} ns")
-    at worst 2.0 %, steps up to 716 ns
+    at worst 1.9 %, steps up to 641 ns
     >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=500).best is None
     True
     """
@@ -398,12 +421,14 @@ class _Search(ABC):
         self, name: str, known: Mapping[str, Any], estimates: dict[str, float], error: float, most: int
     ) -> None:
         self.name, self.known, self.error, self._estimates, self._most = name, known, error, estimates, most
-        self._tried: dict[int, SolvedMesh] = {}  # by cells across
+        self._tried: dict[float, SolvedMesh] = {}  # by cells across
+        self._first: dict[bytes, float] = {}  # cells across the first of equal meshes, by its points
+        self._same: dict[float, float] = {}  # and by those across each of them
         self._found: dict[tuple[int, str], MeshChoice] = {}
         self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
 
     @abstractmethod
-    def _exact(self, cells: int) -> tuple[float, float]:
+    def _exact(self, cells: float) -> tuple[float, float]:
         """Mesh size of so many cells across, and the smaller side, which no mesh size exceeds [m]."""
 
     @abstractmethod
@@ -415,8 +440,8 @@ class _Search(ABC):
         """The mesh of a size."""
 
     @abstractmethod
-    def _trial(self, mesh: Mesh) -> "TriedMesh | TriedShape":
-        """The definitions on it."""
+    def _trial(self, mesh: Mesh, names: Sequence[str]) -> "TriedMesh | TriedShape":
+        """Some definitions on it."""
 
     @abstractmethod
     def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
@@ -426,16 +451,46 @@ class _Search(ABC):
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
         for rung in count():
             # Where the first question is answered, the other one is of springs alone.
-            asked = DEFINITIONS_TRIED if self._start(springs_alone=False) is None else SPRINGS_ALONE
-            names = [name for name in asked if self._promising(name)]
-            answered = self._start(springs_alone=True) is not None
-            cells = _cells(rung)
-            if answered or not names or (cells not in self._tried and not self._try(cells, names)):
+            asked = SPRINGS_ALONE if self._settled(springs_alone=False) else DEFINITIONS_TRIED
+            if self._settled(springs_alone=True):
                 break
-        for alone in (False, True):
-            self._look_between(alone)
+            names, cells = [name for name in asked if self._promising(name)], _cells(rung)
+            if not names or (cells not in self._tried and not self._try(cells, names)):
+                break
 
-    def size(self, cells: int) -> float:
+    def _settled(self, springs_alone: bool) -> bool:
+        """Look for an answer among all meshes up to those that were tried; whether there is one."""
+        if not self._holds(springs_alone):
+            return False
+        self._look_between(springs_alone)
+        return self._holds(springs_alone)
+
+    def _holds(self, springs_alone: bool) -> bool:
+        """Try sizes between whole divisions; whether a mesh is left that keeps the error on all of them."""
+        while start := self._start(springs_alone):
+            cells, names = start
+            for between in self._between(cells):
+                if self._check(between, names) and self._start(springs_alone) != start:
+                    break  # it does not: on to the next one
+            else:
+                return True
+        return False
+
+    def _between(self, cells: int) -> list[float]:
+        """Cells across the meshes between whole divisions that an answer is tried on."""
+        size = self.size(cells)
+        parts = BETWEEN_DIVISIONS + (
+            FINER[4::5] if cells < FEWEST_CELLS else ()
+        )  # errors are irregular on so few cells
+        sizes = (*(size * part for part in parts), *self._stretched(size))
+        found = (round(self._exact(1)[0] / one, ACROSS_DECIMALS) for one in sizes)
+        return [int(one) if one == int(one) else one for one in found]
+
+    def _stretched(self, size: float) -> list[float]:
+        """Sizes down to half of one whose cells are stretched most."""
+        return []
+
+    def size(self, cells: float) -> float:
         """Mesh size [m] of so many cells across the smaller side, rounded up."""
         exact, side = self._exact(cells)
         exact *= 1e3
@@ -449,26 +504,25 @@ class _Search(ABC):
 
     def found(self, springs_alone: bool) -> MeshChoice | None:
         """The coarsest mesh that is taken, and what it costs; None where there is none."""
-        sure = self._start(springs_alone)
+        sure = self._start(springs_alone) if self._holds(springs_alone) else None
         start = sure or self._start(springs_alone, confirmed=False)
         if start is None:
             return None
         cells, names = start
         one = self._tried[cells]
-        name = min(names, key=one.worst)
+        name = in_order(names, one.worst, lambda name: (name in NEED_ENERGIES, name), as_sure_as(self.known))[0]
         if (cells, name) not in self._found:
             mesh = self._mesh(one.size)
-            tried = self._trial(mesh)
-            same = tried.same[name]  # another name of the same springs
+            tried = self._trial(mesh, [name])
             self._found[cells, name] = MeshChoice(
                 self.name,
                 one.size,
                 cells,
-                tried.choice(same),
+                tried.choice(name),
                 one.particles,
                 one.springs,
-                *self._cost(mesh, tried.springs(same)),
-                tuple(self._tried[finer] for finer in self._on(name) if finer > cells),
+                *self._cost(mesh, tried.springs(name)),
+                tuple(finer for finer in self.solved() if finer.cells > cells and name in finer.errors),
                 sure is not None,
             )
         return self._found[cells, name]
@@ -480,26 +534,45 @@ class _Search(ABC):
         size = self.size(cells)
         mesh = self._mesh(size)
         particles = len(mesh.points)
-        if any((particles > one.particles) != (cells > other) for other, one in self._tried.items()):
-            return True  # no mesh of its own between its neighbours
-        tried = self._trial(mesh)
-        errors = {
-            name: {load: _number(tried.error(same, load)) for load in self.known}
-            for name, same in tried.same.items()
-            if name in names
-        }
-        errors |= {name: dict.fromkeys(self.known, math.nan) for name in tried.failures if name in names}
-        self._tried[cells] = SolvedMesh(self.name, size, cells, particles, len(mesh.edges), errors)
+        whole = [(other, one.particles) for other, one in self._tried.items() if other == int(other)]
+        # A mesh of its own has more particles than coarser ones and fewer than finer ones.
+        if all((particles > count) == (cells > other) for other, count in whole):
+            self._solve(cells, size, mesh, names)
         return True
 
-    def _keeps(self, name: str, cells: int) -> bool:
+    def _check(self, cells: float, names: Sequence[str]) -> bool:
+        """Solve definitions on a mesh between whole divisions, once on equal ones; whether there was something to."""
+        cells = self._same.get(cells, cells)
+        if cells in self._tried and all(name in self._tried[cells].errors for name in names):
+            return False
+        size = self.size(cells)
+        mesh = self._mesh(size)
+        same = self._same[cells] = self._first.setdefault(mesh.points.tobytes(), cells)
+        if same != cells:
+            return self._check(same, names)
+        self._solve(cells, size, mesh, names)
+        return True
+
+    def _solve(self, cells: float, size: float, mesh: Mesh, names: Sequence[str]) -> None:
+        """Solve definitions on a mesh, those that were solved on it before no more."""
+        self._first.setdefault(mesh.points.tobytes(), cells)
+        errors = dict(self._tried[cells].errors) if cells in self._tried else {}
+        tried = self._trial(mesh, [name for name in names if name not in errors])
+        errors |= {
+            name: {load: _number(tried.error(same, load)) for load in self.known} for name, same in tried.same.items()
+        }
+        errors |= {name: dict.fromkeys(self.known, math.nan) for name in tried.failures}
+        self._tried[cells] = SolvedMesh(self.name, size, cells, len(mesh.points), len(mesh.edges), errors)
+
+    def _keeps(self, name: str, cells: float) -> bool:
         """Whether a definition keeps the error on a mesh, even if the reference is off by its estimate."""
         errors = self._tried[cells].errors[name]
         return all(abs(error) + self._estimates[load] <= self.error for load, error in errors.items())  # not NaN
 
     def _on(self, name: str) -> list[int]:
-        """Cells across the meshes that a definition was tried on, ascending."""
-        return [cells for cells in sorted(self._tried) if name in self._tried[cells].errors]
+        """Whole cells across the meshes that a definition was tried on, ascending."""
+        whole = (int(cells) for cells in sorted(self._tried) if cells == int(cells))
+        return [cells for cells in whole if name in self._tried[cells].errors]
 
     def _promising(self, name: str) -> bool:
         """Whether a definition may keep the error on the finest mesh, as far as the last ones tell.
@@ -537,25 +610,25 @@ class _Search(ABC):
         """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
         starts: dict[int, list[str]] = {}
         for name in SPRINGS_ALONE if springs_alone else DEFINITIONS_TRIED:
-            kept = list(takewhile(partial(self._keeps, name), reversed(self._on(name))))
+            tried = (cells for cells, one in self._tried.items() if name in one.errors)
+            failing = max((cells for cells in tried if not self._keeps(name, cells)), default=0)
+            kept = [cells for cells in self._on(name) if cells > failing]
             # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
-            taken = [cells for cells in kept[FEWEST_FINER:] if ENOUGH_FINER * cells <= kept[0]] if confirmed else kept
+            taken = [cells for cells in kept[:-FEWEST_FINER] if ENOUGH_FINER * cells <= kept[-1]] if confirmed else kept
             if taken and (not confirmed or self._steady(name)):
-                starts.setdefault(taken[-1], []).append(name)
-        return min(starts.items()) if starts else None
+                starts.setdefault(taken[0], []).append(name)
+        return min(starts.items()) if starts else None  # no two have the same cells
 
     def _look_between(self, springs_alone: bool) -> None:
-        """Try the meshes between the coarsest one that is taken and the next coarser one that was tried."""
+        """Try the whole divisions between the coarsest mesh that is taken and the next coarser one."""
         start = self._start(springs_alone)
-        if start is None:
-            return
+        assert start is not None
         upper, names = start
-        lower = max((cells for cells in self._tried if cells < upper), default=upper)
+        lower = max(takewhile(lambda cells: cells < upper, map(_cells, count())), default=upper)
         steps = (round(lower * (upper / lower) ** (step / (TRIED_BETWEEN + 1))) for step in range(TRIED_BETWEEN, 0, -1))
         for cells in dict.fromkeys(steps):
-            if cells in self._tried:
-                continue
-            self._try(cells, names)
+            if cells not in self._tried:
+                self._try(cells, names)
             if cells in self._tried:
                 names = [name for name in names if self._keeps(name, cells)]
                 if not names:
@@ -578,20 +651,26 @@ class _TypeSearch(_Search):
         self.beam, self.material, self._type, self._references = beam, material, MESH_TYPES[name], known
         super().__init__(name, known, estimates, error, most)
 
-    def _exact(self, cells: int) -> tuple[float, float]:
+    def _exact(self, cells: float) -> tuple[float, float]:
         length, height = self.beam.length, self.beam.height
         return (height / self._type.row_height if height <= length else length) / cells, min(length, height)
 
     def _particles(self, cells: int) -> float:
         return self._type.particles(self.beam.length, self.beam.height, self.size(cells))
 
+    def _stretched(self, size: float) -> list[float]:
+        sizes = [size * part for part in FINER]
+        # Stretches that differ by rounding are one.
+        stretch = np.round([self._type.stretch(self.beam.length, self.beam.height, one) for one in sizes], 9)
+        return [sizes[np.argmin(stretch)], sizes[np.argmax(stretch)]]
+
     def _mesh(self, size: float) -> Mesh:
         mesh = self._type(self.beam.length, self.beam.height, size)
         check_filled(mesh, self.beam)
         return mesh
 
-    def _trial(self, mesh: Mesh) -> TriedMesh:
-        return TriedMesh(mesh, self.beam, self.material, self._references)
+    def _trial(self, mesh: Mesh, names: Sequence[str]) -> TriedMesh:
+        return TriedMesh(mesh, self.beam, self.material, self._references, names)
 
     def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
         seconds, thickness, density = 0.0, self.beam.thickness, self.material.density
@@ -643,7 +722,7 @@ class _ShapeSearch(_Search):
         self._statements = {id(grouped.mesh): found}
         return found
 
-    def _exact(self, cells: int) -> tuple[float, float]:
+    def _exact(self, cells: float) -> tuple[float, float]:
         return self._side / cells, self._side
 
     def _particles(self, cells: int) -> float:
@@ -652,8 +731,8 @@ class _ShapeSearch(_Search):
     def _mesh(self, size: float) -> Mesh:
         return self._statement(self._make(size)).mesh
 
-    def _trial(self, mesh: Mesh) -> TriedShape:
-        return TriedShape(self._statements[id(mesh)], self._references)
+    def _trial(self, mesh: Mesh, names: Sequence[str]) -> TriedShape:
+        return TriedShape(self._statements[id(mesh)], self._references, names)
 
     def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
         statement = self._statements[id(mesh)]
