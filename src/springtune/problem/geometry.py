@@ -6,6 +6,10 @@ from typing import TYPE_CHECKING
 from .quantities import positive
 
 
+class AssumptionWarning(UserWarning):
+    """What is asked for breaks an assumption of the model, such as that of a thin sheet."""
+
+
 @dataclass(frozen=True)
 class Beam:
     """A rectangular sheet, its lower left corner at the origin.
