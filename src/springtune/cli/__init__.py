@@ -1,8 +1,9 @@
 """Command line: `springtune COMMAND`."""
 
+import warnings
 from importlib import import_module
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import click
 
@@ -89,3 +90,12 @@ def main() -> None:
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        if category.__name__ == "AssumptionWarning":  # not imported, so that --help does not wait for it
+            click.echo(f"warning: {message}", err=True)
+        else:
+            shown(message, category, *where)
+
+    warnings.showwarning = show
