@@ -92,10 +92,10 @@ def main() -> None:
     """
     shown = warnings.showwarning
 
-    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+    def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
         if category.__name__ == "AssumptionWarning":  # not imported, so that --help does not wait for it
             click.echo(f"warning: {message}", err=True)
         else:
-            shown(message, category, *where)
+            shown(message, category, *where, **further)
 
     warnings.showwarning = show
