@@ -14,10 +14,10 @@ from .statics import StaticProblem
 FEW, MANY = 3, 8
 """Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
 
-STRAIGHT = 0.02
+NEARLY_STRAIGHT = 0.02
 """Most by which the tangent at 0.4 of a buckling load moves that load, relative, where a column is nearly straight."""
 
-STEP, STEPS = 0.05, 20
+INCREMENT, MOST_INCREMENTS = 0.05, 20
 """Increment of a path to its buckling load, over the displacements of a straight one there, and how many at most."""
 
 BENDS = "nothing bifurcates: the path bends before; this is the load of the nearly perfect column, about rest"
@@ -170,7 +170,7 @@ def buckling(problem: StaticProblem, guess: float) -> Buckling:
         if _bifurcates(problem, 0.85 * at_rest, first.displacements, critical):
             return Buckling(critical, "")
     low = problem.newton(0.4 * at_rest, 0.4 * at_rest * problem.slope)
-    if low.converged and abs(0.4 * smallest_share(network, None, low.displacements) - 1) <= STRAIGHT:
+    if low.converged and abs(0.4 * smallest_share(network, None, low.displacements) - 1) <= NEARLY_STRAIGHT:
         return Buckling(at_rest, BENDS)
     return Buckling(np.nan, "no buckling load: the path bends far below it")
 
@@ -179,18 +179,18 @@ def _bifurcates(problem: StaticProblem, load: float, displacements: np.ndarray, 
     """Whether the path on from a stable equilibrium loses its stability at a critical load, still rising."""
     network = problem.network
     direction, last = network.reduce(displacements), Point(network.reduce(displacements), load, 0, 0)
-    length = STEP * float(np.linalg.norm(problem.slope)) * abs(critical)
+    length = INCREMENT * float(np.linalg.norm(problem.slope)) * abs(critical)
     finest = length / 20  # longer ones may leap from a path that bends to the unstable one beside it
-    for _ in range(STEPS):
+    for _ in range(MOST_INCREMENTS):
         found, _ = next_point(problem, critical, last, direction, length, 1e-6 * length)
-        if found is None or found.load / critical > 1 + 2 * STEP:
+        if found is None or found.load / critical > 1 + 2 * INCREMENT:
             return False
         if not found.negative_pivots:
             direction, last = found.u - last.u, found
         elif length > finest:
             length *= 0.25
         else:
-            return bool(1 - STEP < last.load / critical < found.load / critical)
+            return bool(1 - INCREMENT < last.load / critical < found.load / critical)
     return False
 
 
