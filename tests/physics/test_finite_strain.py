@@ -106,7 +106,7 @@ def test_incompressible_bar_stretches_as_by_hand():
     ],
 )
 def test_the_estimate_under_pressure_covers_the_error(plane, nu, aspect_ratio, strain, finer):
-    """`finer`: the displacement by 14 elements over half the height, in the place of 8; a fifth of the error is left."""
+    """`finer`: the displacement by 14 elements over half the height, not 8, which leaves a fifth of the error."""
     beam, material = Beam(aspect_ratio * 0.02, 0.02, 1e-3, "any"), Material(1e6, nu, name="any")
     force = strain * 1e6 * beam.length * beam.thickness
     found = solve_neo_hooke(beam, material, force, plane=plane, follower=True)
