@@ -605,6 +605,7 @@ class TestPredictAMesh:
             run("predict", *self.STEEL, "--size", "10 mm", "--loads", "shear")
         assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
 
+    @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
     @pytest.mark.parametrize("asked", ["--size", "--error"])
     def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked):
         """By one line each: no mesh, no reference, no network."""
