@@ -204,7 +204,7 @@ def _buckling(data):
     ratio = 100 * (data.buckling_load / data.euler_load - 1)
     restricted = (data.buckling_message != "") & ratio.notnull()
     rows = [
-        [f"`{name}`", *(f"{value:+.1f} %{'*' * mark}".replace("-", "−") for value, mark in zip(*own))]
+        [f"`{name}`", *(f"{value:+.1f} %{'*' if mark else ''}".replace("-", "−") for value, mark in zip(*own))]
         for name in _definitions(data, "buckling_load")
         for own in [(ratio.sel(definition=name).values, restricted.sel(definition=name).values)]
     ]
