@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.arc_length import buckling_load, follow
+from springtune.mechanics.arc_length import buckling, follow, smallest_share
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
@@ -65,13 +65,60 @@ def test_a_slender_column_buckles_at_eulers_load(definition):
     springs = DEFINITIONS[definition].springs(mesh, Material(210e9, 0.3, name="steel"), 1e-3)
     network = Network(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.01**3 / 12 / (4 * 0.2**2)
-    found = buckling_load(StaticProblem(network, weights(mesh, AXIAL)), -euler / springs.reference)
-    assert found * springs.reference == pytest.approx(-euler, rel=0.02)
+    found, restriction = buckling(StaticProblem(network, weights(mesh, AXIAL)), -euler / springs.reference)
+    assert found * springs.reference == pytest.approx(-euler, rel=0.02) and not restriction
+
+
+@pytest.mark.parametrize(
+    "mesh_type, definition, rows, bifurcates",
+    [
+        ("structured", "lattice", 5, True),
+        ("structured", "lattice", 4, False),  # an odd number of rows fits
+        ("alternating", "lattice", 4, True),
+        ("alternating", "lattice", 5, False),
+        ("braced", "lattice", 5, True),
+        ("right", "delingette", 4, False),
+        ("right", "lattice", 4, False),  # bends by a sixth of its height at 95 % of the load
+        ("free", "delingette", 4, False),  # bends by 2e-4 of it
+    ],
+)
+def test_only_a_path_that_bifurcates_is_said_to(mesh_type, definition, rows, bifurcates):
+    """Meshes that are no mirror image bend: the path, followed to a deflection of 3 heights, never loses stability."""
+    problem, euler = scene(definition, AXIAL, mesh_type, 20.0, -(np.pi**2) / 48 / 20**2, 0.3, rows)
+    found, restriction = buckling(problem, euler)
+    assert ("nothing bifurcates" in restriction) == (not bifurcates)
+    length = 0.1 * np.linalg.norm(found * problem.slope)
+    path = follow(problem, 1.3 * found, increment=length, most_points=40)
+    unstable = path.loads[path.negative_pivots > 0] / found
+    if bifurcates:
+        assert not path.negative_pivots[path.loads / found < 1].any() and unstable.min() < 1.15
+    else:
+        assert not len(unstable)
+    # The load of the straight column: below half of it the bend is small, and the tangent falls in proportion to the
+    # load but for strains, here 5e-4, and the square of the bend.
+    below = problem.newton(0.3 * found, 0.3 * found * problem.slope).displacements
+    assert smallest_share(problem.network, None, below) * 0.3 == pytest.approx(1.0, abs=6e-3)
 
 
 def test_what_is_only_pulled_does_not_buckle():
     problem, s = scene("lattice", AXIAL, "structured", 3.0, 0.01, 0.3, 4)
-    assert np.isnan(buckling_load(problem, s))
+    load, why = buckling(problem, s)
+    assert np.isnan(load) and "no buckling load" in why
+
+
+def test_what_snaps_has_a_limit_point_and_no_buckling_load():
+    """A shallow arch of a strip of triangles, clamped at both ends, dead load on its crown."""
+    angle = np.linspace(-0.2, 0.2, 13)
+    inner = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    cells = [corners for i in range(12) for corners in ([i, i + 14, i + 13], [i, i + 1, i + 14])]
+    mesh = Mesh(np.concatenate([inner, 1.02 * inner]), np.array(cells))
+    clamped = np.zeros((26, 2), dtype=bool)
+    clamped[[0, 12, 13, 25]] = True
+    crown = np.zeros((26, 2))
+    crown[19, 1] = 1.0
+    problem = StaticProblem(Network(mesh, clamped, np.ones(len(mesh.edges))), crown)
+    assert problem.judge(-1.0, problem.nonlinear(-1.0))[0] is Status.UNSTABLE
+    assert np.isnan(buckling(problem, -1e-2).load)
 
 
 SNAPPED = [

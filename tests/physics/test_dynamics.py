@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.mechanics import stepping
-from springtune.mechanics.arc_length import buckling_load
+from springtune.mechanics.arc_length import buckling
 from springtune.mechanics.dynamics import Motion, centre, masses, rayleigh, relax
 from springtune.mechanics.integrators import EXPLICIT, INTEGRATORS, BackwardEuler
 from springtune.mechanics.moduli import ends
@@ -595,7 +595,7 @@ def column(share, sideways=0.0, linear=False):
     network = Network(mesh, held(mesh, AXIAL), springs.relative)
     euler = np.pi**2 * STEEL.young_modulus * THICKNESS * 0.01**3 / 12 / (4 * 0.1**2)
     along, across = weights(mesh, AXIAL), weights(mesh, BENDING)
-    critical = buckling_load(StaticProblem(network, along), -euler / springs.reference)
+    critical = buckling(StaticProblem(network, along), -euler / springs.reference).load
     load = share * critical * (along + sideways * across)
     return Motion(network, masses(mesh, DENSITY, THICKNESS) / springs.reference, load, linear=linear)
 

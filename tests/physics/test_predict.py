@@ -22,6 +22,9 @@ from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
 
+# Random beams may be thicker than they are high: thickness is a factor.
+pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")
+
 
 def springs_of(choice, mesh, beam, material):
     """Springs that a row of a prediction stands for."""

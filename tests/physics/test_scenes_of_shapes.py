@@ -26,6 +26,7 @@ from springtune.problem.boundary import (
     reaction_weights,
     weights,
 )
+from springtune.problem.geometry import AssumptionWarning
 from springtune.problem.loads import LOAD_KINDS
 from springtune.springs import DEFINITIONS
 
@@ -706,7 +707,8 @@ def test_a_shape_buckles_and_moves_as_the_beam_does():
     sides = {"left": mesh.outline_edges(0, 0.0), "right": mesh.outline_edges(0, LENGTH)}
     column = st.Scene(beam, mesh, STEEL, "compression", 100.0, definition="delingette")
     other = st.Scene(shape, GroupedMesh(mesh, sides), STEEL, "pull", definition="delingette")
-    assert other.buckling_load() == pytest.approx(column.buckling_load() / 100.0, rel=1e-9)
+    with pytest.warns(AssumptionWarning, match="nothing bifurcates"):  # squares with one diagonal are no mirror image
+        assert other.buckling_load() == pytest.approx(column.buckling_load() / 100.0, rel=1e-9)
     assert other.solve().displacement == pytest.approx(column.solve().displacement, rel=1e-9)
     steps = [one.motion().step_limit("central-difference") for one in (column, other)]
     assert steps[0] == pytest.approx(steps[1], rel=1e-9)

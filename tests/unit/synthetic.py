@@ -125,6 +125,8 @@ def stability():
         arch_load=("definition", "arch_point"), arch_negative_pivots=("definition", "arch_point"),
     )  # fmt: skip
     data["strain_message"] = xr.full_like(data.strain_status, "", dtype=object)
+    data["buckling_message"] = xr.full_like(data.buckling_load, "", dtype=object)
+    data.buckling_message[0, 1] = "nothing bifurcates"
     done = ["limits", "maps", "drift", "rest", "slivers", "strains", "buckling"]
     return data.assign_coords(experiment=done)
 

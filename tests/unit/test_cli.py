@@ -15,6 +15,7 @@ import xarray as xr
 import yaml
 from click.testing import CliRunner
 
+import springtune
 from counting import counted
 from springtune import prediction
 from springtune.cli import COMMANDS, main
@@ -25,7 +26,7 @@ from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
 from springtune.prediction import find_mesh
-from springtune.problem.geometry import Beam
+from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
@@ -50,6 +51,63 @@ def completed(words, number):
     environment = {"COMP_WORDS": words, "COMP_CWORD": str(number), "_SPRINGTUNE_COMPLETE": "bash_complete"}
     result = CliRunner().invoke(main, env=environment, prog_name="springtune")
     return result.output.splitlines()
+
+
+@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+class TestThickBodies:
+    """Plane stress is an assumption about thin sheets: a beam 1 km thick was taken without a word."""
+
+    STUDY = """\
+title: Thick
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+beams: {block: {length: 60 mm, height: 12 mm, thickness: 1 km}, sheet: {length: 60 mm, height: 12 mm}}
+shapes:
+  plate:
+    thickness: 20 mm
+    outline: [{from: [0, 0]}, {from: [60 mm, 0], group: right}, {from: [60 mm, 12 mm]}, {from: [0, 12 mm], group: left}]
+    loads: {pull: {supports: {left: fixed}, forces: {right: [1 N, 0]}, quantities: {end: {displacement: x, of: right}}}}
+grids:
+  one: {beam: [block, sheet], mesh_type: right, mesh_size: 4 mm, material: steel, load: traction,
+        force: {block: 1 N, sheet: 1 N}, definition: patch}
+  two: {beam: sheet, mesh_type: right, mesh_size: 4 mm, material: steel, load: traction, force: 1 N, definition: patch,
+        thickness: [1 mm, 15 mm]}
+shape_grids: {one: {shape: plate, mesh_size: 4 mm, material: steel, definition: patch}}
+refine:
+  thicker: {parameter: thickness, from: 1 mm, to: 30 mm, tolerance: 1 %, beam: sheet, mesh_type: right, mesh_size: 4 mm,
+            material: steel, load: traction, force: 1 N, definition: patch}
+samples: {size: 8, mesh_type: right, load: traction, definition: patch, parameters: {length: 60 mm, height: 12 mm,
+          thickness: {from: 1 mm, to: 13 mm}, mesh_size: 4 mm, young_modulus: 210 GPa, poisson_ratio: 0.3, force: 1 N}}
+"""
+
+    def test_a_study_says_each(self, tmp_path):
+        path = tmp_path / "thick.yaml"
+        path.write_text(self.STUDY)
+        found = run("scenes", path)
+        assert found.exit_code == 0, found.output
+        told = [line for line in found.stderr.splitlines() if line.startswith("warning: ")]
+        begins = [line.removeprefix("warning: ").partition(" exceeds ")[0] for line in told]
+        assert sorted(begins) == [
+            "beam 'block', thickness: 1e+06 mm",
+            "beam 'sheet', thickness: 15 mm",
+            "refine.thicker, thickness: 30 mm",
+            "samples, thickness: 13 mm",
+            "shape 'plate', thickness: 20 mm",
+        ]
+        assert all("its smaller side, 12 mm" in line and "give a smaller thickness" in line for line in told)
+
+    def test_a_command_says_it_beside_its_answer(self):
+        found = run(
+            "predict", "--beam", "60x12", "--thickness", "1 km", "--size", "6 mm", "--material", "steel", "--json"
+        )
+        assert found.stderr.count("warning: beam '60x12', thickness: 1e+06 mm exceeds its smaller side, 12 mm") == 1
+        assert json.loads(found.stdout)
+
+    def test_the_library_warns(self):
+        with pytest.warns(AssumptionWarning, match="beam '60x12', thickness: 13 mm exceeds its smaller side, 12 mm"):
+            springtune.Beam("60 mm", "12 mm", "13 mm")
+        with pytest.warns(AssumptionWarning, match="shape '60x12', thickness"):
+            springtune.Shape.rectangle("60 mm", "12 mm", thickness="13 mm")
+        springtune.Beam("60 mm", "12 mm", "12 mm")
 
 
 def test_shells_complete_commands_and_values(monkeypatch):
@@ -547,6 +605,7 @@ class TestPredictAMesh:
             run("predict", *self.STEEL, "--size", "10 mm", "--loads", "shear")
         assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
 
+    @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
     @pytest.mark.parametrize("asked", ["--size", "--error"])
     def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked):
         """By one line each: no mesh, no reference, no network."""

@@ -251,6 +251,17 @@ def test_page_tells_flutter_from_buckling_and_says_why_a_scene_is_not_solved():
     assert "1 of 2 scenes are solved" in text
 
 
+def test_page_marks_buckling_loads_where_nothing_bifurcates():
+    axes = {"definition": ["lattice"], "rows": [10, 20], "experiment": ["buckling"]}
+    data = xr.Dataset(
+        {"buckling_load": (("definition", "rows"), [[105.3, 99.9]]), "euler_load": ("definition", [100.0]),
+         "buckling_message": (("definition", "rows"), [["", "nothing bifurcates: why"]])}, axes,
+    )  # fmt: skip
+    root = stressed()["/"].to_dataset().sel(definition=["lattice"])
+    text = stability.page(xr.DataTree.from_dict({"/": root, "/stability": data}))
+    assert "| `lattice` | +5.3 % | −0.1 %* |" in text and "\n\\* nothing bifurcates: why\n" in text
+
+
 # -- the page of all tables --------------------------------------------------------------------------------------------
 
 

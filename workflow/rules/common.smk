@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+import warnings
 from math import inf
 from pathlib import Path
 
@@ -16,12 +17,17 @@ from springtune.jobs.atomic import remove_unfinished
 from springtune.jobs.dependencies import CODE_FILE, OURS
 from springtune.kinds import load_study
 from springtune.kinds.base import FORMATS
+from springtune.problem.geometry import AssumptionWarning
 from springtune.study import StudyError
 
 
 def loaded_study():
     try:
-        return load_study(CONFIG)
+        with warnings.catch_warnings():
+            # Jobs read it, too: the run says it once.
+            warnings.simplefilter("default" if workflow.is_main_process else "ignore", AssumptionWarning)
+            warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
+            return load_study(CONFIG)
     except StudyError as error:
         # The message says it all; a traceback through Snakemake would bury it.
         print(error, file=sys.stderr)

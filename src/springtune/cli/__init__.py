@@ -1,8 +1,9 @@
 """Command line: `springtune COMMAND`."""
 
+import warnings
 from importlib import import_module
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import click
 
@@ -48,6 +49,10 @@ COMMANDS = {
 """Commands by name, in the order of the help; none is imported before it is called."""
 
 
+SAID = f"{__name__}.said"
+"""Warnings of a command, in its context."""
+
+
 class Commands(click.Group):
     """Group whose commands are imported when they are called."""
 
@@ -89,3 +94,19 @@ def main() -> None:
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """
+    shown, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, [])
+
+    def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
+        if category.__name__ == "AssumptionWarning":  # not imported, so that --help does not wait for it
+            said.append(f"warning: {message}")
+        else:
+            shown(message, category, *where, **further)
+
+    warnings.showwarning = show
+
+
+@main.result_callback()
+def warn(*_: Any, **__: Any) -> None:
+    """Say what breaks an assumption of the model below an answer; a refusal says enough."""
+    for line in click.get_current_context().meta[SAID]:
+        click.echo(line, err=True)

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -51,6 +52,7 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     and with 2 when it was called in a wrong way.
     """
     from ..kinds import load_study  # here, so that --help does not wait for it
+    from ..problem.geometry import AssumptionWarning
     from ..study import StudyError
 
     allow(most)
@@ -73,7 +75,9 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
     shown = Path(arguments[0]) if named else path
     try:
-        study = load_study(shown)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
+            study = load_study(shown)
     except StudyError as error:
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None

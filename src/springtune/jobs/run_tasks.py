@@ -8,12 +8,14 @@ its limits is lost, and the others are done; a program that is broken ends the j
 import os
 import sys
 import traceback
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..problem.geometry import AssumptionWarning
 from . import records, sealed
 from .damage import DamagedError, set_aside
 from .guard import Watch, guarded
@@ -58,6 +60,7 @@ def main(tasks: str, done: str, digest: str) -> None:
     began_with = os.environ.get(STATE)
     if began_with and began_with != source_state():
         raise SystemExit(f"{PACKAGE} was edited while the study ran; call the same command again")
+    warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
     _run(note, done, Path(tasks).parents[1])
 
 

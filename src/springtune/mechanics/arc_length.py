@@ -1,6 +1,7 @@
 """Equilibrium paths through limit points, and buckling loads."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
@@ -9,6 +10,15 @@ from ..linalg.factors import Factor
 from .continuation import FEW, MANY, Point, next_point
 from .network import Network
 from .statics import StaticProblem
+
+NEARLY_STRAIGHT = 0.02
+"""Most by which the tangent at 0.4 of a buckling load moves that load, relative, where a column is nearly straight."""
+
+INCREMENT, MOST_INCREMENTS = 0.05, 20
+"""Increment of a path to its buckling load, over the displacements of a straight one there, and how many at most."""
+
+BENDS = "nothing bifurcates: the path bends before; this is the load of the nearly perfect column, about rest"
+"""Message of a buckling load that no path has."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +112,22 @@ def follow(
     )
 
 
-def buckling_load(problem: StaticProblem, guess: float) -> float:
-    """Load at which the path from rest loses its stability [m]: force over the reference stiffness.
+class Buckling(NamedTuple):
+    """A buckling load over the reference stiffness [m], and what restricts it; nothing where the path bifurcates."""
 
-    A linear buckling analysis about two equilibria shortly below the critical load of the one about rest; the number of
-    negative pivots of the tangent shortly below and above its answer proves it.
+    load: float
+    message: str
+
+
+def buckling(problem: StaticProblem, guess: float) -> Buckling:
+    """Load at which the path from rest bifurcates, or at which it would if it did not bend before.
+
+    The load is that of a linear buckling analysis about two equilibria shortly below the critical load of the one about
+    rest. The path is then followed beyond it: its tangent has a negative pivot in an equilibrium there, and none in one
+    shortly below.
+
+    On a mesh that is no mirror image a column bends from the first load on, as an imperfect one does, and the path
+    stays stable. The load is then that of the analysis about rest, since the bend changes the later equilibria.
 
     Parameters
     ----------
@@ -116,8 +137,9 @@ def buckling_load(problem: StaticProblem, guess: float) -> float:
 
     Returns
     -------
-    float
-        NaN where there is none up to a hundred times the guess, or none that could be proved.
+    Buckling
+        The load is NaN where there is none up to a hundred times the guess, or where the path bends far below it, as
+        that of an arch; the message says which.
 
     Examples
     --------
@@ -125,34 +147,48 @@ def buckling_load(problem: StaticProblem, guess: float) -> float:
     right, over Euler's load:
 
     >>> from springtune.mesh import MESH_TYPES
-    >>> mesh = MESH_TYPES["structured"](0.2, 0.02, 2.5e-3)
+    >>> mesh = MESH_TYPES["structured"](0.2, 0.02, 0.01 / 27**0.5)  # six rows
     >>> x = mesh.points[:, 0]
     >>> held = np.repeat((x <= x.min())[:, None], 2, axis=1)
     >>> pushed = np.stack([(x >= x.max()) / (x >= x.max()).sum(), 0 * x], axis=1)
     >>> problem = StaticProblem(Network(mesh, held, 0.5 * mesh.cells_per_edge), pushed)
     >>> euler = np.pi**2 * 2 / np.sqrt(3) * 0.02**3 / 12 / (4 * 0.2**2)
-    >>> float((buckling_load(problem, -1e-5) / -euler).round(2))
-    0.99
+    >>> found = buckling(problem, -1e-5)
+    >>> float((found.load / -euler).round(2)), found.message
+    (1.01, '')
     """
     network, small = problem.network, 1e-3 * guess
-    critical = smallest_share(network, None, small * problem.slope, problem.rest_factor) * small
-    if not abs(critical) < 100 * abs(guess):
-        return np.nan
-    first, second = (problem.newton(share * critical, share * critical * problem.slope) for share in (0.85, 0.95))
-    if not (first.converged and second.converged):
-        return np.nan
-    step = 0.1 * critical
-    share = smallest_share(network, first.displacements, second.displacements)
-    critical = 0.85 * critical + share * step
+    at_rest = smallest_share(network, None, small * problem.slope, problem.rest_factor) * small
+    if not abs(at_rest) < 100 * abs(guess):
+        return Buckling(np.nan, "no buckling load up to a hundred times the load")
+    first, second = (problem.newton(share * at_rest, share * at_rest * problem.slope) for share in (0.85, 0.95))
+    if first.converged and second.converged:
+        critical = (0.85 + 0.1 * smallest_share(network, first.displacements, second.displacements)) * at_rest
+        if _bifurcates(problem, 0.85 * at_rest, first.displacements, critical):
+            return Buckling(critical, "")
+    low = problem.newton(0.4 * at_rest, 0.4 * at_rest * problem.slope)
+    if low.converged and abs(0.4 * smallest_share(network, None, low.displacements) - 1) <= NEARLY_STRAIGHT:
+        return Buckling(at_rest, BENDS)
+    return Buckling(np.nan, "no buckling load: the path bends far below it")
 
-    def pivots(factor: float) -> int:
-        # The path is all but straight between the two equilibria and here.
-        along = (factor * critical - (critical - share * step)) / step
-        return network.factorize_tangent(
-            first.displacements + along * (second.displacements - first.displacements)
-        ).negative_pivots
 
-    return critical if pivots(0.99) < pivots(1.01) else np.nan
+def _bifurcates(problem: StaticProblem, load: float, displacements: np.ndarray, critical: float) -> bool:
+    """Whether the path on from a stable equilibrium loses its stability at a critical load, still rising."""
+    network = problem.network
+    direction, last = network.reduce(displacements), Point(network.reduce(displacements), load, 0, 0)
+    length = INCREMENT * float(np.linalg.norm(problem.slope)) * abs(critical)
+    finest = length / 20  # longer ones may leap from a path that bends to the unstable one beside it
+    for _ in range(MOST_INCREMENTS):
+        found, _ = next_point(problem, critical, last, direction, length, 1e-6 * length)
+        if found is None or found.load / critical > 1 + 2 * INCREMENT:
+            return False
+        if not found.negative_pivots:
+            direction, last = found.u - last.u, found
+        elif length > finest:
+            length *= 0.25
+        else:
+            return bool(1 - INCREMENT < last.load / critical < found.load / critical)
+    return False
 
 
 def smallest_share(

@@ -1,9 +1,36 @@
 """Geometry of the bodies that a study asks for."""
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .quantities import positive
+
+
+class AssumptionWarning(UserWarning):
+    """What is asked for breaks an assumption of the model, such as that of a thin sheet."""
+
+
+def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -> None:
+    """Warn where a body is thicker than its smaller side: plane stress is an assumption about thin sheets.
+
+    Parameters
+    ----------
+    thickness : float
+        [m]
+    sides : tuple of float
+        Its length and height [m].
+    what : str
+        What the message calls it.
+    """
+    smaller = min(sides)
+    if thickness > smaller:
+        warnings.warn(
+            f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
+            "stress is an assumption about thin sheets; give a smaller thickness",
+            AssumptionWarning,
+            stacklevel=4,  # whoever makes the body
+        )
 
 
 @dataclass(frozen=True)
@@ -21,6 +48,11 @@ class Beam:
     ------
     ValueError
         If a length is not above zero, a text no length, or the name no text.
+
+    Warns
+    -----
+    AssumptionWarning
+        If it is thicker than its smaller side: plane stress is an assumption about thin sheets.
 
     Examples
     --------
@@ -47,6 +79,7 @@ class Beam:
             raise ValueError(f"name: {self.name!r} is not a text; give one such as '200x40', or none")
         if not self.name:
             object.__setattr__(self, "name", f"{1e3 * self.length:g}x{1e3 * self.height:g}")
+        warn_of_thickness(self.thickness, (self.length, self.height), f"beam {self.name!r}")
 
     @property
     def label(self) -> str:

@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ..registry import NAME, NAME_RULE
-from .geometry import beam_label
+from .geometry import beam_label, warn_of_thickness
 from .outlines import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from .quantities import nearest, positive, quantity
 
@@ -583,6 +583,11 @@ class Shape:
         If there is neither an outline nor a file, sides meet where they are not to, holes or points are not in the
         body, or names cannot be some, are of two things, or of nothing.
 
+    Warns
+    -----
+    AssumptionWarning
+        If it has an outline and is thicker than the smaller side of the box around it.
+
     Examples
     --------
     A plate with a hole:
@@ -648,6 +653,8 @@ class Shape:
                 load.check_names(self.groups, self.points)
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
+        (left, low), (right, high) = self.extent
+        warn_of_thickness(self.thickness, (right - left, high - low), what)
 
     def _check_rounds(self) -> None:
         """Refuse rounds that meet each other or themselves, or are at a wrong place; turn a clockwise outline."""

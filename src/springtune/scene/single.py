@@ -1,6 +1,7 @@
 """One scene: a meshed beam of springs under a load, its equilibrium, and the finite-element answer beside it."""
 
 import time
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -16,7 +17,7 @@ from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import quantity_errors
-from ..problem.geometry import Beam
+from ..problem.geometry import AssumptionWarning, Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
@@ -520,41 +521,51 @@ class Scene:
         return found
 
     def buckling_load(self) -> float:
-        """Size of the force at which the path from rest loses its stability, by bifurcation.
+        """Size of the force at which the path from rest bifurcates, or would if it did not bend before.
 
         Returns
         -------
         float
             [N], of a shape the factor on its load [1]; NaN where there is none up to a hundred times the scene's force,
-            or none that could be proved.
+            or where the path bends far below it.
 
         Raises
         ------
         ValueError
             If the load prescribes displacements.
 
+        Warns
+        -----
+        AssumptionWarning
+            If nothing bifurcates: a column on a mesh that is no mirror image, such as ``free``, ``right`` or some
+            ``structured`` ones, bends from the first load on and stays stable. The force is then that of the nearly
+            perfect column.
+
         Notes
         -----
-        By linear buckling analyses about equilibria shortly below it, proved by the sign of the tangent's pivots on
-        both sides; see `springtune.mechanics.arc_length.buckling_load`.
+        By linear buckling analyses about equilibria shortly below it, proved by the tangent's pivots in equilibria on
+        both sides; see `springtune.mechanics.arc_length.buckling`.
 
         Examples
         --------
         >>> import math
         >>> import springtune as st
         >>> column, steel = st.Beam("100 mm", "4 mm"), st.Material("210 GPa", 0.3)
-        >>> mesh = st.make_mesh(column, "structured", "0.5 mm")
+        >>> mesh = st.make_mesh(column, "structured", "0.6 mm")
         >>> scene = st.Scene(column, mesh, steel, "compression", "200 N", definition="delingette")
         >>> euler = math.pi**2 * 210e9 * (1e-3 * 4e-3**3 / 12) / (2 * 0.1) ** 2
         >>> print(f"{scene.buckling_load():.0f} N; a slender column, by Euler: {euler:.0f} N")
-        283 N; a slender column, by Euler: 276 N
+        285 N; a slender column, by Euler: 276 N
         """
-        from ..mechanics.arc_length import buckling_load
+        from ..mechanics.arc_length import buckling
 
         if self.problem.given is not None:
             raise ValueError(f"load: {self.load!r} prescribes displacements, and buckling loads are of forces")
         begin = self.statement.factor(self.springs)
-        return float(abs(buckling_load(self.problem, begin) / begin * self.statement.size))
+        load, restriction = buckling(self.problem, begin)
+        if restriction and np.isfinite(load):
+            warnings.warn(restriction, AssumptionWarning, stacklevel=2)
+        return float(abs(load / begin * self.statement.size))
 
 
 @dataclass(frozen=True, eq=False)

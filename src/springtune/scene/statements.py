@@ -26,7 +26,7 @@ from ..problem.boundary import (
     supported,
 )
 from ..problem.cases import check_case
-from ..problem.geometry import Beam
+from ..problem.geometry import Beam, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
 from ..problem.quantities import positive
@@ -233,6 +233,8 @@ class ShapeStatement:
         self.shape, self.grouped, self.mesh, self.thickness = shape, grouped, grouped.mesh, shape.thickness
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)
+        if shape.file:
+            warn_of_thickness(shape.thickness, np.ptp(self.mesh.points, axis=0), f"shape {shape.name!r}")
         self.materials = list(dict.fromkeys(self.by_part.values()))
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")

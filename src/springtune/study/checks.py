@@ -325,7 +325,9 @@ def check_files(
     """Different things must not share a name: names become files."""
     parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
     pairs = {(reference.beam.name, reference.material.name) for reference in references}
-    flat = {replace(mesh, beam=replace(mesh.beam, thickness=1.0)) for mesh in meshes}
+    flat = {
+        replace(mesh, beam=replace(mesh.beam, thickness=min(mesh.beam.length, mesh.beam.height))) for mesh in meshes
+    }
     sizes = {mesh.mesh_size for mesh in meshes}
     boxes = {(mesh.beam.length, mesh.beam.height) for mesh in meshes}
     extents = [f"{1e3 * length:g} x {1e3 * height:g} mm" for length, height in boxes]

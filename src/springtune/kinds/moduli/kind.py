@@ -81,7 +81,7 @@ def _expand(config, declared):
             found |= dict.fromkeys(product(derived, grid.mesh_type, grid.mesh_size, ratios))
     if not found:
         return None
-    box = Beam(config.patch.length, config.patch.height, 1.0, "patch")
+    box = Beam(config.patch.length, config.patch.height, min(config.patch.length, config.patch.height), "patch")
     return Measurements(box, tuple(Measurement(*labels) for labels in sorted(found)))
 
 

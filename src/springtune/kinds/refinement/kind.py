@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ...mesh import MESH_TYPES
-from ...problem.geometry import Beam
+from ...problem.geometry import Beam, warn_of_thickness
 from ...problem.loads import LOADS
 from ...problem.materials import Material
 from ...springs import DEFINITIONS
@@ -215,9 +215,10 @@ def _expand(config, declared):
     found = []
     for name, section in (config.refine or {}).items():
         known = VARIED[section.parameter]
+        start, stop = known.read(section.start), known.read(section.stop)
         rule = Rule(
-            known.read(section.start),
-            known.read(section.stop),
+            start,
+            stop,
             section.points,
             section.spacing == "logarithmic",
             section.tolerance,
@@ -225,6 +226,8 @@ def _expand(config, declared):
             section.most,
         )
         beam, material = declared.beams[section.beam], declared.materials[section.material]
+        if section.parameter == "thickness":
+            warn_of_thickness(max(start, stop), (beam.length, beam.height), f"refine.{name}")
         force = LOADS[section.load].sign * (1.0 if section.force is None else section.force)
         body = beam, material, section.load, force, section.mesh_type, section.mesh_size or 0.0
         found += [

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from ...mesh import MESH_TYPES
 from ...mesh.types import MOST_MESHED
+from ...problem.geometry import warn_of_thickness
 from ...problem.loads import LOADS
 from ...problem.parameters import MOST_SCENES
 from ...problem.quantities import nearest
@@ -274,7 +275,12 @@ def _sample(section):
 
 
 def _expand(config, declared):
-    return _sample(config.samples) if config.samples else None
+    if not config.samples:
+        return None
+    sample = _sample(config.samples)
+    smallest = tuple(sample.parameters[name]["low"] for name in ("length", "height"))
+    warn_of_thickness(sample.parameters["thickness"]["high"], smallest, "samples")
+    return sample
 
 
 def _summary(sample):

@@ -1,9 +1,11 @@
 """Shapes, loads and materials as tasks hold them: plain dicts of what results depend on, without labels."""
 
+import warnings
 from dataclasses import asdict, replace
 from math import isfinite
 from typing import Any
 
+from ...problem.geometry import AssumptionWarning
 from ...problem.materials import AnyMaterial, material_of
 from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
@@ -88,7 +90,9 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
     points = {name: _pair(point) for name, point in described["points"].items()}
     loads = {} if case is None else {ONE_LOAD: load_of(case)}
     file = described.get("file", "")
-    return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
+        return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:

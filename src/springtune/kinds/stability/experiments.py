@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from ...linalg.factors import SingularError
-from ...mechanics.arc_length import buckling_load, follow
+from ...mechanics.arc_length import buckling as critical_load
+from ...mechanics.arc_length import follow
 from ...mechanics.dynamics import Motion, relax
 from ...mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
 from ...mechanics.moduli import PatchTest
@@ -487,14 +488,15 @@ def buckling(setup):
     height = 0.05 * setup.beam.length
     euler = np.pi**2 * setup.material.young_modulus * setup.beam.thickness * height**3 / 12
     euler /= 4 * setup.beam.length**2
-    loads = np.full(len(AXES["rows"]), np.nan)
+    loads, messages = np.full(len(AXES["rows"]), np.nan), np.full(len(AXES["rows"]), "", dtype=object)
     for i, rows in enumerate(AXES["rows"]):
         mesh = MESH_TYPES[setup.mesh_type](setup.beam.length, height, height / rows)
         try:
             problem, reference = setup.problem(mesh)
-            loads[i] = -buckling_load(problem, -euler / reference) * reference
-        except (DefinitionError, SingularError):
-            continue
+            load, messages[i] = critical_load(problem, -euler / reference)
+            loads[i] = -load * reference
+        except (DefinitionError, SingularError) as error:
+            messages[i] = str(error)
     path, deflection, reference = _arch(setup)
     count = len(AXES["arch_point"])
     found = {name: np.full(count, np.nan) for name in ("arch_load", "arch_deflection", "arch_negative_pivots")}
@@ -503,7 +505,7 @@ def buckling(setup):
         found["arch_load"][:size] = -path.loads[:size] * reference
         found["arch_deflection"][:size] = -deflection[:size]
         found["arch_negative_pivots"][:size] = path.negative_pivots[:size]
-    return {"buckling_load": loads, "euler_load": euler} | found
+    return {"buckling_load": loads, "buckling_message": messages, "euler_load": euler} | found
 
 
 def _arch(setup):

@@ -497,8 +497,10 @@ def plot_stability_buckling(data, ax=None):
     wide = 0.8 / data.sizes["rows"]
     for number, rows in enumerate(data.rows.values):
         ratio = (data.buckling_load.sel(rows=rows) / data.euler_load).sel(definition=names)
-        left.bar(places - 0.4 + wide * (number + 0.5), 100 * (ratio - 1), 0.95 * wide, label=f"{rows} rows",
-                 color=shades[number % 3], edgecolor="0.3", linewidth=0.4)  # fmt: skip
+        bars = left.bar(places - 0.4 + wide * (number + 0.5), 100 * (ratio - 1), 0.95 * wide, label=f"{rows} rows",
+                        color=shades[number % 3], edgecolor="0.3", linewidth=0.4)  # fmt: skip
+        for bar, message in zip(bars, data.buckling_message.sel(rows=rows, definition=names).values):
+            bar.set_hatch("///" if message else "")  # nothing bifurcates
     left.axhspan(-2, 2, color="0.9", zorder=0)
     left.set_xticks(places, names, rotation=20)
     left.legend()

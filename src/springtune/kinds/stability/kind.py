@@ -141,7 +141,7 @@ KIND = Kind(
         "rest": (2.0, 0.0),
         "sizes": (3.0, 0.0),
         "strains": (2.0, 0.0),
-        "buckling": (2.0, 0.0),
+        "buckling": (5.0, 0.0),
         "slivers": (0.1, 0.0),
         "contrast": (0.1, 0.0),
         "poisson": (0.3, 0.0),

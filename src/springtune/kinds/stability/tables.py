@@ -202,12 +202,16 @@ def _slivers(data):
 
 def _buckling(data):
     ratio = 100 * (data.buckling_load / data.euler_load - 1)
+    restricted = (data.buckling_message != "") & ratio.notnull()
     rows = [
-        [f"`{name}`", *(f"{value:+.1f} %".replace("-", "−") for value in ratio.sel(definition=name).values)]
+        [f"`{name}`", *(f"{value:+.1f} %{'*' if mark else ''}".replace("-", "−") for value, mark in zip(*own))]
         for name in _definitions(data, "buckling_load")
+        for own in [(ratio.sel(definition=name).values, restricted.sel(definition=name).values)]
     ]
     heads = ["definition", *(f"{count} rows" for count in data.rows.values)]
-    return ["### Buckling load of a slender column over Euler's", "", *markdown_table(heads, rows)]
+    why = dict.fromkeys(str(one) for one in data.buckling_message.values[restricted.values])
+    notes = ["", *(f"\\* {one}" for one in why)] if why else []
+    return ["### Buckling load of a slender column over Euler's", "", *markdown_table(heads, rows), *notes]
 
 
 def _scenes(root):

@@ -97,6 +97,7 @@ STABILITY = Group(
             "buckling load of a column twenty times as long as high",
             np.nan,
         ),
+        "buckling_message": (("definition", "rows"), "1", "what restricts the buckling load, or why there is none", ""),
         "euler_load": (("definition",), "N", "its load by Euler", np.nan),
         "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", np.nan),
         "arch_deflection": (ARCH, "m", "its deflection", np.nan),
