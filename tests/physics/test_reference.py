@@ -233,7 +233,7 @@ def test_bodies_that_do_not_bend_may_be_slender():
 @pytest.mark.parametrize("nu", [-0.9, -0.5])
 def test_the_bound_of_rounding_is_positive_where_bodies_grow_thicker_as_they_are_pulled(nu):
     for aspect_ratio in (1 / 3000, 1 / 300, 1.0):
-        assert UnitLevel(2 * aspect_ratio, nu, 3, SHEAR).round_off >= 1e-13
+        assert UnitLevel(2 * aspect_ratio, nu, 3, SHEAR).round_off >= 5e-14
 
 
 def test_rounding_out_of_reach_is_an_error_that_says_so():

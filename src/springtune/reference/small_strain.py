@@ -50,7 +50,7 @@ ELEMENT_GROWTH = 3.0
 EXTENDED = np.longdouble
 
 #: Relative rounding of a displacement from which on a solution is not refined any more.
-REFINED_UNTIL = 1e-13
+REFINED_UNTIL = 5e-14
 
 #: Most corrections of a solution.
 CORRECTIONS = 40
