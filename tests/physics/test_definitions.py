@@ -310,6 +310,18 @@ def test_slender_rectangles_are_refused():
         DEFINITIONS["lloyd"].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "nu", "ratio"), [("lattice", 0.3, 3**0.5), ("baudet", 0.5, 3.5**0.5), ("axis-exact", 0.25, 2.0)]
+)
+def test_sides_without_stiffness_are_not_refused_by_rounding(name, nu, ratio):
+    """In whatever unit: before, rounding of the coordinates decided which of these meshes are taken."""
+    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    for factor in np.random.default_rng(1).uniform(0.1, 10, 20):
+        scaled = Mesh(mesh.points * [ratio * factor, factor], mesh.triangles, mesh.quads)
+        made = DEFINITIONS[name].springs(scaled, Material(1.0, nu, name="unit"), 1.0)
+        assert (made.relative == 0).sum() == 20 * 6  # the edges along x
+
+
 @pytest.mark.parametrize(("ratio", "taken"), [(1.015, True), (1.025, False), (0.975, False)])
 def test_lloyds_squares_may_be_off_by_two_percent(ratio, taken):
     mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
