@@ -214,7 +214,9 @@ class _Sheet:
         side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
         places = self.nodes_at = basis.doflocs.T
         # Coordinates of the nodes: ends and middles of elements. Those of one line differ by rounding.
-        self.axes = [np.interp(np.arange(2 * len(ends) - 1) / 2, np.arange(len(ends)), ends) for ends in (along, across)]
+        self.axes = [
+            np.interp(np.arange(2 * len(ends) - 1) / 2, np.arange(len(ends)), ends) for ends in (along, across)
+        ]
         self.held = np.zeros(places.shape, dtype=bool)
         for where, axes in kind.half_held if kind.symmetric else kind.held:
             there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
