@@ -60,7 +60,7 @@ SHARED = 2e-12
 
 #: Largest ratio of the sides of a body that bends, see `_most_slender`. Beyond some ratio the corrections do not
 #: converge; which one depends on the processor's arithmetic. On all that were tried it is at least 15 % above this one.
-MOST_SLENDER = 7000.0
+MOST_BENT = 7000.0
 
 #: What is added to the diagonal of a matrix before it is factorized, relative.
 SHIFT = 1e-15
@@ -290,7 +290,7 @@ def _most_slender(nu: float, degree: int) -> float:
 
     A level's smallest elements, and shear that is stiff as nu tends to -1, worsen the condition of the matrix as well.
     """
-    return MOST_SLENDER * min(1.0, 2 * (1 + nu)) ** 0.5 * (2 / 3) ** max(degree - 6, 0)
+    return MOST_BENT * min(1.0, 2 * (1 + nu)) ** 0.5 * (2 / 3) ** max(degree - 6, 0)
 
 
 class UnitLevel:
