@@ -43,6 +43,7 @@ test-fuzz: $(VENV)/.test
 
 # The same numbers by SuperLU and by CHOLMOD, with the oldest packages that pyproject.toml allows, and with the newest by
 # each Python (python3.11 ...) on PATH; physics holds with them. They are installed, and what is not there is named.
+# The quick study, the paper's and physics by the kernels of other processors; what this one cannot run is named, too.
 test-versions: $(VENV)/.test
 	pytest -rs tests/versions
 

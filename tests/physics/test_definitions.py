@@ -300,6 +300,22 @@ def test_what_is_no_declaration_is_refused(wrong):
     assert "none of ours" not in DEFINITIONS
 
 
+def test_rounding_does_not_choose_the_corner_that_is_held():
+    """A regular polygon has two lowest corners of equal x + y; coordinates differ by rounding among processors."""
+    angles, noise = np.arange(12) * np.pi / 6, np.random.default_rng(1)
+    points = np.vstack([np.zeros(2), np.column_stack([np.cos(angles), np.sin(angles)])])
+    triangles = np.array([[0, i + 1, (i + 1) % 12 + 1] for i in range(12)])
+    held = {
+        patch_cases(
+            Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
+            Material(1.0, 0.3, name="unit"),
+            1.0,
+        )[0].held.tobytes()
+        for _ in range(20)
+    }
+    assert len(held) == 1
+
+
 def test_slender_rectangles_are_refused():
     mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
     slender = Mesh(mesh.points * [2.5, 1], mesh.triangles, mesh.quads)
@@ -308,6 +324,18 @@ def test_slender_rectangles_are_refused():
             DEFINITIONS[name].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
     with pytest.raises(DefinitionError, match=r"needs squares.*of 5 x 2 mm"):
         DEFINITIONS["lloyd"].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "nu", "ratio"), [("lattice", 0.3, 3**0.5), ("baudet", 0.5, 3.5**0.5), ("axis-exact", 0.25, 2.0)]
+)
+def test_sides_without_stiffness_are_not_refused_by_rounding(name, nu, ratio):
+    """In whatever unit: before, rounding of the coordinates decided which of these meshes are taken."""
+    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    for factor in np.random.default_rng(1).uniform(0.1, 10, 20):
+        scaled = Mesh(mesh.points * [ratio * factor, factor], mesh.triangles, mesh.quads)
+        made = DEFINITIONS[name].springs(scaled, Material(1.0, nu, name="unit"), 1.0)
+        assert (made.relative == 0).sum() == 20 * 6  # the edges along x
 
 
 @pytest.mark.parametrize(("ratio", "taken"), [(1.015, True), (1.025, False), (0.975, False)])

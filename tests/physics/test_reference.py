@@ -13,10 +13,27 @@ from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, Me
 from skfem.models.elasticity import linear_elasticity
 
 from springtune.problem.geometry import Beam
-from springtune.problem.loads import AXIAL, BENDING, FACE, LOAD_KINDS, SHEAR
+from springtune.problem.loads import (
+    AXIAL,
+    BENDING,
+    BOTH,
+    FACE,
+    LEFT,
+    LOAD_KINDS,
+    RIGHT,
+    SHEAR,
+    TOP,
+    LoadKind,
+)
 from springtune.problem.materials import Material
 from springtune.reference.field import outline
-from springtune.reference.small_strain import FIRST_LEVEL, ReferenceNotConvergedError, UnitLevel, solve_small_strain
+from springtune.reference.small_strain import (
+    FIRST_LEVEL,
+    ReferenceNotConvergedError,
+    UnitLevel,
+    solve_small_strain,
+    solve_unit,
+)
 
 STEEL = Material(210e9, 0.3, name="steel")
 RUBBER = Material(1e6, 0.5, name="rubber")
@@ -182,6 +199,41 @@ def test_rounding_of_slender_cantilevers_is_bounded(aspect_ratio, nu, degree):
     assert level.displacement <= exact * (1 + level.round_off + 1e-11)
     if nu == 0 and degree == 6:
         assert abs(level.displacement / exact - 1) <= level.round_off + 1e-7 / aspect_ratio**3 + 1e-15
+
+
+BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
+
+
+@pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3])
+@pytest.mark.parametrize("kind", [BENDING, SHEAR, BUILT_IN], ids=str)
+def test_slender_bodies_that_bend_are_refused_by_their_ratio_alone(kind, nu):
+    """The most slender ones are solved; below 7000 : 1 the bound on rounding is the same on every processor."""
+    for ratio in (6300, 7000):
+        assert solve_unit(1 / ratio if kind == SHEAR else ratio, nu, kind).error_estimate <= 1e-4
+    with pytest.raises(ReferenceNotConvergedError, match=r"unknown at level 3 .* sides of more than 7000 : 1; such"):
+        solve_unit(1 / 7001 if kind == SHEAR else 7001, nu, kind)
+
+
+@pytest.mark.parametrize("nu", [-0.9, 0.0, 0.5])
+@pytest.mark.parametrize(("degree", "ratio"), [(5, 7000), (6, 7000), (7, 4666)])
+def test_rounding_of_the_most_slender_cantilever_of_a_level_is_bounded(degree, ratio, nu):
+    ratio *= min(1.0, 2 * (1 + nu)) ** 0.5
+    level = UnitLevel(2 * ratio, nu, degree, BENDING)
+    # 2.6e-8 at most; a solution that does not converge has a bound of 1 and more.
+    assert 0 < level.round_off <= 1e-7
+    # Levels lack 1e-4 over the ratio at most; the cubic's own error is some 1e-12.
+    assert abs(level.displacement / np.polyval(interior(nu), ratio) - 1) <= level.round_off + 1e-4 / ratio
+
+
+def test_bodies_that_do_not_bend_may_be_slender():
+    for kind, ratio in ((AXIAL, 1e4), (FACE, 1e4), (FACE, 1e-4), (SHEAR, 1e4)):
+        assert solve_unit(ratio, 0.5, kind).error_estimate <= 1e-4
+
+
+@pytest.mark.parametrize("nu", [-0.9, -0.5])
+def test_the_bound_of_rounding_is_positive_where_bodies_grow_thicker_as_they_are_pulled(nu):
+    for aspect_ratio in (1 / 3000, 1 / 300, 1.0):
+        assert UnitLevel(2 * aspect_ratio, nu, 3, SHEAR).round_off >= 5e-14
 
 
 def test_rounding_out_of_reach_is_an_error_that_says_so():

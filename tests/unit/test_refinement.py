@@ -114,6 +114,13 @@ def test_where_nothing_is_crossed_nothing_is_added():
         assert len(refine(rule, lambda values, error=error: [error] * len(values))[0]) == 4
 
 
+def test_rounding_about_zero_is_no_root():
+    """The error of an exact definition is rounding, another one on another processor."""
+    rule, noise = Rule(0.0, 2.0, 5, False, 1e-3, 0.02, 40), np.random.default_rng(1)
+    places, _, errors = refine(rule, lambda values: noise.uniform(-1e-12, 1e-12, len(values)))
+    assert len(places) == 5 and not crossings(rule, places, errors)
+
+
 def test_a_jump_is_enclosed_and_told_from_a_root():
     rule = Rule(0.0, 1.0, 3, False, 0.1, 1e-3, 100)
     places, _, errors = refine(rule, lambda values: [0.3 if value < 0.4 else -0.3 for value in values])

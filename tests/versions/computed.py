@@ -1,6 +1,7 @@
 """What the stages of a study store, in a file: ``python computed.py STUDY OUTPUT``.
 
 Any Python that has the packages runs it. Results are told by their place, since versions are part of their keys.
+An output that ends in ``.nc`` is the study's dataset.
 """
 
 import pickle
@@ -66,7 +67,21 @@ def installed(name):
         return "none"
 
 
+def collected(study, output):
+    """Write the dataset of a study, all stages in this process."""
+    from springtune.campaign import collect  # here: the oldest packages have no xarray
+
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "results"
+        for job in plan(load_study(study), folder, 1).jobs.values():
+            import_module(f"springtune.{job.stage.module}").run(job.content, Spent())
+        collect.run(study, folder, output)
+
+
 if __name__ == "__main__":
+    if sys.argv[2].endswith(".nc"):
+        collected(*sys.argv[1:])
+        sys.exit()
     with tempfile.TemporaryDirectory() as scratch:
         result = computed(load_study(sys.argv[1]), Path(scratch))
     result["versions"] = {name: installed(name) for name in PACKAGES}

@@ -1,4 +1,4 @@
-"""The same numbers from other solvers and other versions of numpy and scipy, within what a solve promises.
+"""The same numbers from other solvers, processors and versions of numpy and scipy, within what a solve promises.
 
 What is compared how follows from what is computed: a state is the same or not; an equilibrium is as good as Newton's
 method leaves it, a curve as its series are, an error as what it is a ratio of. A residual is what rounding leaves, and
@@ -7,6 +7,7 @@ compared with nothing.
 
 import os
 import pickle
+import platform
 import re
 import shutil
 import subprocess
@@ -58,6 +59,20 @@ TESTERS = [one for one in DECLARED["optional-dependencies"]["test"] if re.match(
 
 PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.search(r":: 3\.\d+$", one)]
 """Versions of Python that are supported."""
+
+
+PROCESSORS = {
+    "Haswell": {"avx2", "fma"},
+    "SkylakeX": {"avx512f", "avx512dq", "avx512bw", "avx512vl"},
+    "Prescott": {"pni"},
+    "Nehalem": {"sse4_2"},
+    "generic": {"pni"},
+}
+"""Kernels of OpenBLAS, and what they ask of a processor; of the generic one numba compiles for no processor either."""
+
+NOISE = ("contrast_error", "contrast_estimate", "buckling_load")
+"""Variables that are not compared between processors: what rounding leaves, and an eigenvalue of the difference of two
+equilibria, which agrees to 1e-8 only."""
 
 
 @pytest.fixture(scope="module")
@@ -130,10 +145,56 @@ def environment(folder, python, packages):
     return folder / "bin/python"
 
 
-def physics(python, tests="tests/physics"):
+def processor(name, folder):
+    """Environment that makes this processor compute as another one; skips the test if it cannot."""
+    if platform.machine() != "x86_64" or not Path("/proc/cpuinfo").exists():
+        pytest.skip("OpenBLAS's kernels are chosen by name on x86-64 under Linux alone")
+    lacking = PROCESSORS[name] - set(Path("/proc/cpuinfo").read_text().split())
+    if lacking:
+        pytest.skip(f"this processor has no {', '.join(sorted(lacking))}, so kernel {name} is left out")
+    if name != "generic":
+        return {"OPENBLAS_CORETYPE": name}
+    return {"OPENBLAS_CORETYPE": "Prescott", "NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(folder / "numba")}
+
+
+def assert_same_datasets(config, folder, environments, tolerance, ignored=()):
+    """Compute a study in each environment at once, and compare the datasets with the first.
+
+    Statuses and messages are equal, and numbers within the tolerance.
+    """
+    outputs = [folder / f"{number}.nc" for number in range(len(environments))]
+    usual = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"}
+    calls = [[sys.executable, str(PROGRAM), str(config), str(output)] for output in outputs]
+    running = [subprocess.Popen(call, env=usual | one) for call, one in zip(calls, environments)]
+    assert [one.wait() for one in running] == [0] * len(running)
+    compare = [sys.executable, "-m", "springtune", "diff", "--relative", str(tolerance), "--all"]
+    compare += [word for name in ignored for word in ("--ignore", name)]
+    for output in outputs[1:]:
+        found = subprocess.run([*compare, str(outputs[0]), str(output)], capture_output=True, text=True, env=usual)
+        assert found.returncode == 0, found.stdout + found.stderr
+
+
+def test_the_quick_study_is_the_same_under_two_kernels(tmp_path):
+    environments = [processor(name, tmp_path) for name in ("Nehalem", "Prescott")]
+    assert_same_datasets(REPOSITORY / "config/quick.yaml", tmp_path, environments, 1e-9, NOISE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROCESSORS)
+def test_the_paper_study_is_the_same_on_every_processor(name, tmp_path):
+    assert_same_datasets(REPOSITORY / "config/paper.yaml", tmp_path, [{}, processor(name, tmp_path)], CURVE_TOLERANCE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROCESSORS)
+def test_physics_holds_on_every_processor(name, tmp_path):
+    physics(sys.executable, **processor(name, tmp_path))
+
+
+def physics(python, tests="tests/physics", **environment):
     """Run the physics tests by a Python, and assert that they hold."""
     call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider", tests]
-    here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"}
+    here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "OPENBLAS_NUM_THREADS": "1"} | environment
     done = subprocess.run(call, cwd=REPOSITORY, env=here, capture_output=True, text=True)
     print(done.stdout.splitlines()[-1:])
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-2000:]

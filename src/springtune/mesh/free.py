@@ -11,7 +11,9 @@ from .types import check_box, mesh_type
 
 def _stretch(length: float, height: float, size: float) -> float:
     """As of `MeshType.stretch`: the sides are divided, each by itself."""
-    return length / max(1, math.ceil(length / size)) / (height / max(1, math.ceil(height / size)))
+    # A hair less: a side of exactly n edges is not split into n + 1 by rounding.
+    along, across = (max(1, math.ceil(side / size * (1 - 1e-9))) for side in (length, height))
+    return length / along / (height / across)
 
 
 @mesh_type("free", order=20, row_height=ROW_HEIGHT, own_stretch=_stretch)

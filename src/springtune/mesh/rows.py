@@ -6,7 +6,7 @@ from numbers import Integral, Real
 import numpy as np
 
 from .cells import Mesh, MeshError
-from .types import MOST_MESHED, check_box, mesh_type, nearest_counts
+from .types import MOST_MESHED, check_box, mesh_type, nearest_counts, nearest_whole
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""
@@ -67,9 +67,9 @@ def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: 
     check_box(length, height, size)
     if not (isinstance(poisson_ratio, Real) and 1e-6 <= poisson_ratio <= 1):
         raise MeshError(f"poisson_ratio: {poisson_ratio!r} has no such rows; give a number above 0 and at most 1")
-    rows = max(1, round(height / row_height(size, poisson_ratio)))
+    rows = nearest_whole(height / row_height(size, poisson_ratio))
     size = 2 * math.sqrt(poisson_ratio) * height / rows
-    return max(1, round(length / size)), rows
+    return nearest_whole(length / size), rows
 
 
 def row_height(size: float, poisson_ratio: float) -> float:

@@ -64,6 +64,20 @@ def too_many(count: float, size: float, side: float, body: str) -> str:
     return f"makes some {count:.2g} particles of {body}, more than can be meshed ({MOST_MESHED:,}); give {remedy}"
 
 
+def nearest_whole(ratio: float) -> int:
+    """Nearest whole number, at least 1, halves to even ones: 2.5000000000000004 is a half, too.
+
+    Parameters
+    ----------
+    ratio : float
+
+    Returns
+    -------
+    int
+    """
+    return max(1, round(round(ratio, 9)))
+
+
 def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
     """Whole numbers of cells along a box and of rows over its height that come nearest to a size.
 
@@ -92,7 +106,7 @@ def nearest_counts(length: float, height: float, size: float, row_height: float 
     (18, 4)
     """
     check_box(length, height, size)
-    return max(1, round(length / size)), max(1, round(height / (row_height * size)))
+    return nearest_whole(length / size), nearest_whole(height / (row_height * size))
 
 
 Function = TypeVar("Function", bound=Callable[..., Mesh])

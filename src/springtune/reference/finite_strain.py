@@ -231,6 +231,10 @@ class _Sheet:
         facets = mesh.facets_satisfying(lambda x: np.isclose(x[axis], place), boundaries_only=True)
         side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
         places = self.nodes_at = basis.doflocs.T
+        # Coordinates of the nodes: ends and middles of elements. Those of one line differ by rounding.
+        self.axes = [
+            np.interp(np.arange(2 * len(ends) - 1) / 2, np.arange(len(ends)), ends) for ends in (along, across)
+        ]
         self.held = np.zeros(places.shape, dtype=bool)
         for where, axes in kind.half_held if kind.symmetric else kind.held:
             there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
@@ -312,10 +316,12 @@ class _Sheet:
 
     def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
-        places = self.nodes_at
-        order = np.lexsort(np.round(places, 12).T[::-1])
-        x, y = (np.unique(np.round(places[:, axis], 12)) for axis in range(2))
-        field = moved[order].reshape(len(x), len(y), 2)
+        x, y = self.axes
+        field = np.empty((len(x), len(y), 2))
+        columns, rows = (
+            np.searchsorted((axis[1:] + axis[:-1]) / 2, at) for axis, at in zip((x, y), self.nodes_at.T, strict=True)
+        )
+        field[columns, rows] = moved
         if not self.kind.symmetric:
             return x, y, field
         if self.kind.cut == BOTTOM:  # the upper half

@@ -295,8 +295,13 @@ def from_rectangles(mesh: Mesh, first: np.ndarray, second: np.ndarray, diagonal:
     return mesh.sum_to_edges({4: np.stack([first, second, first, second, diagonal, diagonal], axis=1)})
 
 
+NO_STIFFNESS = 1e-12
+"""Stiffness over E t that counts as zero: of terms that cancel rounding decides the sign."""
+
+
 def not_negative(stiffness: np.ndarray) -> np.ndarray:
     """Stiffnesses, refused where one is negative: such a network need not be stable."""
+    stiffness = np.where(np.abs(stiffness) <= NO_STIFFNESS, 0.0, stiffness)
     bad = int((stiffness < 0).sum())
     if bad:
         raise DefinitionError(

@@ -68,12 +68,13 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
     except MeshError as error:
         raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
     x, y = mesh.points.T
-    corner = np.argmin(x + y)
+    corner = _first_least(x + y)
     held = np.zeros(mesh.points.shape, dtype=bool)
     held[corner] = True
-    other = np.argmax(x - y)  # the other end of the lower side
-    if x[other] - x[corner] <= abs(y[other] - y[corner]):  # of a body that has none, or stands on its corner
-        other = np.argmax(np.abs(x - x[corner]))
+    other = _first_least(y - x)  # the other end of the lower side
+    # Of a body that has none, or stands on its corner.
+    if x[other] - x[corner] <= abs(y[other] - y[corner]) * (1 + 1e-9):
+        other = _first_least(-np.abs(x - x[corner]))
     held[other, 1] = True
     points = mesh.points - mesh.points[corner]
     modulus, gradients = _gradients(material)
@@ -87,6 +88,11 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
             gradient = gradient - turn * np.array([[0.0, -1.0], [1.0, 0.0]])
         cases.append(Case(held, forces, points @ gradient.T))
     return cases
+
+
+def _first_least(values: np.ndarray) -> int:
+    """Number of the least value; of equal ones the first, whatever rounding says."""
+    return int(np.argmax(values <= values.min() + 1e-9 * np.ptp(values)))
 
 
 def _gradients(material: AnyMaterial) -> tuple[float, list[list[list[float]]]]:

@@ -148,9 +148,13 @@ def _halved(rule: Rule, known: dict[float, tuple[int, float]]) -> list[float]:
     return [middle for _, middle in sorted(found)]
 
 
+SAME = 1e-9
+"""Error by which two are the same: of an exact definition rounding decides the sign [1]."""
+
+
 def _crosses(one: float, other: float, level: float) -> bool:
     """Whether two errors are on different sides of a level; one that is not there is on none."""
-    return bool(np.isfinite([one, other]).all()) and (one >= level) != (other >= level)
+    return bool(np.isfinite([one, other]).all()) and (one >= level - SAME) != (other >= level - SAME)
 
 
 def crossings(rule: Rule, places: Sequence[float], errors: Sequence[float]) -> list[Crossing]:
@@ -178,7 +182,7 @@ def crossings(rule: Rule, places: Sequence[float], errors: Sequence[float]) -> l
     for (low, one), (high, other) in zip(known, known[1:]):
         for level in rule.levels:
             if _crosses(one, other, level):
-                share = (level - one) / (other - one)
+                share = float(np.clip((level - one) / (other - one), 0.0, 1.0))
                 width = rule.value(high) - rule.value(low)
                 found.append(Crossing(level, rule.value(low + share * (high - low)), width, other - one))
     return sorted(found, key=lambda crossing: crossing.value)
