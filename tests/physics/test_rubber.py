@@ -142,6 +142,8 @@ def test_a_row_of_springs_gives_back_its_law():
         SpringLaw.fitted(TensileTest(q[three], stress[three]))
     with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
         SpringLaw.fitted(TensileTest(q, 1e6 * np.exp(-3 * q)), 2)
+    with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
+        SpringLaw.fitted(TensileTest(q, np.exp(-3 * q)), 2)
 
 
 @pytest.mark.parametrize(("test", "across"), [("equibiaxial", 1.0), ("pure shear", 0.0)])
