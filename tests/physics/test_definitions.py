@@ -308,10 +308,20 @@ def test_what_definitions_without_a_word_can_do():
     assert DEFINITIONS["lattice"].cells == (3, 4)
     assert {name for name, one in DEFINITIONS.items() if one.finite_strain} == {"neo-hooke", "yeoh"}
     assert {name for name, one in DEFINITIONS.items() if one.uniform} == UNIFORM
+    assert all(DEFINITIONS[name].anisotropic for name in ("adjoint", "annealed", "evolved", "paper"))
+
+
+@pytest.mark.parametrize("name", ["lattice", "patch", "patch-fit", "element-fit", "energy-fit", "area", "delingette"])
+def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
+    mesh, steel = MESH_TYPES["structured"](0.03, 0.01, 2.5e-3), Material(210e9, 0.3, name="steel")
+    thin, thick = (DEFINITIONS[name].springs(mesh, steel, thickness) for thickness in (1e-3, 3e-3))
+    # The product is rounded twice.
+    np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-14)
 
 
 def test_springs_of_no_stiffness_are_springs_and_none_is_their_measure():
     assert Springs(1.0, np.array([0.0, 1.0])).spring_ratio == np.inf
+    assert Springs(1.0, np.array([0.5, 4.0])).spring_ratio == 8.0
     assert not_negative(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
 
 
