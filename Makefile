@@ -22,9 +22,11 @@ report: study
 paper: $(VENV)/.run
 	snakemake paper
 
-# Files in this order, those that take longest first: at the end no core waits for the other.
+# Files in this order, those that take longest first: at the end no core waits for the other. The inputs of tests/fuzz are
+# others each day: the line that is printed has their seed, by which `make test FUZZ_SEED=...` makes them again.
+FUZZ_SEED := $(shell date -u +%Y%m%d)
 test: $(VENV)/.test
-	pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
+	FUZZ_SEED=$(FUZZ_SEED) pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.

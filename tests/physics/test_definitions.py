@@ -92,6 +92,7 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
     assert other.reference == pytest.approx(one.reference, rel=1e-12)
     np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
     assert one.evaluations == other.evaluations and (one.evaluations == 0) != name.startswith("patch")
+    assert name != "patch" or one.evaluations == 1
 
 
 def test_ends_of_rows_carry_what_a_strip_of_their_area_does():
@@ -287,9 +288,40 @@ def test_what_is_no_thickness_is_refused(thickness):
         DEFINITIONS["lattice"].springs(lattice(2, 2), Material(1.0, 0.3), thickness)
 
 
+@pytest.mark.parametrize("reference", [0.0, np.inf, np.nan, True, "1 N/m"])
+def test_what_is_no_reference_stiffness_is_refused(reference):
+    with pytest.raises(DefinitionError, match="reference stiffness .* is not a number above zero"):
+        Springs(reference, np.ones(3))
+
+
+@pytest.mark.parametrize("relative", [[1.0], np.ones((2, 1)), np.array([1.0, np.nan]), np.array([np.inf])], ids=repr)
+def test_what_are_no_relative_stiffnesses_is_refused(relative):
+    with pytest.raises(DefinitionError, match=r"(?s)relative stiffnesses .* are not finite"):
+        Springs(1.0, relative)
+
+
+UNIFORM = {"paper", "calibrated", "uniform", "density", "oriented"}
+
+
+def test_what_definitions_without_a_word_can_do():
+    """All that the decorator takes for granted, and that a wrong default would change without a word."""
+    assert DEFINITIONS["lattice"].cells == (3, 4)
+    assert {name for name, one in DEFINITIONS.items() if one.finite_strain} == {"neo-hooke", "yeoh"}
+    assert {name for name, one in DEFINITIONS.items() if one.uniform} == UNIFORM
+    assert all(DEFINITIONS[name].anisotropic for name in ("adjoint", "annealed", "evolved", "paper"))
+
+
+@pytest.mark.parametrize("name", ["lattice", "patch", "patch-fit", "element-fit", "energy-fit", "area", "delingette"])
+def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
+    mesh, steel = MESH_TYPES["structured"](0.03, 0.01, 2.5e-3), Material(210e9, 0.3, name="steel")
+    thin, thick = (DEFINITIONS[name].springs(mesh, steel, thickness) for thickness in (1e-3, 3e-3))
+    # The product is rounded twice.
+    np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-14)
+
+
 def test_springs_of_no_stiffness_are_springs_and_none_is_their_measure():
-    with pytest.raises(DefinitionError, match="reference stiffness 0.0 is not a number above zero"):
-        Springs(0.0, np.ones(3))
+    assert Springs(1.0, np.array([0.0, 1.0])).spring_ratio == np.inf
+    assert Springs(1.0, np.array([0.5, 4.0])).spring_ratio == 8.0
     assert not_negative(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
 
 
@@ -314,6 +346,17 @@ def test_rounding_does_not_choose_the_corner_that_is_held():
         for _ in range(20)
     }
     assert len(held) == 1
+
+
+@pytest.mark.parametrize("corner", [[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], ids=str)
+def test_quadrilaterals_that_are_no_rectangles_are_refused(corner):
+    """Opposite sides may be equal and diagonals not, as of a sheared square, or the other way round."""
+    square, sheared = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]), np.array([[0, 0], [1, 0], [1.5, 1], [0.5, 1.0]])
+    quads = np.array([[0, 1, 2, 3]])
+    moved = square + [[0, 0], [0, 0], corner, [0, 0]]
+    for points in (moved, sheared, np.array([[0, 0], [1, 0], [0.8, 1], [0.2, 1.0]])):
+        with pytest.raises(DefinitionError, match="needs rectangles and the mesh has other quadrilaterals"):
+            DEFINITIONS["baudet"].springs(Mesh(points, np.zeros((0, 3), int), quads), Material(1.0, 0.3), 1.0)
 
 
 def test_slender_rectangles_are_refused():

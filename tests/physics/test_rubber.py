@@ -134,12 +134,16 @@ def test_a_row_of_springs_gives_back_its_law():
     stress = terms @ [q - q**-2, q - q**-5, q - q**-8]
     law = SpringLaw.fitted(TensileTest(q, stress))
     assert law.coefficients == pytest.approx(terms, rel=1e-6) and law.largest == q[q < 2].max()
+    soft = SpringLaw.fitted(TensileTest(q, 1e-6 * stress))  # what is stable is so in any unit
+    assert soft.coefficients == pytest.approx(1e-6 * terms, rel=1e-6)
     four, three = ([*range(count), -2, -1] for count in (4, 3))  # and two beyond
     assert len(SpringLaw.fitted(TensileTest(q[four], stress[four])).coefficients) == 3
     with pytest.raises(TestDataError, match="3 terms need more than 3 points below a stretch of 2,"):
         SpringLaw.fitted(TensileTest(q[three], stress[three]))
     with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
         SpringLaw.fitted(TensileTest(q, 1e6 * np.exp(-3 * q)), 2)
+    with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
+        SpringLaw.fitted(TensileTest(q, np.exp(-3 * q)), 2)
 
 
 @pytest.mark.parametrize(("test", "across"), [("equibiaxial", 1.0), ("pure shear", 0.0)])

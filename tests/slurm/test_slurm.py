@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from cluster import NODES, asked, until
+from cluster import NODES, PATIENCE, asked, until
 from studies import REPOSITORY, jobs
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
@@ -64,7 +64,7 @@ def running(rule, besides, nodes=NODES):
         active = (job for job in jobs() if job.state == "RUNNING" and job.number not in besides)
         return next((job for job in active if rule in job.rule and job.node in nodes), None)
 
-    return until(found, 300)
+    return until(found)
 
 
 def state(number):
@@ -99,9 +99,9 @@ def test_two_thousand_scenes_survive_drains_cancels_failures_and_limits(here, th
         asked("scontrol", "update", f"NodeName={hung.node}", "State=DRAIN", "Reason=test")
         cancelled = running("rule_", {*before, hung.number, lost.number}, [failing])
         asked("scancel", cancelled.number)
-        until(lambda: state(hung.number) == "TIMEOUT", 240)
+        until(lambda: state(hung.number) == "TIMEOUT")
         asked("scontrol", "update", f"NodeName={hung.node}", "State=RESUME")
-        assert process.wait(900) == 0, log.read_text()
+        assert process.wait(PATIENCE) == 0, log.read_text()
     here.run("two_thousand")
     found = made(there, "two_thousand")
     assert differences(found, made(here, "two_thousand")) == [] and "dataset.nc" in found

@@ -66,6 +66,10 @@ STUDIES = {
         "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
     ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
+    "lists in a list of names": (
+        SMALL.replace("lattice", str([["lattice"]] * 30)),
+        "definition[0]: a list instead of a name such as 'paper'; give",
+    ),
     "a long name": (SMALL.replace("a: {length", "a" * 61 + ": {length"), "' cannot name a beam; use letters, digits"),
     "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give a length such as"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),

@@ -108,18 +108,24 @@ class AskedShape:
         return Path(self.shape.file).name if self.size is None else f"free {self.size_text}"
 
     def mesh(self) -> "GroupedMesh":
-        """The mesh.
+        """The mesh, finer where the study says so.
 
         Raises
         ------
         ValueError
-            Names the option.
+            If the shape cannot be meshed so; names the option.
+        MeshError
+            If the file cannot be read.
         """
+        from ..mesh.group_files import read_shape  # here, since studies are read without scipy
+        from ..mesh.outlines import mesh_shape
+
+        if self.size is None:
+            return read_shape(self.shape.file, self.shape.unit)
+        refined = {where: share * self.size for where, share in self.part.refined[self.shape.name].items()}
         try:
-            return self.part.mesh(self.shape.name, self.size)
+            return mesh_shape(self.shape, self.size, refined=refined)
         except ValueError as error:
-            if self.size is None:
-                raise
             said = MESH_SIZE.sub("", str(error))
             between = " " if said != str(error) else ": "
             raise ValueError(f"--size: '{self.size_text}'{between}{said}") from None

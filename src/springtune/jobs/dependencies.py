@@ -32,6 +32,7 @@ CARRIED = {
     ("browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
     ("jobs/processes.py", "psutil"): "it says which processes live",
     ("jobs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
+    ("output/dataset.py", "h5py"): "texts go into a dataset as they are",
     ("output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
     ("mesh/formats.py", "meshio"): "so do the meshes between two stages; where a study's own file is read it counts",
     ("units.py", "pint"): "what a study says with units is in the parameters as numbers",

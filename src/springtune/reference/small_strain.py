@@ -36,7 +36,7 @@ from .limits import rotation_and_strain
 from .similarity import unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
-FIRST_LEVEL, LAST_LEVEL = 3, 8
+FIRST_LEVEL, LAST_LEVEL = 3, 9
 
 #: Size of a layer of elements over that of the next one outwards. In one dimension (sqrt(2) - 1)^2 = .17 is best (Gui,
 #: Babuska 1986); of .1, .15, .2 and .3, .2 has the least error here.

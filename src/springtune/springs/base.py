@@ -121,12 +121,12 @@ class Definition(Declared):
     'Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3'
     """
 
-    uniform: bool = False
-    cells: tuple[int, ...] = (3, 4)
-    uniaxial: bool = False
-    needs: str = ""
-    anisotropic: bool = False
-    finite_strain: bool = False
+    uniform: bool
+    cells: tuple[int, ...]
+    uniaxial: bool
+    needs: str
+    anisotropic: bool
+    finite_strain: bool
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh.

@@ -27,6 +27,9 @@ LONGEST_TEXT = 1000
 MOST_LISTED = 10_000
 """Most values of a list."""
 
+FEW_NAMES = 5
+"""Names that a message lists, where a value is no name: a study may have hundreds of such values."""
+
 
 class Scalar:
     """Annotation of a field.
@@ -39,10 +42,12 @@ class Scalar:
         JSON schema.
     words : str
         What is expected, for messages and the manual.
+    short : str, optional
+        What messages say in the place of long words.
     """
 
-    def __init__(self, read: Callable[[str], Any], schema: dict[str, Any], words: str) -> None:
-        self.read, self.schema, self.words = read, schema, words
+    def __init__(self, read: Callable[[str], Any], schema: dict[str, Any], words: str, short: str = "") -> None:
+        self.read, self.schema, self.words, self.short = read, schema, words, short or words
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self._read)
@@ -52,9 +57,9 @@ class Scalar:
 
     def _read(self, value: object) -> Any:
         if not isinstance(value, str) or not value.strip():
-            raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
+            raise refuse(f"{show(value)} instead of {self.short}; give {self.short}")
         if len(value) > LONGEST_TEXT:
-            raise refuse(f"{show(value)}, {len(value)} characters; give {self.words}, of at most {LONGEST_TEXT}")
+            raise refuse(f"{show(value)}, {len(value)} characters; give {self.short}, of at most {LONGEST_TEXT}")
         return self.read(value)
 
 
@@ -129,7 +134,9 @@ def one_of(what: str, names: Collection[str]) -> Scalar:
             raise refuse(f"unknown {what} {show(value)}; {nearest(value, names)}")
         return value
 
-    return Scalar(read, {"enum": list(names)}, " or ".join(f"'{name}'" for name in names))
+    words = " or ".join(f"'{name}'" for name in names)
+    short = f"a name such as '{next(iter(names))}'" if len(names) > FEW_NAMES else words
+    return Scalar(read, {"enum": list(names)}, words, short)
 
 
 def _read_flag(value: str) -> bool:

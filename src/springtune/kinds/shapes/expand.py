@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
 
 from ...problem.loads import KINEMATICS
 from ...problem.materials import Material
@@ -11,9 +10,6 @@ from ...problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape
 from ...springs import DEFINITIONS
 from .names import OUTLINED, OWN_FILE, OWN_SIZE
 from .plan import mesh_name
-
-if TYPE_CHECKING:
-    from ...mesh.groups import GroupedMesh
 
 
 @dataclass(frozen=True)
@@ -91,37 +87,6 @@ class Shapes:
     def material(self) -> dict[str, Material]:
         """Materials by name."""
         return {one.name: one for one in self.materials}
-
-    def mesh(self, name: str, size: float | None = None) -> "GroupedMesh":
-        """Mesh of a shape, finer where the study says so; of one from a file that of the file.
-
-        Parameters
-        ----------
-        name : str
-            Of a shape that is declared.
-        size : float, optional
-            Length of an edge [m]; none where the mesh is that of a file.
-
-        Returns
-        -------
-        GroupedMesh
-
-        Raises
-        ------
-        ValueError
-            If the shape cannot be meshed so.
-        MeshError
-            If the file cannot be read.
-        """
-        from ...mesh.group_files import read_shape  # here, since studies are read without scipy
-        from ...mesh.outlines import mesh_shape
-
-        shape = self.declared[name]
-        if shape.file:
-            return read_shape(shape.file, shape.unit)
-        assert size is not None
-        refined = {where: share * size for where, share in self.refined[name].items()}
-        return mesh_shape(shape, size, refined=refined)
 
     def materials_of(self, shape: str, material: str) -> dict[str, Material]:
         """Material of each part of a shape, that of the main part under ``""``."""
