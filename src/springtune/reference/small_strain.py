@@ -68,9 +68,8 @@ SHIFT = 1e-15
 #: Number of points of the field that is handed out, about.
 FIELD_POINTS = 3000
 
-
-Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
-"""Signs, places and matrices that take coefficients to displacements on a grid, see `_Grid.values`."""
+#: Signs, places and matrices that take coefficients to displacements on a grid, see `_Grid.values`.
+_Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
 
 
 class ReferenceNotConvergedError(RuntimeError):
@@ -376,7 +375,7 @@ class UnitLevel:
         x, y = self._grid.plot_points
         return x, y, self._sum(self._grid.plot_values)
 
-    def _sum(self, values: Values) -> np.ndarray:
+    def _sum(self, values: _Values) -> np.ndarray:
         signs, places, at_x, at_y = values
         parts = ((at_x @ part @ at_y.T)[places] for part in self._coefficients)
         return np.stack([sign * part for sign, part in zip(signs, parts)], axis=2)
@@ -523,7 +522,7 @@ class _Grid:
             field[np.ix_(*ends)] = part.reshape(len(ends[0]), -1)
         return fields
 
-    def values(self, x: np.ndarray, y: np.ndarray) -> Values:
+    def values(self, x: np.ndarray, y: np.ndarray) -> _Values:
         """Signs of the two displacements on a grid, places of its points in the half, matrices along x and y there.
 
         A point and its mirror image have one place: products of matrices round differently from column to column.
@@ -547,7 +546,7 @@ class _Grid:
         return np.concatenate([x, self._length - x[-2::-1]]), np.concatenate([-half[:0:-1], half])
 
     @cached_property
-    def plot_values(self) -> Values:
+    def plot_values(self) -> _Values:
         return self.values(*self.plot_points)
 
 
