@@ -588,7 +588,8 @@ class SceneSprings(Springs):
             Ending in ``.csv``, ``.json``, ``.vtu`` or ``.h5``, or in one of those for simulators, see
             `springtune.SpringNet.write`.
         **options
-            ``mesh_name``, what the header calls the mesh, and ``errors``, whether it says the expected errors.
+            ``mesh_name``, what the header calls the mesh, ``errors``, whether it says the expected errors, and
+            ``mujoco``, see `springtune.SpringNet.write`.
 
         Returns
         -------
