@@ -81,6 +81,30 @@ def test_a_shape_that_snaps_is_unstable_and_says_where(pushed):
     assert np.isnan(beyond.displacement)
 
 
+@pytest.mark.parametrize("definition", ["patch", "lattice", "area"])
+@pytest.mark.parametrize(
+    "size, status, says",
+    [
+        ("6 mm", Status.UNSTABLE, "turns back, unstable, at 90."),
+        ("4 mm", Status.NOT_CONVERGED, "cells turn inside out beyond 8"),
+    ],
+)
+def test_one_event_has_one_status(definition, size, status, says):
+    """A quarter of a strip with a hole, stretched to twice its length: cells at the hole collapse."""
+    hole = st.Shape(
+        "hole", "1 mm",
+        [st.Segment((0.01, 0), group="lower"), st.Segment((0.1, 0), group="right"), st.Segment((0.1, 0.05)),
+         st.Segment((0, 0.05), group="left"), st.Segment((0, 0.01), (0, 0))],
+        loads={"pull": st.LoadCase("pull", [st.Support("lower", y=0), st.Support("left", x=0)],
+                                   [st.Traction("right", ("50 N", 0))],
+                                   quantities=[st.Quantity("end", "displacement", "right", "x")])},
+    )  # fmt: skip
+    result = st.Scene(
+        hole, st.mesh_shape(hole, size), st.Material("1 MPa", 1 / 3), "pull", definition=definition
+    ).solve()
+    assert result.status is status and says in result.message
+
+
 @pytest.mark.parametrize("share, says", [(0.8, ""), (3.0, "unstable at 33")])
 def test_a_motion_that_snaps_says_so_where_it_comes_to_rest(share, says):
     arch = Arch("truss", "clamped", "point", "lattice", 3.0)

@@ -17,6 +17,9 @@ MOST_BEYOND = 24
 SHORTEST_BEYOND = 1e-6
 """Shortest increment beyond the last load step, over that step."""
 
+SHORTEST_INVERTED = 1e-3
+"""Shortest increment to a place where a cell turns inside out, over that step."""
+
 MOST_BEHIND = 60
 """Points of a path behind a limit point that are looked at for a stable one that carries the load."""
 
@@ -127,11 +130,14 @@ class Continuation(NamedTuple):
     end : Point or None
         Stable point at or beyond the load that was asked for: before a limit point, or where the path comes back to
         that load behind it. None where none was found.
+    inverts : bool
+        Whether a cell turns inside out before the path turns back or gets there.
     """
 
     limit: float
     lost: float
     end: Point | None
+    inverts: bool = False
 
 
 def continued(
@@ -180,14 +186,16 @@ def continued(
         pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
     except SingularError:
         return Continuation(limit, lost, None)
-    most = MOST_BEYOND
+    most, growth = MOST_BEYOND, 1.5
     while most:
         most -= 1
         found, length = next_point(problem, target, point, direction, length, SHORTEST_BEYOND * increment)
         if found is None:
             break
         if network.inverted(problem.moved(found.load, network.expand(found.u))):
-            length *= BEYOND  # cells that collapse snap just before
+            growth, length = 1.0, BEYOND * length  # cells that collapse mostly snap just before
+            if length < SHORTEST_INVERTED * increment:
+                return Continuation(limit, lost, None, inverts=True)
             continue
         falls, unstable = abs(found.load) < abs(point.load), found.negative_pivots > pivots
         if np.isnan(limit) and falls and unstable:
@@ -201,5 +209,5 @@ def continued(
         if abs(point.load) >= abs(target) and not unstable:
             return Continuation(limit, lost, point)
         if point.steps <= FEW:
-            length = min(1.5 * length, increment)
+            length = min(growth * length, increment)
     return Continuation(limit, lost, None)

@@ -465,9 +465,9 @@ class StaticProblem:
             leaves = looked_at and self._unstable(there, found)
             bend = 0.25 * step / (step + last_step)
             apart = looked_at and not leaves and not self._joined(here, last, there, found.displacements, guess, bend)
-            limit, failed = np.nan, apart or not found.converged
+            limit, inverts, failed = np.nan, False, apart or not found.converged
             if failed and step <= SMALLEST_STEP and last_step:
-                limit, lost, end = continued(self, here, last, before, there)
+                limit, lost, end, inverts = continued(self, here, last, before, there)
                 if np.isnan(unstable) and not limit / s <= lost / s:
                     unstable = lost / s
                 if np.isnan(limit) and np.isnan(lost) and end is not None:
@@ -484,11 +484,12 @@ class StaticProblem:
                     return replace(found, iterations=iterations, unstable_share=unstable)
                 step *= 1.5
             elif failed and (step <= SHORTEST or not np.isnan(limit) or not found.converged and step <= SMALLEST_STEP):
+                reason = "cells turn inside out" if inverts else found.reason or "no stable path"
                 return replace(
                     found,
                     converged=False,
                     iterations=iterations,
-                    reason=f"{found.reason or 'no stable path'} beyond {100 * done:.3g} % of the load",
+                    reason=f"{reason} beyond {100 * done:.3g} % of the load",
                     unstable_share=unstable,
                     load_share=done,
                     last=last,
