@@ -1,5 +1,6 @@
 """What `predict` says of a mesh, against solutions of the same networks by other means."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -121,7 +122,9 @@ class TestWhatClosedFormsGotWrong:
         beam, material = Beam(length, height, 1e-3, "b"), Material(1e9, nu, name="m")
         mesh = MESH_TYPES[mesh_type](length, height, size)
         found = {choice.definition: choice for choice in predict(beam, mesh, material)}
-        assert list(found) == sorted(found, key=lambda name: found[name].worst)
+        # Errors that differ by less than the references' estimates are equal: names are their order.
+        errors = [choice.worst for choice in found.values()]
+        assert all(before <= after + 1e-6 for before, after in itertools.pairwise(errors))
         return beam, material, mesh, found
 
     def through_the_stage(self, beam, material, mesh, definition, load):

@@ -186,7 +186,7 @@ def continued(
         pivots = problem.stability(load, last, problem.factorize_tangent(load, last))[0]
     except SingularError:
         return Continuation(limit, lost, None)
-    most, growth = MOST_BEYOND, 1.5
+    most, growth, way, loads = MOST_BEYOND, 1.5, [0.0], [load]
     while most:
         most -= 1
         found, length = next_point(problem, target, point, direction, length, SHORTEST_BEYOND * increment)
@@ -197,9 +197,11 @@ def continued(
             if length < SHORTEST_INVERTED * increment:
                 return Continuation(limit, lost, None, inverts=True)
             continue
+        way += [way[-1] + float(np.linalg.norm(found.u - point.u))]
+        loads += [found.load]
         falls, unstable = abs(found.load) < abs(point.load), found.negative_pivots > pivots
         if np.isnan(limit) and falls and unstable:
-            limit = point.load
+            limit, lost = _top(way, loads), np.nan if lost == point.load else lost
             if not farthest:
                 break
             most, increment = MOST_BEHIND, max(increment, farthest)
@@ -211,3 +213,11 @@ def continued(
         if point.steps <= FEW:
             length = min(growth * length, increment)
     return Continuation(limit, lost, None)
+
+
+def _top(way: list[float], loads: list[float]) -> float:
+    """Largest load of a path whose last point falls: that of the parabola through its last three points, if it is."""
+    if len(way) < 3:
+        return loads[-2]
+    square, slope, _ = np.polyfit(np.subtract(way[-3:], way[-2]), np.subtract(loads[-3:], loads[-2]), 2)
+    return float(loads[-2] - slope**2 / (4 * square)) if square * loads[-2] < 0 else loads[-2]

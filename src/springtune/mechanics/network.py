@@ -485,7 +485,7 @@ class Network:
         if self._by_cholesky:
             return self._pattern.analysis.factorize(matrix.data) is not None
         try:
-            return self.factorize_matrix(matrix).negative_pivots == 0
+            return not (self._by_multigrid and self._loose) and self.factorize_matrix(matrix).negative_pivots == 0
         except SingularError:
             return False
 

@@ -27,7 +27,7 @@ FAR = 0.15
 TURNED = 0.3
 """Change of a spring's vector over its length, turns included, beyond which it is, too."""
 
-SMALL = 1e-3
+UNSNAPPED = 1e-3
 """Change of a spring's vector over its length within which no path turns back: a shallow arch of the thinnest sheet
 that can be solved turns by more before it snaps."""
 
@@ -43,7 +43,7 @@ SHORTEST = 1 / 2048
 BENT = 0.1
 """Distance of the middle of a parabola from that of the straight way, over its length, up to which it is taken."""
 
-ALIKE, SLACK = 0.25, 0.02
+FORESEEN, SLACK = 0.25, 0.02
 """Distance of an equilibrium from a guess over the way to it, and work of the forces out of balance in the middle of
 that way over the load's, below which no snap can lie on the way: of 153 snaps of arches the least are 0.35 and 0.05."""
 
@@ -318,13 +318,13 @@ class StaticProblem:
             if found.converged:
                 change = self.network.largest_change(found.displacements)  # never below the stretch
                 near = change <= FAR or change <= TURNED and self.network.largest_stretch(found.displacements) <= FAR
-                if near and (change <= SMALL or self._reached(s, found.displacements) or self._unstable(s, found)):
+                if near and (change <= UNSNAPPED or self._reached(s, found.displacements) or self._unstable(s, found)):
                     return replace(found, iterations=iterations)
                 break
         return self._in_steps(s, found, iterations)
 
     def departure(self, s: float, displacements: np.ndarray) -> str:
-        """How a stable equilibrium differs from the one that the path from rest leads to; empty where it does not.
+        """Why the path from rest does not lead to a stable equilibrium: a limit point, or another one; mostly empty.
 
         Parameters
         ----------
@@ -333,14 +333,17 @@ class StaticProblem:
         displacements : ndarray of float, shape (n_points, 2)
             [m]
         """
-        if self.network.largest_change(displacements) <= SMALL or self._reached(s, displacements):
+        network = self.network
+        if network.largest_change(displacements) <= UNSNAPPED:
+            return ""
+        if network.is_stable(0.5 * displacements, self._follower_at(0.5 * s)):
             return ""
         found = self.nonlinear(s)
         status, message, _ = self.judge(s, found)
-        if status is not Status.SOLVED:
-            return message
-        apart = self.network.largest_change(displacements - found.displacements) > SURPRISE
-        return "the path from rest leads to another stable equilibrium" if apart else ""
+        if status is Status.SOLVED:
+            apart = network.largest_change(displacements - found.displacements) > SURPRISE
+            return "the path from rest leads to another stable equilibrium" if apart else ""
+        return message if found.limit_share < 1 else ""
 
     def _reached(self, s: float, displacements: np.ndarray) -> bool:
         """Whether no snap lies between rest and an equilibrium."""
@@ -360,7 +363,7 @@ class StaticProblem:
         if bend * np.linalg.norm(off) <= BENT * np.linalg.norm(way):
             middle = middle - bend * off
         half = 0.5 * (s + to)
-        if self.given is None and network.largest_change(off) <= ALIKE * network.largest_change(way):
+        if self.given is None and network.largest_change(off) <= FORESEEN * network.largest_change(way):
             along = network.reduce(way)
             work = (to - s) * float(self.load_at(there) @ along)
             if abs(float(self.balance(half, middle)[0] @ along)) <= SLACK * abs(work):

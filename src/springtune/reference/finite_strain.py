@@ -49,7 +49,7 @@ MOST_LONG = 10
 
 SMALLEST_STEP = 1 / 64
 
-SAME = 0.01
+SAME_PATH = 0.01
 """Difference of two meshes' displacements within which they are on the same path."""
 
 BENT = 0.1
@@ -180,7 +180,9 @@ def _solve(
     sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
     name = f"{beam.name}, {material.name}"
     coarse, fine = (sheet.solve(stress, name, watched) for sheet, watched in zip(sheets, (True, False)))
-    if not abs(coarse.mean - fine.mean) <= SAME * abs(fine.mean):  # it may have snapped where the coarse one has not
+    if not abs(coarse.mean - fine.mean) <= SAME_PATH * abs(
+        fine.mean
+    ):  # it may have snapped where the coarse one has not
         fine = sheets[1].solve(stress, name)
     # Lengths are over half the height.
     scale = beam.height / 2
@@ -294,6 +296,15 @@ class _Sheet:
         little = np.linalg.norm(bent) <= BENT * np.linalg.norm(moved)
         return bool(len(path) == 1 and little and self._is_stable(0.5 * moved - bent, stress * middle))
 
+    def _judged(self, factor: SuperLUFactor, moved: np.ndarray, stress: float) -> bool:
+        """Whether an equilibrium is stable, so far as the factor of its tangent tells."""
+        try:
+            negative = factor.negative_pivots
+        except SingularError:  # pivots beside the diagonal
+            return self._is_stable(moved, stress)
+        # Of a tangent that is not symmetric only an odd number says something.
+        return not (negative % 2 if self.turning.nnz else negative)
+
     def _is_stable(self, moved: np.ndarray, stress: float) -> bool:
         """Whether the symmetric part of the tangent is positive definite: no real eigenvalue is negative then."""
         gradient = self._gradient(moved)
@@ -358,14 +369,13 @@ class _Sheet:
             except SingularError:
                 return None
             step[~self.held] = factor.solve(residual)
-            negative = factor.negative_pivots  # of a tangent that is not symmetric only an odd number says something
             if not np.abs(step).max() <= FARTHEST * self.extent:
                 return None
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
             if np.abs(step).max() <= TOLERANCE * np.abs(moved).max():
                 open_ = float(abs((self.load * step).sum() / (self.load * moved).sum()))
-                return moved, open_, not (negative % 2 if self.turning.nnz else negative)
+                return moved, open_, self._judged(factor, moved, stress)
         return None
 
     def _gradient(self, moved: np.ndarray) -> np.ndarray:
