@@ -157,10 +157,13 @@ def buckling(problem: StaticProblem, guess: float) -> Buckling:
     >>> float((found.load / -euler).round(2)), found.message
     (1.01, '')
     """
-    network, small = problem.network, 1e-3 * guess
-    at_rest = smallest_share(network, None, small * problem.slope, problem.rest_factor) * small
-    if not abs(at_rest) < 100 * abs(guess):
-        return Buckling(np.nan, "no buckling load up to a hundred times the load")
+    network, at_rest = problem.network, 0.01 * guess
+    for share in (1.0, 0.1):  # a first estimate, then of its own size, whatever the guess
+        step = share * at_rest
+        there, back = step * problem.slope, -step * problem.slope
+        at_rest = smallest_share(network, None, there, problem.rest_factor, back) * step
+        if not abs(at_rest) < 100 * abs(guess):
+            return Buckling(np.nan, "no buckling load up to a hundred times the load")
     first, second = (problem.newton(share * at_rest, share * at_rest * problem.slope) for share in (0.85, 0.95))
     if first.converged and second.converged:
         critical = (0.85 + 0.1 * smallest_share(network, first.displacements, second.displacements)) * at_rest
@@ -192,7 +195,11 @@ def _bifurcates(problem: StaticProblem, load: float, displacements: np.ndarray, 
 
 
 def smallest_share(
-    network: Network, first: np.ndarray | None, second: np.ndarray | None, factor: Factor | None = None
+    network: Network,
+    first: np.ndarray | None,
+    second: np.ndarray | None,
+    factor: Factor | None = None,
+    mirror: np.ndarray | None = None,
 ) -> float:
     """Where on the line from one tangent to another the first eigenvalue vanishes: 0 at the first, 1 at the second.
 
@@ -206,6 +213,8 @@ def smallest_share(
         Displacements [m]; None at rest.
     factor : Factor, optional
         First tangent factorized.
+    mirror : ndarray of float, shape (n_points, 2), optional
+        As far before the first as the second is beyond it [m]: tangents then change as they do at the first.
 
     Returns
     -------
@@ -213,9 +222,10 @@ def smallest_share(
         Infinite where there is no such place.
     """
     here, there = network.tangent(first), network.tangent(second)
+    change = here - there if mirror is None else 0.5 * (network.tangent(mirror) - there)
     factor = factor or network.factorize_tangent(first)
     inverse = LinearOperator(here.shape, factor.solve, dtype=float)
     # A fixed start, across the beam, since buckling bends it: the same numbers in every run.
     start = network.reduce(network.mesh.points[:, ::-1] ** 2 * [0.0, 1.0] + 1e-3 * network.mesh.points)
-    largest = eigsh(here - there, 1, here, which="LA", Minv=inverse, v0=start, tol=1e-4, return_eigenvectors=False)[0]
+    largest = eigsh(change, 1, here, which="LA", Minv=inverse, v0=start, tol=1e-10, return_eigenvectors=False)[0]
     return 1.0 / largest if largest > 0 else np.inf
