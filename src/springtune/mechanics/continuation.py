@@ -128,8 +128,8 @@ class Continuation(NamedTuple):
     lost : float
         First load at which the path was found unstable before it turns back [m]; NaN where it was not.
     end : Point or None
-        Stable point at or beyond the load that was asked for: before a limit point, or where the path comes back to
-        that load behind it. None where none was found.
+        Stable point at or beyond the load that was asked for, or the last one below it where a limit point is above it;
+        or where the path comes back to that load behind a limit point. None where none was found.
     inverts : bool
         Whether a cell turns inside out before the path turns back or gets there.
     """
@@ -179,7 +179,7 @@ def continued(
     """
     network, limit, lost = problem.network, np.nan, np.nan
     direction = network.reduce(last - before)
-    point = Point(network.reduce(last), load, 0, 0)
+    point = stable = Point(network.reduce(last), load, 0, 0)
     increment = float(np.linalg.norm(direction))
     length = BEYOND * increment  # near a limit point two paths may be near
     try:
@@ -202,12 +202,12 @@ def continued(
         falls, unstable = abs(found.load) < abs(point.load), found.negative_pivots > pivots
         if np.isnan(limit) and falls and unstable:
             limit, lost = _top(way, loads), np.nan if lost == point.load else lost
-            if not farthest:
-                break
+            if not farthest:  # the top may be above the load all the same, between two points below it
+                return Continuation(limit, lost, stable if abs(limit) >= abs(target) else None)
             most, increment = MOST_BEHIND, max(increment, farthest)
         elif np.isnan(lost) and unstable:
             lost = found.load
-        direction, point = found.u - point.u, found
+        direction, point, stable = found.u - point.u, found, stable if unstable else found
         if abs(point.load) >= abs(target) and not unstable:
             return Continuation(limit, lost, point)
         if point.steps <= FEW:

@@ -473,11 +473,12 @@ class StaticProblem:
                 limit, lost, end, inverts = continued(self, here, last, before, there)
                 if np.isnan(unstable) and not limit / s <= lost / s:
                     unstable = lost / s
-                if np.isnan(limit) and np.isnan(lost) and end is not None:
+                if end is not None and np.isnan(lost):
                     guess = self.network.expand(end.u)
                     near = self.newton(there, guess)
-                    if near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISE:
-                        found, failed = near, False
+                    close = near.converged and self.network.largest_change(near.displacements - guess) <= SURPRISE
+                    if close and not self._unstable(there, near):
+                        found, failed, missed = near, False, False
             if not failed and (step <= SHORTEST or not missed):
                 if leaves or missed and np.isnan(unstable):
                     unstable = done + step if leaves else done
