@@ -708,7 +708,8 @@ def test_a_shape_buckles_and_moves_as_the_beam_does():
     column = st.Scene(beam, mesh, STEEL, "compression", 100.0, definition="delingette")
     other = st.Scene(shape, GroupedMesh(mesh, sides), STEEL, "pull", definition="delingette")
     with pytest.warns(AssumptionWarning, match="nothing bifurcates"):  # squares with one diagonal are no mirror image
-        assert other.buckling_load() == pytest.approx(column.buckling_load() / 100.0, rel=1e-9)
+        # An eigenvalue of the difference of two tangents, which rounding leaves eight digits.
+        assert other.buckling_load() == pytest.approx(column.buckling_load() / 100.0, rel=1e-8)
     assert other.solve().displacement == pytest.approx(column.solve().displacement, rel=1e-9)
     steps = [one.motion().step_limit("central-difference") for one in (column, other)]
     assert steps[0] == pytest.approx(steps[1], rel=1e-9)

@@ -20,6 +20,9 @@ SHORTEST_BEYOND = 1e-6
 SHORTEST_INVERTED = 1e-3
 """Shortest increment to a place where a cell turns inside out, over that step."""
 
+NEARLY = 1e-3
+"""Load below a limit point, over it, that may be above it all the same: the limit point is estimated."""
+
 MOST_BEHIND = 60
 """Points of a path behind a limit point that are looked at for a stable one that carries the load."""
 
@@ -44,6 +47,9 @@ class Continued(Protocol):
 
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
         """Factor of the tangent of resistance less load."""
+
+    def holds(self, s: float, displacements: np.ndarray) -> bool:
+        """Whether displacements, in equilibrium or not, have a tangent without negative eigenvalues."""
 
     def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
         """Negative eigenvalues of the tangent, and whether the equilibrium flutters."""
@@ -187,8 +193,8 @@ def continued(
     except SingularError:
         return Continuation(limit, lost, None)
     most, growth, way, loads = MOST_BEYOND, 1.5, [0.0], [load]
+    watched = problem.holds(load, last)  # under a follower pressure the symmetric part may be indefinite all along
     while most:
-        most -= 1
         found, length = next_point(problem, target, point, direction, length, SHORTEST_BEYOND * increment)
         if found is None:
             break
@@ -197,13 +203,19 @@ def continued(
             if length < SHORTEST_INVERTED * increment:
                 return Continuation(limit, lost, None, inverts=True)
             continue
+        unstable = found.negative_pivots > pivots
+        half = 0.5 * (point.load + found.load)
+        middle = problem.moved(half, network.expand(0.5 * (point.u + found.u)))
+        if watched and not unstable and point is stable and not problem.holds(half, middle):
+            length *= BEYOND  # it has left the path
+            continue
+        most -= 1
         way += [way[-1] + float(np.linalg.norm(found.u - point.u))]
         loads += [found.load]
-        falls, unstable = abs(found.load) < abs(point.load), found.negative_pivots > pivots
-        if np.isnan(limit) and falls and unstable:
+        if np.isnan(limit) and abs(found.load) < abs(point.load) and unstable:
             limit, lost = _top(way, loads), np.nan if lost == point.load else lost
-            if not farthest:  # the top may be above the load all the same, between two points below it
-                return Continuation(limit, lost, stable if abs(limit) >= abs(target) else None)
+            if not farthest:  # the top is between two points: a load next to it may be carried
+                return Continuation(limit, lost, stable if abs(limit) >= (1 - NEARLY) * abs(target) else None)
             most, increment = MOST_BEHIND, max(increment, farthest)
         elif np.isnan(lost) and unstable:
             lost = found.load

@@ -336,7 +336,7 @@ class StaticProblem:
         network = self.network
         if network.largest_change(displacements) <= UNSNAPPED:
             return ""
-        if network.is_stable(0.5 * displacements, self._follower_at(0.5 * s)):
+        if self.holds(0.5 * s, 0.5 * displacements):
             return ""
         found = self.nonlinear(s)
         status, message, _ = self.judge(s, found)
@@ -368,7 +368,19 @@ class StaticProblem:
             work = (to - s) * float(self.load_at(there) @ along)
             if abs(float(self.balance(half, middle)[0] @ along)) <= SLACK * abs(work):
                 return True
-        return not network.inverted(middle) and network.is_stable(middle, self._follower_at(half))
+        return self.holds(half, middle)
+
+    def holds(self, s: float, displacements: np.ndarray) -> bool:
+        """Whether no cell is inside out and the symmetric part of the tangent is positive definite at displacements.
+
+        Parameters
+        ----------
+        s : float
+            Force over the reference stiffness [m].
+        displacements : ndarray of float, shape (n_points, 2)
+            In equilibrium or not [m].
+        """
+        return not self.network.inverted(displacements) and self.network.is_stable(displacements, self._follower_at(s))
 
     def _unstable(self, s: float, found: Equilibrium) -> bool:
         """Whether a path leaves an equilibrium; flutter on the way is no matter of where it leads."""
