@@ -1,6 +1,6 @@
 """Displacement over uniform stiffness: one equilibrium path serves all stiffnesses and forces of one sign."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,7 +71,11 @@ def meeting(path: LinearPath | StablePath, force: float, stiffness: np.ndarray, 
     """
     if objection:
         return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")
-    return best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
+    best = best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
+    if isinstance(path, LinearPath) and best.status is Status.SOLVED:
+        # In proportion: to the last digit the same from all points of a curve.
+        return replace(best, stiffness=path.value(force) / reference)
+    return best
 
 
 def ending(path: LinearPath | StablePath, force: float, stable: np.ndarray) -> str:
