@@ -334,9 +334,7 @@ class StaticProblem:
             [m]
         """
         network = self.network
-        if network.largest_change(displacements) <= UNSNAPPED:
-            return ""
-        if self.holds(0.5 * s, 0.5 * displacements):
+        if network.largest_change(displacements) <= UNSNAPPED or self.holds(0.5 * s, 0.5 * displacements):
             return ""
         found = self.nonlinear(s)
         status, message, _ = self.judge(s, found)

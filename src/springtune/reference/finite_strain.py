@@ -180,9 +180,8 @@ def _solve(
     sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
     name = f"{beam.name}, {material.name}"
     coarse, fine = (sheet.solve(stress, name, watched) for sheet, watched in zip(sheets, (True, False)))
-    if not abs(coarse.mean - fine.mean) <= SAME_PATH * abs(
-        fine.mean
-    ):  # it may have snapped where the coarse one has not
+    # The finer mesh may have snapped where the coarser one has not.
+    if not abs(coarse.mean - fine.mean) <= SAME_PATH * abs(fine.mean):
         fine = sheets[1].solve(stress, name)
     # Lengths are over half the height.
     scale = beam.height / 2
