@@ -37,8 +37,8 @@ extensions = [
 ]
 
 root_doc = "docs/index"
-include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "config/README.md", "workflow/profiles/README.md"]
-include_patterns += ["docs/**.md", "docs/reference/generated/*"]
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "config/README.md"]
+include_patterns += ["workflow/profiles/README.md", "docs/**.md", "docs/reference/generated/*"]
 exclude_patterns = ["docs/README.md"]  # the list of pages where there is no sidebar
 templates_path = [str(DOCS / "templates")]  # some look for it from the sources
 
@@ -75,7 +75,7 @@ html_theme_options = {
     "footer_end": [],
     "secondary_sidebar_items": ["page-toc"],
 }
-html_sidebars = {"docs/index": [], "README": [], "CHANGELOG": [], "CONTRIBUTING": []}
+html_sidebars = {"docs/index": [], "README": [], "CHANGELOG": [], "CONTRIBUTING": [], "SECURITY": []}
 html_context = {"default_mode": "light"}
 pygments_style = "default"
 

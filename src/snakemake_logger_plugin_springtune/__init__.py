@@ -7,7 +7,7 @@ something to do.
 import os
 import sys
 from argparse import ArgumentError, ArgumentParser
-from logging import ERROR, WARNING, LogRecord
+from logging import ERROR, WARNING, Handler, LogRecord
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,6 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from logging import Handler
 
     from .display import Display
 
@@ -79,8 +78,13 @@ class LogHandler(LogHandlerBase):
     Snakemake prints without a plugin.
     """
 
+    latest: "LogHandler | None" = None
+    """The handler of this run, for the Snakefile; None where Snakemake logs without this plugin."""
+
     def __post_init__(self) -> None:
+        Handler.__init__(self)  # the interface before 2.0 leaves it out
         _check_study(sys.argv[1:])
+        LogHandler.latest = self
         self.display: Display | None = None
         self.plain: Handler | None = None
         self.results: Path | None = None  # the Snakefile says it
@@ -191,7 +195,7 @@ class LogHandler(LogHandlerBase):
             self.display.stop()
             self.display = None
 
-    def _plain(self) -> "Handler":
+    def _plain(self) -> Handler:
         """Snakemake's own handler, which writes where it would without a plugin."""
         if self.plain is None:
             from snakemake.logging import ColorizingTextHandler

@@ -55,6 +55,9 @@ NEEDED = [*DECLARED["dependencies"], *DECLARED["optional-dependencies"]["cholesk
 NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
 """Packages that physics may need. Snakemake is none, and what it needs may have no wheel for the newest Python."""
 
+SNAKEMAKE = [one for one in DECLARED["dependencies"] if one.startswith("snakemake")]
+"""Snakemake and the interface of its loggers."""
+
 TESTERS = [one for one in DECLARED["optional-dependencies"]["test"] if re.match("hypothesis|mujoco|pytest", one)]
 
 PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.search(r":: 3\.\d+$", one)]
@@ -240,3 +243,36 @@ def test_files_for_mujoco_3_hold_in_it(version, tmp_path):
     """The first that has a flex's elasticity, the last with wrong forces on its rollers, and the last of version 3."""
     python = environment(tmp_path / "venv", sys.executable, [*NEEDED, f"mujoco=={version}"])
     physics(python, "tests/physics/test_simulators.py")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "packages",
+    [
+        pytest.param([one.replace(">=", "==") for one in SNAKEMAKE], id="oldest"),
+        pytest.param(["snakemake==9.16.3", "snakemake-interface-logger-plugins==1.2.4"], id="between"),
+        pytest.param(SNAKEMAKE, id="newest"),
+    ],
+)
+def test_the_quick_study_runs_with_this_snakemake(packages, tmp_path):
+    """The same scenes are solved, and a run with nothing to do says so, whichever private names it has."""
+    python = environment(tmp_path / "venv", sys.executable, [*NEEDED, *packages])
+    study = tmp_path / "study"
+    study.mkdir()
+    for name in ("Snakefile", "workflow", "config", "src"):
+        (study / name).symlink_to(REPOSITORY / name)
+    path = os.pathsep.join([str(python.parent), os.environ["PATH"]])
+    here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src"), "PATH": path, "CI": "true"}
+    call = [str(python), "-m", "snakemake", "--configfile", "config/quick.yaml", "--cores", "2"]
+    call += ["--workflow-profile", "workflow/profiles/default"]
+
+    def run(*options):
+        done = subprocess.run([*call, *options], cwd=study, env=here, capture_output=True, text=True)
+        said = done.stdout + done.stderr
+        assert done.returncode == 0, said[-3000:]
+        assert "Error" not in said, said
+        return said
+
+    assert "collect" in run("--dry-run")
+    assert re.search(r"^new +(?!nothing)\w", run(), re.M)
+    assert "Nothing to be done" in run()

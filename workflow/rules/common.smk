@@ -9,6 +9,7 @@ from pathlib import Path
 
 from snakemake.logging import logger
 from snakemake.settings.enums import Quietness
+from snakemake_logger_plugin_springtune import LogHandler
 
 from springtune.campaign import due, locks, workload
 from springtune.campaign.plan import plan, stages
@@ -61,10 +62,9 @@ READ.append((STUDY, PLAN))
 SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
 CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
 
-HANDLERS = workflow.logger_manager.get_log_handlers()
-if "study" not in config:
-    for handler in HANDLERS:
-        handler.results = RESULTS  # whose summary to show where nothing is to be done
+DISPLAY = LogHandler.latest
+if "study" not in config and DISPLAY:
+    DISPLAY.results = RESULTS  # whose summary to show where nothing is to be done
 
 
 def done(stage):
@@ -172,10 +172,10 @@ def asks_for_storage():
 
 
 LOOKING = {
-    "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--filegraph", "--lc", "--li", "--lint", "--list",
-    "--list-changes", "--list-code-changes", "--list-input-changes", "--list-params-changes", "--list-rules",
-    "--list-target-rules", "--list-targets", "--list-untracked", "--lp", "--lt", "--lu", "--report", "--rulegraph", "--summary",
-    "--unlock", "-D", "-S", "-l",
+    "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--dry-run", "--dryrun", "--filegraph",
+    "--lc", "--li", "--lint", "--list", "--list-changes", "--list-code-changes", "--list-input-changes", "--list-params-changes",
+    "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp", "--lt", "--lu", "--report",
+    "--rulegraph", "--summary", "--unlock", "-D", "-S", "-l", "-n", "-np",
 }  # fmt: skip
 """Options of Snakemake by which nothing is computed."""
 
@@ -187,7 +187,7 @@ def release():
         why = f"{Path.cwd()} cannot be written, and Snakemake wants to even where it only looks"
         print(f"{why}; `springtune info`, `browse` and `verify` do not: call these", file=sys.stderr)
         sys.exit(1)
-    looking = any(handler.common_settings.dryrun for handler in HANDLERS if hasattr(handler, "common_settings"))
+    looking = DISPLAY is not None and DISPLAY.common_settings.dryrun
     looking |= any(word.partition("=")[0] in LOOKING for word in sys.argv[1:])
     if looking or not workflow.is_main_process:
         return
@@ -228,7 +228,6 @@ def tell_end(how):
     from springtune.campaign import summary  # here: only a run needs it
 
     locks.end()
-    since = workflow.start_time.timestamp()
-    text = getattr(summary, how)(*READ[0], since)
-    text += "".join(summary.beside(*one, since) for one in READ[1:])
+    text = getattr(summary, how)(*READ[0], BEGUN)
+    text += "".join(summary.beside(*one, BEGUN) for one in READ[1:])
     logger.info(text, extra={"ends": True})

@@ -2,11 +2,15 @@
 
 import os
 import sys
+import time
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
 from springtune.jobs.run_tasks import STATE, source_state
+
+BEGUN = time.time()
+"""When this run began [s since the epoch]: what is newer was made by it."""
 
 # One thread a process: the solvers are sequential, and cores are Snakemake's to share out.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
