@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from springtune.campaign import contents, environment, provenance, reproduction
 from springtune.cli import main
+from springtune.jobs import sealed
 from springtune.kinds import load_study
 from springtune.output import reading
 from springtune.output.comparison import Tolerance, compare
@@ -406,6 +407,48 @@ class TestVerify:
         if not faults:  # a bit that says nothing of the content, such as of a time
             with zipfile.ZipFile(io.BytesIO(changed)) as file:
                 assert {name: file.read(name) for name in file.namelist()} == packed
+
+
+class TestResults:
+    """`springtune verify` of the results themselves."""
+
+    def test_every_damaged_file_is_named_and_set_aside(self, checkout):
+        folder, command = Path("results/one"), ("verify", "results/one", "--scenes", "0")
+        before = run(*command)
+        assert before.exit_code == 0 and "faults: 0" in before.stdout, before.output
+        products = {path.stem: sealed.demand(path)["products"] for path in folder.glob("done/*.json")}
+        everything = [*folder.glob("done/*.json"), *folder.glob("tasks/*.json")]
+        everything += [Path(name) for made in products.values() for name in made]
+        assert f"{len(everything)} files compared" in before.stdout
+        page, solved = ([*made] for name, made in products.items() if name.startswith(("present_scenes", "solve")))
+        damaged = [*map(Path, page), *(folder / name for name in ("dataset.nc", "summary.txt", "index.html"))]
+        damaged += [folder / "done/solve_0.json", folder / "tasks/bundles.json", Path(solved[0])]
+        damaged += folder.glob("meshes/*")
+        assert len(damaged) > 9 and len(page) > 1  # several of one job
+        for path in damaged:
+            path.write_bytes(path.read_bytes()[:-3] + b"???")
+        gone = next(folder.glob("references/*.h5"))
+        gone.unlink()
+        result = run(*command, "--set-aside")
+        assert result.exit_code == 1 and f"faults: {len(damaged) + 1}\n" in result.stdout, result.output
+        assert f"{gone} is missing" in result.stdout
+        moved = {line.split()[-1] for line in result.stdout.splitlines() if "  set aside:" in line}
+        assert moved == {*map(str, damaged)}
+        for path in damaged:
+            assert f"{path} is damaged\n" in result.stdout and not path.exists()
+            assert path.with_name(f"{path.name}.damaged").exists()
+        do("config/one.yaml")
+        after = run(*command)
+        assert after.exit_code == 0 and "faults: 0" in after.stdout, after.output
+        assert f"{len(everything)} files compared" in after.stdout
+
+    def test_more_faults_than_a_screen_has_lines_are_named(self, checkout):
+        record = Path("results/one/done/collect.json")
+        found = sealed.demand(record)
+        found["products"] |= {f"results/one/{number}.csv": [1, 1, "0"] for number in range(60)}
+        sealed.write(record, found)
+        result = run("verify", "results/one", "--scenes", "0")
+        assert result.stdout.count(".csv is missing\n") == 60 and "faults: 60\n" in result.stdout, result.stdout
 
 
 class TestEnvironment:

@@ -270,12 +270,12 @@ def _other_library(packed: Path) -> str:
     return next(others, "")
 
 
-def _unfinished(study: "Study", folder: Path, faults: dict[str, str], stale: Iterable[str]) -> str:
-    said = [f"{name}: {why}" for name, why in faults.items()]
+def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> str:
+    said = [f"{name}: {why}" for name, why in faults]
     said += [f"{name}: the study or the program changed since" for name in stale]
     shown = said[:MOST_TOLD] + ([f"and {len(said) - MOST_TOLD} more"] if len(said) > MOST_TOLD else [])
     remedy = f"springtune run {study.path}"
-    if any(why.endswith(records.DAMAGED) for why in faults.values()):
+    if any(why.endswith(records.DAMAGED) for _, why in faults):
         remedy = f"springtune verify {study.path} --set-aside, then {remedy}"
     lines = [f"{folder}: is not what the study asks for now, and is not archived", *shown, f"make it: {remedy}"]
     return "\n  ".join(lines)
