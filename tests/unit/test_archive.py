@@ -3,10 +3,12 @@
 import hashlib
 import io
 import json
+import os
 import platform
 import shutil
 import subprocess
 import sys
+import warnings
 import zipfile
 from contextlib import chdir
 from pathlib import Path, PurePosixPath
@@ -19,7 +21,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.campaign import contents, environment, provenance, reproduction
+from springtune.campaign import archive, contents, environment, provenance, reproduction
 from springtune.cli import main
 from springtune.jobs import sealed
 from springtune.kinds import load_study
@@ -344,9 +346,9 @@ class TestRefusals:
         refused(run("archive", "results/one"), "springtune[archive]")
 
 
-def rewritten(packed, target, **changes):
+def rewritten(packed, target, method=zipfile.ZIP_STORED, **changes):
     """An archive of which some files are others, or None: not there."""
-    with zipfile.ZipFile(target, "w") as file:
+    with zipfile.ZipFile(target, "w", method) as file:
         for name, content in (packed | changes).items():
             if content is not None:
                 file.writestr(name, content)
@@ -386,6 +388,101 @@ class TestVerify:
         refused(run("verify", tmp_path / "other.zip"), "is no archive of a study")
         rewritten(packed, tmp_path / "one.zip", **{"ro-crate-metadata.json": b'{"@graph": []}'})
         refused(run("verify", tmp_path / "one.zip"), "its ro-crate-metadata.json is damaged")
+
+    @pytest.mark.parametrize("name", ["ro-crate-metadata.json", "SHA256SUMS", "code/src/springtune/units.py"])
+    def test_sizes_are_compared_before_anything_is_read(self, packed, tmp_path, monkeypatch, name):
+        blanks = {name: packed[name] + b" " * reproduction.MOST_TEXT}
+        path = rewritten(packed, tmp_path / "one.zip", zipfile.ZIP_DEFLATED, **blanks)
+        monkeypatch.setattr(reproduction, "MOST_RATIO", 1)
+        monkeypatch.setattr(zipfile.ZipFile, "open", lambda *_: pytest.fail("is read"))
+        result = run("verify", path)
+        refused(result, f"{path}: ", " bytes unpacked, and at most ", "; get it again")
+        assert result.stderr.count("\n") == 1
+
+    def test_members_are_counted_before_anything_is_read(self, packed, tmp_path, monkeypatch):
+        path = rewritten(packed, tmp_path / "one.zip")
+        monkeypatch.setattr(zipfile.ZipFile, "open", lambda *_: pytest.fail("is read"))
+        monkeypatch.setattr(reproduction, "MOST_FILES", 7)
+        refused(run("verify", path), f"{path}: has {len(packed)} files, and at most 7 are read; get it again")
+        monkeypatch.setattr(zipfile, "ZipInfo", lambda *_: pytest.fail("is made"))
+        monkeypatch.setattr(reproduction, "MOST_TEXT", 100)  # its list of contents is longer
+        refused(run("verify", path), "is no whole zip file (more than 100 bytes at once)")
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            b"[" * 200_000 + b"]" * 200_000,
+            b'{"@graph": ' + b"[" * 990 + b"]" * 990 + b"}",
+            b"\xff\xfe\x00",
+            b'{"@graph": [{"@id": []}]}',
+            b'{"@graph": [7]}',
+            b"9" * 5000,
+            ("@id", 7),
+            ("@id", "\ud800"),
+            ("sha256", ["f00d"]),
+            ("value", "inf"),
+            ("value", {}),
+            ("name", ["a"]),
+            ("version", None),
+            ("workExample", {"@id": "../../etc/passwd"}),
+            ("workExample", {"@id": "results/dataset.nc"}),
+            ("workExample", [1]),
+            ("conformsTo", [[]]),
+        ],
+        ids=lambda given: ascii(given)[:40],
+    )
+    def test_metadata_that_is_malformed_is_one_line(self, packed, tmp_path, content):
+        name = "ro-crate-metadata.json"
+        if isinstance(content, tuple):
+            key, value = content
+            found = json.loads(packed[name])
+            first = next(one for one in found["@graph"] if key in one and (key != "value" or one["@id"][-2:] == "-s"))
+            if key in ("name", "version", "conformsTo"):
+                first = next(one for one in found["@graph"] if one["@id"] == "./")
+            first[key] = value
+            content = json.dumps(found).encode()
+        path = rewritten(packed, tmp_path / "one.zip", SHA256SUMS=None, **{name: content})
+        result = run("verify", path)
+        refused(result, f"{path}: is no archive of a study of springtune, or its {name} is damaged; get it again")
+        assert result.stderr.count("\n") == 1 and not result.stdout
+
+    @pytest.mark.parametrize(
+        ("name", "said"),
+        [
+            ("/etc/passwd", "leads out of the archive"),
+            ("code/../../x", "leads out of the archive"),
+            ("code\\..\\x", "leads out of the archive"),
+            ("code/./x", "is no plain name"),
+            ("code//x", "is no plain name"),
+            ("x" * 2000, "is no plain name"),
+            ("", "is no plain name"),
+            ("code/Snakefile", "is there twice"),
+            ("code/Snakefile/x", "is a file and a folder"),
+            ("link", "is a link or a device"),
+            ("other", "is packed by another method"),
+        ],
+    )
+    def test_members_that_are_no_plain_files(self, packed, tmp_path, name, said):
+        path, info = rewritten(packed, tmp_path / "one.zip"), zipfile.ZipInfo(name)
+        if name == "link":
+            info.external_attr = 0o120777 << 16
+        if name == "other":
+            info.compress_type = zipfile.ZIP_BZIP2
+        with zipfile.ZipFile(path, "a") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of names that are there twice
+            file.writestr(info, "/etc/passwd")
+        result = run("verify", path)
+        assert result.exit_code == 1 and said in result.stdout, result.output
+        assert not isinstance(result.exception, Exception) and "faults: 0" not in result.stdout
+
+    def test_what_is_no_regular_file_is_not_read(self, tmp_path):
+        os.mkfifo(tmp_path / "one.zip")
+        refused(run("verify", tmp_path / "one.zip"), "one.zip: is no file; give an archive")
+
+    def test_what_could_not_be_checked_is_not_written(self, checkout, monkeypatch):
+        monkeypatch.setattr(archive, "MOST_FILES", 7)
+        refused(run("archive", "results/one"), "files, and an archive holds at most 7")
+        assert not list(Path("results").glob("*.zip*"))
 
     def test_options_of_the_other_kind_are_wrong_calls(self, made):
         path = made / "results/one.crate.zip"

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from ..jobs import atomic, records
 from . import crate
-from .contents import CITATION, METADATA, SUMS, ArchiveError, gather, of_text
+from .contents import CITATION, METADATA, MOST_FILES, MOST_TEXT, SUMS, ArchiveError, gather, of_text
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -71,8 +71,19 @@ def write(
         packed |= {METADATA: of_text(METADATA, crate.metadata(found, cited))}
         sums = "".join(f"{one.sha256}  {name}\n" for name, one in sorted(packed.items()))
         packed |= {SUMS: of_text(SUMS, sums)}
+        _check(packed)
         _zip(target, packed.values())
     return records.checksum(target)
+
+
+def _check(packed: "dict[str, Packed]") -> None:
+    """Refuse what `springtune verify` would not read."""
+    texts = max(packed[name].size for name in (METADATA, SUMS))
+    if len(packed) > MOST_FILES or texts > MOST_TEXT:
+        raise ArchiveError(
+            f"{len(packed)} files, and an archive holds at most {MOST_FILES}, with {MOST_TEXT} bytes of metadata; "
+            "leave out --with-store, or archive parts of the study"
+        )
 
 
 def _zip(target: Path, packed: "Iterable[Packed]") -> None:

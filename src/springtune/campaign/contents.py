@@ -60,6 +60,9 @@ NEW = ("src", "workflow", "tools", "requirements")
 NOT_PACKED = ("__pycache__", ".egg-info", ".pyc", ".DS_Store")
 """Endings of names of files and folders that are made of others."""
 
+MOST_FILES, MOST_TEXT = 100_000, 2**24
+"""Files of an archive, and bytes of its metadata or checksums; parsed these take thirty times as much memory."""
+
 MOST_TOLD = 5
 """Most jobs that are told in a refusal."""
 
