@@ -39,7 +39,7 @@ UNZIPPED = 2**20
 MOST_RATIO = 100
 """So many times as large as packed an archive may be; those of studies are some times as large."""
 
-LONGEST_NAME = 1000
+LONGEST_MEMBER = 1000
 """Characters of a file's name in an archive."""
 
 
@@ -183,7 +183,7 @@ def _unusual(info: zipfile.ZipInfo) -> str:
     name, place = info.filename.removesuffix("/"), PurePosixPath(info.filename)
     if place.is_absolute() or ".." in place.parts or "\\" in name:
         return "leads out of the archive"
-    if str(place) != name or len(name) > LONGEST_NAME:
+    if str(place) != name or len(name) > LONGEST_MEMBER:
         return "is no plain name"
     if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is a link or a device"

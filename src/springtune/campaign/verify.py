@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..jobs import atomic, records, sealed, store
-from ..jobs.damage import ASIDE, rename
+from ..jobs.damage import ASIDE, DamagedError, rename
 from ..jobs.guard import LIMITS_TOLD
 from ..jobs.keys import installed
 from ..jobs.run_tasks import RECORDS, TASKS
@@ -48,8 +48,17 @@ SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
 others, whose factors round differently; equilibria are solved to 1e-10 of the load."""
 
 
+def _is_whole(path: Path) -> bool:
+    """Whether a file of results is what was written."""
+    try:
+        store.contents(path)
+    except DamagedError:
+        return False
+    return True
+
+
 SEALS: dict[str, Callable[[Path], bool]] = {
-    ".h5": store.is_whole,
+    ".h5": _is_whole,
     ".json": lambda path: sealed.read(path) is not None,
 }
 """Whether a file is as it was written, by the checksum in it; by the file's ending."""

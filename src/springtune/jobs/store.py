@@ -55,15 +55,6 @@ def _checked(path: str | Path) -> None:
         raise DamagedError(path, "its checksum is not that of its content" if whole else "it is no file of results")
 
 
-def is_whole(path: str | Path) -> bool:
-    """Whether a file is what was written, by its checksum."""
-    try:
-        _checked(path)
-    except DamagedError:
-        return False
-    return True
-
-
 def _user_block(image: bytes) -> bytes:
     return (MAGIC + hashlib.sha256(image).hexdigest().encode()).ljust(USER_BLOCK, b"\0")
 
