@@ -99,7 +99,7 @@ def _tell(found: "Contents") -> None:
     if found.departures:
         said = ", ".join(f"{name} {used} (locked: {locked})" for name, (locked, used) in found.departures.items())
         click.echo(f"  made with other versions than the lock file's, so others get the same to rounding only: {said}")
-    if not found.machine:
+    if not found.machine and "host" not in found.untold:
         click.echo("  computed on other machines, at least in part, of which no cores and no processor are told")
 
 
