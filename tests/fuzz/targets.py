@@ -1,14 +1,19 @@
-"""What is fed: studies, mesh files, datasets and nets, as bytes and by their structure."""
+"""What is fed: studies, mesh files, datasets, nets and archives, as bytes and by their structure."""
 
+import hashlib
 import io
+import json
 import os
 import random as generators
 import shutil
 import tempfile
+import warnings
+import zipfile
 from contextlib import redirect_stdout
 from functools import cache
 from pathlib import Path
 
+import click
 import h5py
 import meshio
 import numpy as np
@@ -18,6 +23,9 @@ from mutations import WORDS, spoil_bytes, spoil_tree
 
 import springtune as st
 from springtune.browse.page import page
+from springtune.campaign import reproduction
+from springtune.campaign.contents import METADATA, SUMS
+from springtune.cli.archived import verified
 from springtune.cli.diff import comparison_text
 from springtune.cli.info import info_text
 from springtune.handover.formats import ENDINGS
@@ -415,8 +423,122 @@ def read_net(path):
     return "accepted"
 
 
+# -- archives ----------------------------------------------------------------------------------------------------------
+
+
+@cache
+def _archived():
+    """Files of a small archive, and its metadata as a tree."""
+    snakefile, config, dataset = "code/Snakefile", "code/config/one.yaml", "results/one/dataset.nc"
+    files = {snakefile: b"rule all:\n", config: b"title: One\n", dataset: bytes(range(256)) * 40}
+    files["code/plate mesh.vtu"] = b"<VTKFile>" * 500
+    described = [
+        {"@id": name.replace(" ", "%20"), "@type": "File", "sha256": hashlib.sha256(content).hexdigest()}
+        for name, content in files.items()
+    ]
+    described[0] |= {"input": {"@id": "#study"}, "output": {"@id": "#dataset"}}
+    described += [
+        {"@id": "./", "name": "One", "version": "0.1.0", "conformsTo": [{"@id": reproduction.MADE_BY}]},
+        {"@id": "#study", "workExample": {"@id": config}},
+        {"@id": "#dataset", "workExample": {"@id": dataset}},
+        {"@id": "#machine-cores", "@type": "PropertyValue", "name": "cores", "value": "2"},
+        {"@id": "#collect-s", "@type": "PropertyValue", "name": "wall time", "value": "0.25"},
+    ]
+    return files, {"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": described}
+
+
+def _sums(files):
+    return "".join(f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in files.items()).encode()
+
+
+def _zipped(files):
+    """Bytes of a zip file of members: names or their ZipInfo, and contents."""
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of names that are there twice
+        for name, content in files:
+            archive.writestr(name, content)
+    return target.getvalue()
+
+
+@cache
+def _archive():
+    files, tree = _archived()
+    files = files | {METADATA: json.dumps(tree).encode()}
+    return _zipped([*files.items(), (SUMS, _sums(files))])
+
+
+def archive_bytes(random, folder):
+    path, content = folder / "one.zip", _archive()
+    # Where the lists of contents are, or anywhere.
+    start = content.index(b"PK\1\2") if random.random() < 0.5 else 0
+    path.write_bytes(content[:start] + spoil_bytes(random, content[start:], (METADATA, SUMS, "../", "PK\1\2")))
+    return path, False
+
+
+NAMES = (
+    "/etc/passwd",
+    "../x",
+    "code/../../x",
+    "code//x",
+    "./x",
+    "code/Snakefile/x",
+    "",
+    "x" * 60_000,
+    "a\nb",
+    "\\x",
+    "ü",
+)
+"""Names that no archive has."""
+
+
+def archive_structure(random, folder):
+    """An archive of which metadata, checksums or members are others; its other checksums are right."""
+    path, (files, tree) = folder / "one.zip", _archived()
+    text = json.dumps(spoil_tree(random, tree) if random.random() < 0.6 else tree).encode()
+    kind = random.randrange(8)
+    if kind == 0:
+        text = random.choice((b"[", b'{"a":')) * random.choice((900, 30_000, 300_000))
+    elif kind == 1:
+        text = random.choice((b"\0", b" ", b"[[],[]," * 20)).ljust(100, b" ") * random.choice((10, 1000, 200_000))
+    elif kind == 2:
+        text = text.replace(b'"', random.choice((b"'", b'\\"', b'"\\ud800')), random.randrange(1, 9))
+    files = files | {METADATA: text}
+    sums = _sums(files)
+    if kind == 3:
+        sums = random.choice((b"\n", b" ", b"\xff", sums[:70])) * random.choice((1, 300, 20_000, 300_000))
+    members = [*files.items(), (SUMS, sums)]
+    if kind in (4, 5):
+        info = zipfile.ZipInfo(random.choice((*NAMES, *files)))
+        info.external_attr = random.choice((0, 0o120777, 0o020666, 0o040755)) << 16
+        info.compress_type = random.choice((zipfile.ZIP_STORED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA))
+        members.insert(random.randrange(len(members) + 1), (info, bytes(random.choice((0, 10, 3_000_000)))))
+    elif kind == 6:
+        members += [(f"{number}/", b"") for number in range(random.choice((10, 3000)))]
+    elif kind == 7:
+        del members[random.randrange(len(members))]
+    path.write_bytes(_zipped(members))
+    return path, True
+
+
+def read_archive(made):
+    """Check an archive as `springtune verify` does; without a fault it holds what was packed."""
+    path, rewritten = made
+    try:
+        whole = verified(path, again=False, fresh=False)
+    except click.ClickException as error:
+        if "\n" in error.message:
+            raise Wrong(f"is refused in several lines: {error.message[:300]!r}") from None
+        raise Refused(error.message) from None
+    if whole and not rewritten:
+        with zipfile.ZipFile(path) as archive, zipfile.ZipFile(io.BytesIO(_archive())) as sound:
+            if any(archive.read(name) != sound.read(name) for name in sound.namelist()):
+                raise Wrong("is accepted, and holds what was not packed")
+    return "accepted" if whole else "faulty"
+
+
 TARGETS = (
-    Target("studies as bytes", study_bytes, read_study, 32),
+    Target("studies as bytes", study_bytes, read_study, 29),
     Target("studies by structure", study_trees, read_study, 17),
     Target("mesh files as bytes", mesh_bytes, read_mesh, 14),
     Target("mesh files by structure", mesh_structure, read_mesh, 14),
@@ -424,6 +546,8 @@ TARGETS = (
     Target("datasets as bytes", dataset_bytes, read_dataset, 7),
     Target("datasets by structure", dataset_structure, read_dataset, 4),
     Target("nets as bytes", net_bytes, read_net, 4),
+    Target("archives as bytes", archive_bytes, read_archive, 1),
+    Target("archives by structure", archive_structure, read_archive, 2),
 )
 
 

@@ -12,13 +12,14 @@ from springtune.kinds.scenes import plan as scenes
 class Campaign:
     """A study of this folder, as it is to be run now."""
 
-    def __init__(self, config, cores=1):
+    def __init__(self, config, cores=1, chosen=None):
         for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
             cache.cache_clear()
         self.config, self.study = str(config), load_study(config)
         self.folder = Path("results") / self.study.name
         self.plan = plan(self.study, self.folder, cores)
-        self.jobs = due.jobs(self.study, self.plan)
+        self.chosen = chosen
+        self.jobs = due.jobs(self.study, self.plan, chosen)
 
     def due(self):
         """Names of the jobs that are to run, in order."""
@@ -60,7 +61,8 @@ class Campaign:
         if name in self.plan.jobs:
             self.do_stage(name)
         elif name == due.COLLECT:
-            collect.main(self.config, str(self.folder), dataset, str(job.record), job.digest)
+            untold = due.untold(self.folder, self.chosen)
+            collect.main(self.config, str(self.folder), dataset, str(job.record), job.digest, *untold)
         elif name == due.BROWSE:
             browse.main(dataset, job.products[0], str(job.record), job.digest, *due.linked(self.study))
         else:

@@ -63,12 +63,12 @@ def check_command(words, folder):
     elif name == "springtune":
         command = main.get_command(None, arguments[0])
         assert command is not None, words
+        known = {option for parameter in command.params for option in parameter.opts} | {"--help"}
         if arguments[0] == "run":  # what is not its own is Snakemake's
-            study, *options = (word for word in arguments[1:] if word != "--strict")
+            study, *options = (word for word in arguments[1:] if word not in known)
             parse_args([*options, "--configfile", study])
             load_study(folder / study)
             return
-        known = {option for parameter in command.params for option in parameter.opts} | {"--help"}
         assert {word for word in arguments if word.startswith("--")} <= known, words
 
 

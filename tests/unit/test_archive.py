@@ -1,13 +1,19 @@
 """A study is packed with all that it needs, once it is whole; whatever becomes of the archive is told."""
 
+import base64
 import hashlib
 import io
 import json
+import os
 import platform
+import re
 import shutil
+import struct
 import subprocess
 import sys
+import warnings
 import zipfile
+import zlib
 from contextlib import chdir
 from pathlib import Path, PurePosixPath
 
@@ -19,8 +25,9 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.campaign import contents, environment, provenance, reproduction
+from springtune.campaign import archive, contents, environment, provenance, reproduction
 from springtune.cli import main
+from springtune.jobs import sealed
 from springtune.kinds import load_study
 from springtune.output import reading
 from springtune.output.comparison import Tolerance, compare
@@ -88,15 +95,30 @@ def make_checkout(folder):
     (folder / ".gitignore").write_text("results/\n*.pyc\n")
 
 
-def do(config):
-    """Run a study in this process."""
-    campaign = Campaign(config)
+def do(config, chosen=None):
+    """Run a study in this process; names of the jobs that ran."""
+    campaign = Campaign(config, chosen=chosen)
     campaign.plan.write()
-    for name in campaign.due():
+    names = campaign.due()
+    for name in names:
         campaign.do(name)
         times = campaign.folder / f"benchmarks/{name}.tsv"
         times.parent.mkdir(exist_ok=True)
         times.write_text("s\th:m:s\tmax_rss\tcpu_time\n0.25\t0:00:00\tNA\t0.50\n")
+    return names
+
+
+def archived_files(result):
+    """Files of the archive that was written."""
+    assert result.exit_code == 0, result.output
+    with zipfile.ZipFile("results/one.crate.zip") as file:
+        return {name: file.read(name) for name in file.namelist()}
+
+
+def page_text(page):
+    """What a page to browse holds, unpacked."""
+    packed = re.findall(r'<script type="application/octet-stream"[^>]*>([^<]*)<', page)
+    return page + "".join(zlib.decompress(base64.b64decode(one)).decode(errors="replace") for one in packed)
 
 
 def git(*arguments):
@@ -219,33 +241,135 @@ class TestContents:
         with zipfile.ZipFile("merged.zip") as file:
             assert b"#machine-" not in file.read("ro-crate-metadata.json")
 
-    def test_commit_differences_and_new_files_are_told(self, checkout):
-        with open("Snakefile", "a") as file:
-            file.write("# changed\n")
-        Path("src/own.py").write_text('"""Mine."""\n')
-        Path("secret.txt").write_text("mine alone")
-        result = run("archive", "results/one")
-        assert "code.diff and 1 files that git does not know" in result.stdout, result.output
-        with zipfile.ZipFile("results/one.crate.zip") as file:
-            assert b"+# changed" in file.read("code.diff") and b"# changed" in file.read("code/Snakefile")
-            assert "code/src/own.py" in file.namelist() and "code/secret.txt" not in file.namelist()
-            text = file.read("ro-crate-metadata.json").decode()
-        assert git("rev-parse", "HEAD").strip() in text and "src/own.py." in text
+    def test_nothing_is_packed_but_what_the_study_needs(self, checkout):
+        for name in ("docs/own.md", "tests/own.py", "config/other.yaml", "notes.txt", "tools/other.sh"):
+            (checkout / name).parent.mkdir(exist_ok=True)
+            Path(name).write_text("known to git")
+        git("add", ".")
+        git("commit", "-q", "-m", "More")
+        found = archived_files(run("archive", "results/one"))
+        inside = {name.removeprefix("code/") for name in found if name.startswith("code/")}
+        folders = ("src/", "workflow/", "requirements/", "profiles/")
+        own = {"config/one.yaml", "config/forces.csv", "config/plate mesh.vtu"}
+        assert {name for name in inside if not name.startswith(folders)} == {*contents.CHECKOUT_FILES, *own} - {
+            *filter(lambda name: name.startswith(folders), contents.CHECKOUT_FILES)
+        }
 
-    def test_without_git_the_program_is_packed_as_it_is(self, checkout):
-        shutil.rmtree(".git")
+    def test_commit_and_differences_are_told_of_program_and_study_alone(self, checkout):
+        for name in (
+            "Snakefile",
+            "Makefile",
+            "pyproject.toml",
+            "config/one.yaml",
+            "workflow/profiles/slurm/config.yaml",
+        ):
+            with open(name, "a") as file:
+                file.write(f"# changed {name}\n")
+        Path("workflow/profiles/own.yaml").write_text("# changed token")
+        git("add", "workflow/profiles/own.yaml")
         result = run("archive", "results/one")
-        assert "no git here" in result.stdout, result.output
-        with zipfile.ZipFile("results/one.crate.zip") as file:
-            assert {"code/Snakefile", "code/profiles/default/config.yaml", "code/src/springtune/units.py"} <= {
-                *file.namelist()
-            }
-            assert "from no git checkout" in file.read("README.md").decode()
+        assert "packed as it is, with code.diff\n" in result.stdout, result.output
+        assert "(--untracked packs them): workflow/profiles/own.yaml\n" in result.stdout
+        assert (
+            "packed as committed, since profiles are a user's own: profiles/slurm/config.yaml, workf" in result.stdout
+        )
+        found = archived_files(result)
+        lines = [line for line in found["code.diff"].decode().splitlines() if line.startswith("+# ")]
+        assert lines == ["+# changed Snakefile", "+# changed config/one.yaml"]
+        assert b"# changed" in found["code/Snakefile"] and b"# changed" in found["code/Makefile"]
+        assert "code/profiles/slurm/config.yaml" in found and "code/workflow/profiles/slurm/config.yaml" in found
+        for name, content in found.items():
+            assert b"# changed workflow" not in content and b"# changed token" not in content, name
+        assert git("rev-parse", "HEAD").strip() in found["ro-crate-metadata.json"].decode()
+
+    UNKNOWN = "src/token.txt", "tools/token.txt", "workflow/.env", "workflow/ignored.yaml"
+
+    def test_files_that_git_does_not_know_are_named_and_left_out(self, checkout):
+        for name in (*self.UNKNOWN, "secret.txt"):
+            Path(name).write_text("a token")
+        (checkout / ".gitignore").write_text("results/\n*.pyc\n.env\nignored.*\n")
+        result = run("archive", "results/one")
+        assert f"(--untracked packs them): {', '.join(self.UNKNOWN)}\n" in result.stdout, result.output
+        assert not [name for name, content in archived_files(result).items() if content == b"a token"]
+        result = run("archive", "results/one", "--untracked", "--force")
+        assert f"files that git does not know: {', '.join(self.UNKNOWN)}\n" in result.stdout, result.output
+        found = archived_files(result)
+        assert {name for name, content in found.items() if content == b"a token"} == {
+            f"code/{name}" for name in self.UNKNOWN
+        }
+        assert "src/token.txt, tools" in found["ro-crate-metadata.json"].decode()
+
+    def test_links_that_lead_out_are_left_out(self, checkout, tmp_path):
+        (tmp_path / "token.txt").write_text("a token")
+        Path("workflow/link.yaml").symlink_to(tmp_path / "token.txt")
+        git("add", "workflow/link.yaml")
+        git("commit", "-q", "-m", "Link")
+        for option in ((), ("--untracked", "--force")):
+            result = run("archive", "results/one", *option)
+            assert "workflow/link.yaml\n" in result.stdout, result.output
+            assert b"a token" not in archived_files(result).values()
+
+    def test_a_module_that_git_does_not_know_is_asked_for(self, checkout):
+        git("rm", "-q", "--cached", "src/springtune/units.py")
+        refused(
+            run("archive", "results/one"),
+            "src/springtune/units.py: the study is computed by it, and git does not know it; add it to git, or pack",
+        )
+        assert run("archive", "results/one", "--untracked").exit_code == 0
+
+    def test_without_git_files_are_packed_by_their_endings(self, checkout):
+        shutil.rmtree(".git")
+        for name in ("src/token.txt", "workflow/.env", "src/.own.py"):
+            Path(name).write_text("a token")
+        result = run("archive", "results/one")
+        assert "no git here" in result.stdout and "src/ .css, .html, .js, .py" in result.stdout, result.output
+        assert "src/.own.py, src/token.txt, workflow/.env\n" in result.stdout
+        found = archived_files(result)
+        assert {"code/Snakefile", "code/profiles/default/config.yaml", "code/src/springtune/units.py"} <= found.keys()
+        assert "from no git checkout" in found["README.md"].decode() and b"a token" not in found.values()
 
     @pytest.mark.skipif(not (REPOSITORY / ".git").exists(), reason="there is no git to ask")
     def test_without_git_nothing_is_forgotten_that_git_knows(self):
-        known = {name.partition("/")[0] for name in git("-C", REPOSITORY, "ls-files").splitlines()}
-        assert known - {*contents.TREE} == {".ci", ".pre-commit-config.yaml"}
+        known = git("-C", REPOSITORY, "ls-files", *contents.FOLDERS).splitlines()
+        assert len(known) > 300 and all(name.endswith(contents.FOLDERS[name.partition("/")[0]]) for name in known)
+
+    def test_the_page_says_no_more_of_the_machine_than_the_dataset(self, packed, made):
+        before = page_text((made / "results/one/index.html").read_text())
+        assert HOST in before and HOST not in page_text(packed["results/one/index.html"].decode())
+
+    def test_what_is_left_out_on_request_is_nowhere(self, checkout):
+        with open("Snakefile", "a") as file:
+            file.write("# token-of-mine\n")
+        Path("results/one/done/collect.json").unlink()
+        do("config/one.yaml")
+        assert "token-of-mine" in page_text(Path("results/one/index.html").read_text())
+        result = run("archive", "results/one", "--no-diff", "--no-host")
+        assert "packed as it is\n" in result.stdout and "other machines" not in result.stdout, result.output
+        found = archived_files(result)
+        told = [name for name, content in found.items() if b"token-of-mine" in content]
+        assert told == ["code/Snakefile"] and b"#machine" not in found["ro-crate-metadata.json"]
+        assert "token-of-mine" not in page_text(found["results/one/index.html"].decode())
+        assert "'git_diff' and 'host' of its attributes are blanked" in found["ro-crate-metadata.json"].decode()
+
+    def test_what_a_run_leaves_out_stays_out(self, checkout, monkeypatch):
+        monkeypatch.setattr(platform, "node", lambda: HOST)
+        with open("Snakefile", "a") as file:
+            file.write("# token-of-mine\n")
+
+        def told():
+            page = page_text(Path("results/one/index.html").read_text())
+            with reading.open("results/one") as tree:
+                texts = [tree.attrs["git_diff"] + tree.attrs["host"], page]
+            return [[word in text for word in ("token-of-mine", HOST)] for text in texts]
+
+        assert do("config/one.yaml", {"no_diff": True, "no_host": True})[0] == "collect"
+        assert told() == [[False, False]] * 2
+        assert run("verify", "results/one", "--scenes", "0").exit_code == 0
+        assert do("config/one.yaml") == []  # nothing is said: as before
+        found = archived_files(run("archive", "results/one"))
+        assert "code.diff" not in found and b"#machine" not in found["ro-crate-metadata.json"]
+        assert do("config/one.yaml", {"no_diff": False})[0] == "collect"
+        assert told() == [[True, False]] * 2
 
     def test_a_study_outside_of_the_checkout_comes_with_its_files(self, checkout, tmp_path):
         config = write_study(tmp_path / "elsewhere/deep")
@@ -343,9 +467,9 @@ class TestRefusals:
         refused(run("archive", "results/one"), "springtune[archive]")
 
 
-def rewritten(packed, target, **changes):
+def rewritten(packed, target, method=zipfile.ZIP_STORED, **changes):
     """An archive of which some files are others, or None: not there."""
-    with zipfile.ZipFile(target, "w") as file:
+    with zipfile.ZipFile(target, "w", method) as file:
         for name, content in (packed | changes).items():
             if content is not None:
                 file.writestr(name, content)
@@ -386,6 +510,106 @@ class TestVerify:
         rewritten(packed, tmp_path / "one.zip", **{"ro-crate-metadata.json": b'{"@graph": []}'})
         refused(run("verify", tmp_path / "one.zip"), "its ro-crate-metadata.json is damaged")
 
+    @pytest.mark.parametrize("name", ["ro-crate-metadata.json", "SHA256SUMS", "code/blanks.py"])
+    def test_sizes_are_compared_before_anything_is_read(self, packed, tmp_path, monkeypatch, name):
+        files = {"ro-crate-metadata.json": b"{}", name: bytes(17_000_000)}
+        path = rewritten(files, tmp_path / "one.zip", zipfile.ZIP_DEFLATED)
+        monkeypatch.setattr(zipfile.ZipFile, "open", lambda *_: pytest.fail("is read"))
+        result = run("verify", path)
+        refused(result, f"{path}: ", " bytes unpacked, and at most ", "; get it again")
+        assert result.stderr.count("\n") == 1
+
+    def test_members_are_counted_before_anything_is_read(self, tmp_path, monkeypatch):
+        path, end = rewritten({"a": b""}, tmp_path / "one.zip"), struct.Struct("<4s4H2LH")
+        content = path.read_bytes()
+        member = content[content.index(b"PK\1\2") : -end.size]
+        path.write_bytes(content[: -end.size] + 100_000 * member + end.pack(b"PK\5\6", 0, 0, 9, 9, 4_700_047, 31, 0))
+        monkeypatch.setattr(zipfile.ZipFile, "open", lambda *_: pytest.fail("is read"))
+        refused(run("verify", path), f"{path}: has 100001 files, and at most 100000 are read; get it again")
+        path.write_bytes(bytes(20_000_000) + end.pack(b"PK\5\6", 0, 0, 9, 9, 20_000_000, 0, 0))
+        refused(run("verify", path), "is no whole zip file (more than 16777216 bytes at once)")
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            b"[" * 200_000 + b"]" * 200_000,
+            b'{"@graph": ' + b"[" * 990 + b"]" * 990 + b"}",
+            b"\xff\xfe\x00",
+            b'{"@graph": [{"@id": []}]}',
+            b'{"@graph": [7]}',
+            b"9" * 5000,
+            ("@id", 7),
+            ("@id", "\ud800"),
+            ("sha256", ["f00d"]),
+            ("value", "inf"),
+            ("value", {}),
+            ("name", ["a"]),
+            ("version", None),
+            ("workExample", {"@id": "../../etc/passwd"}),
+            ("workExample", {"@id": "results/dataset.nc"}),
+            ("workExample", [1]),
+            ("conformsTo", [[]]),
+        ],
+        ids=lambda given: ascii(given)[:40],
+    )
+    def test_metadata_that_is_malformed_is_one_line(self, packed, tmp_path, content):
+        name = "ro-crate-metadata.json"
+        if isinstance(content, tuple):
+            key, value = content
+            found = json.loads(packed[name])
+            first = next(one for one in found["@graph"] if key in one and (key != "value" or one["@id"][-2:] == "-s"))
+            if key in ("name", "version", "conformsTo"):
+                first = next(one for one in found["@graph"] if one["@id"] == "./")
+            first[key] = value
+            content = json.dumps(found).encode()
+        path = rewritten(packed, tmp_path / "one.zip", SHA256SUMS=None, **{name: content})
+        result = run("verify", path)
+        refused(result, f"{path}: is no archive of a study of springtune, or its {name} is damaged; get it again")
+        assert result.stderr.count("\n") == 1 and not result.stdout
+
+    @pytest.mark.parametrize(
+        ("name", "said"),
+        [
+            ("/etc/passwd", "leads out of the archive"),
+            ("code/../../x", "leads out of the archive"),
+            ("code\\..\\x", "leads out of the archive"),
+            ("code/./x", "is no plain name"),
+            ("code//x", "is no plain name"),
+            ("x" * 2000, "is no plain name"),
+            ("", "is no plain name"),
+            ("code/Snakefile", "is there twice"),
+            ("code/Snakefile/x", "is a file and a folder"),
+            ("link", "is a link or a device"),
+            ("other", "is packed by another method"),
+        ],
+    )
+    def test_members_that_are_no_plain_files(self, packed, tmp_path, name, said):
+        path, info = rewritten(packed, tmp_path / "one.zip"), zipfile.ZipInfo(name)
+        if name == "link":
+            info.external_attr = 0o120777 << 16
+        if name == "other":
+            info.compress_type = zipfile.ZIP_BZIP2
+        with zipfile.ZipFile(path, "a") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of names that are there twice
+            file.writestr(info, "/etc/passwd")
+        result = run("verify", path)
+        assert result.exit_code == 1 and said in result.stdout, result.output
+        assert not isinstance(result.exception, Exception) and "faults: 0" not in result.stdout
+
+    def test_what_is_no_regular_file_is_not_read(self, tmp_path):
+        os.mkfifo(tmp_path / "one.zip")
+        refused(run("verify", tmp_path / "one.zip"), "one.zip: is no file; give an archive")
+
+    def test_what_could_not_be_checked_is_not_written(self):
+        def files(number, size):
+            text = contents.Packed("", b"", "", size)
+            return dict.fromkeys([*map(str, range(number)), "ro-crate-metadata.json", "SHA256SUMS"], text)
+
+        archive.check_limits(files(99_998, 2**24))
+        for number, size in ((99_999, 1), (1, 2**24 + 1)):
+            with pytest.raises(contents.ArchiveError, match="an archive holds at most 100000, with 16777216 bytes"):
+                archive.check_limits(files(number, size))
+
     def test_options_of_the_other_kind_are_wrong_calls(self, made):
         path = made / "results/one.crate.zip"
         assert run("verify", path, "--scenes", "3").exit_code == 2
@@ -406,6 +630,48 @@ class TestVerify:
         if not faults:  # a bit that says nothing of the content, such as of a time
             with zipfile.ZipFile(io.BytesIO(changed)) as file:
                 assert {name: file.read(name) for name in file.namelist()} == packed
+
+
+class TestResults:
+    """`springtune verify` of the results themselves."""
+
+    def test_every_damaged_file_is_named_and_set_aside(self, checkout):
+        folder, command = Path("results/one"), ("verify", "results/one", "--scenes", "0")
+        before = run(*command)
+        assert before.exit_code == 0 and "faults: 0" in before.stdout, before.output
+        products = {path.stem: sealed.demand(path)["products"] for path in folder.glob("done/*.json")}
+        everything = [*folder.glob("done/*.json"), *folder.glob("tasks/*.json")]
+        everything += [Path(name) for made in products.values() for name in made]
+        assert f"{len(everything)} files compared" in before.stdout
+        page, solved = ([*made] for name, made in products.items() if name.startswith(("present_scenes", "solve")))
+        damaged = [*map(Path, page), *(folder / name for name in ("dataset.nc", "summary.txt", "index.html"))]
+        damaged += [folder / "done/solve_0.json", folder / "tasks/bundles.json", Path(solved[0])]
+        damaged += folder.glob("meshes/*")
+        assert len(damaged) > 9 and len(page) > 1  # several of one job
+        for path in damaged:
+            path.write_bytes(path.read_bytes()[:-3] + b"???")
+        gone = next(folder.glob("references/*.h5"))
+        gone.unlink()
+        result = run(*command, "--set-aside")
+        assert result.exit_code == 1 and f"faults: {len(damaged) + 1}\n" in result.stdout, result.output
+        assert f"{gone} is missing" in result.stdout
+        moved = {line.split()[-1] for line in result.stdout.splitlines() if "  set aside:" in line}
+        assert moved == {*map(str, damaged)}
+        for path in damaged:
+            assert f"{path} is damaged\n" in result.stdout and not path.exists()
+            assert path.with_name(f"{path.name}.damaged").exists()
+        do("config/one.yaml")
+        after = run(*command)
+        assert after.exit_code == 0 and "faults: 0" in after.stdout, after.output
+        assert f"{len(everything)} files compared" in after.stdout
+
+    def test_more_faults_than_a_screen_has_lines_are_named(self, checkout):
+        record = Path("results/one/done/collect.json")
+        found = sealed.demand(record)
+        found["products"] |= {f"results/one/{number}.csv": [1, 1, "0"] for number in range(60)}
+        sealed.write(record, found)
+        result = run("verify", "results/one", "--scenes", "0")
+        assert result.stdout.count(".csv is missing\n") == 60 and "faults: 60\n" in result.stdout, result.stdout
 
 
 class TestEnvironment:

@@ -195,6 +195,27 @@ class TestProvenance:
         assert dirty["git_commit"] == clean["git_commit"] + "+changes"
         assert "-title: Small\n+title: Smaller\n" in dirty["git_diff"]
 
+    def test_changes_are_those_of_package_rules_and_study_alone(self, tmp_path):
+        (tmp_path / "config").mkdir()
+        path = TestConventions().study(tmp_path / "config")
+        kept = ["src/own.py", "Snakefile", "workflow/rules/a[b].smk", "workflow/report/a.rst"]
+        others = ["workflow/profiles/slurm/config.yaml", "Makefile", "requirements/run.txt", "config/other.yaml"]
+        for name in (*kept, *others):
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).write_text("")
+        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
+        for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
+            subprocess.run([*git, *command], check=True)
+        for name in (*kept, *others):
+            (tmp_path / name).write_text(f"changed {name}\n")
+        path.write_text(path.read_text() + "# changed study\n")
+        study = load_study(path)
+        found = provenance.attributes(study, path)["git_diff"]
+        added = [line for line in found.splitlines() if line.startswith("+") and "changed" in line]
+        assert set(added) == {"+# changed study", *(f"+changed {name}" for name in kept)}
+        less = provenance.attributes(study, path, ["git_diff", "host"])
+        assert less["git_diff"] == less["host"] == "" and less["git_commit"].endswith("+changes")
+
     def test_long_changes_are_cut_and_hashed(self, tmp_path):
         path = TestConventions().study(tmp_path)
         git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
@@ -202,7 +223,7 @@ class TestProvenance:
             subprocess.run([*git, *command], check=True)
         path.write_text(path.read_text() + "".join(f"# {number:050}\n" for number in range(2000)))
         whole = subprocess.run([*git, "diff", "HEAD"], check=True, capture_output=True).stdout
-        kept = provenance.git_diff(tmp_path)
+        kept = provenance.git_diff(load_study(path), tmp_path)
         assert len(kept) < 41_000 and whole.decode().startswith(kept.rpartition("...")[0])
         assert hashlib.sha256(whole).hexdigest() in kept
 

@@ -5,6 +5,7 @@ import logging
 import os
 import re
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -184,6 +185,41 @@ def test_outputs_without_files_have_no_job(planned, tmp_path):
     found = due.jobs(study, plan.plan(study, tmp_path / "results/none", 1))
     assert all(job.products for name, job in found.items() if name.startswith(due.PRESENT))
     assert not any("sensitivity" in name for name in found if name.startswith(due.PRESENT))
+
+
+def test_what_a_run_made_again_is_not_nothing(planned):
+    study, made, names = planned
+    found = due.jobs(study, made)
+
+    def do(name):
+        job, work = found[name], {"linear": [0, 0.0, 0.0]}  # all of its tasks were stored before
+        for product in map(Path, job.products):
+            product.parent.mkdir(exist_ok=True, parents=True)
+            product.write_text("")
+        more = {"work": work} if name in names else {"read": ""}
+        records.write(job.record, job.digest, job.products, **more)
+
+    for name in found:
+        do(name)
+    time.sleep(0.05)  # clocks of files tick slowly
+    since = time.time() - 0.02
+    assert "new      nothing: all results were stored before\n" in summary.ending(study, made, since)
+    do(due.COLLECT)
+    do(due.BROWSE)
+    line = "5 files made again by collect, browse; all that is computed was stored before\n"
+    assert f"new      {line}" in summary.ending(study, made, since)
+    assert summary.beside(study, made, since).startswith(f"new in two: {line}")
+
+
+def test_what_a_job_made_again_for_another_one_counts(planned):
+    """Such a job keeps its record's time, so that what waited for it does not run again."""
+    study, made, names = planned
+    now, name = time.time(), next(name for name in names if name.startswith("solve"))
+    made.folder.mkdir(parents=True)
+    (made.folder / "made.h5").write_text("")
+    records.write(made.record(name), "digest", [made.folder / "made.h5"], work={"linear": [1, 1.0, 0.1]})
+    os.utime(made.record(name), (now - 100, now - 100))
+    assert "new      solve 1 of 4" in summary.ending(study, made, now - 50)
 
 
 class TestWorkload:

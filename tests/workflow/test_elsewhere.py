@@ -1,5 +1,6 @@
 """Jobs that a cluster's nodes run: what they ask for, and what they read of a study."""
 
+import os
 import re
 import subprocess
 import sys
@@ -31,6 +32,20 @@ def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
     code, output = run.snakemake("elsewhere.yaml", "-n", "--config", f"job_minutes={minutes}")
     assert code == 1 and "Traceback" not in output
     assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
+
+
+def test_what_the_dataset_is_not_to_tell_reaches_the_job_that_writes_it(run, repository):
+    run.write("elsewhere.yaml", STUDY)
+    code, output = run.snakemake("elsewhere.yaml", "-n", "-p", "--config", "no_diff=true", "no_host=true")
+    assert code == 0 and re.search(r"campaign\.collect .* git_diff host > ", output), output
+    code, output = run.snakemake("elsewhere.yaml", "-n", "-p")
+    assert code == 0 and re.search(r"campaign\.collect .* [0-9a-f]{24} +> ", output), output
+    code, output = run.snakemake("elsewhere.yaml", "-n", "--config", "no_host=maybe")
+    assert code == 1 and "--config no_host=maybe: neither true nor false; give one of them" in output, output
+    command = [sys.executable, "-m", "springtune", "run", "--no-host", "elsewhere.yaml", "-n", "-p", "--cores", "2"]
+    around = os.environ | {"SPRINGTUNE_WORKFLOW": str(repository)}
+    done = subprocess.run(command, cwd=run.folder, env=around, capture_output=True, text=True)
+    assert done.returncode == 0 and re.search(r"campaign\.collect .* host > ", done.stdout + done.stderr), done
 
 
 def test_rules_whose_jobs_go_elsewhere_have_a_benchmark(repository):

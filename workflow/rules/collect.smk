@@ -17,6 +17,7 @@ rule collect:
         config=str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
+        untold=due.untold(RESULTS, UNTOLD),
     resources:
         runtime=minutes(due.COLLECT),
         mem_mb=megabytes(due.COLLECT),
@@ -26,4 +27,4 @@ rule collect:
         RESULTS / "benchmarks/collect.tsv"
     shell:
         "python -m springtune.campaign.collect {params.config} {params.folder} {output.dataset} {output.done} {params.digest}"
-        " > {log} 2>&1"
+        " {params.untold} > {log} 2>&1"

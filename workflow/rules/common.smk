@@ -47,6 +47,21 @@ def lasting():
     return 60.0 * minutes
 
 
+def chosen_untold():
+    """What the dataset is to leave empty or not, by ``--config no_host=true``; for studies that the paper reads, too."""
+    chosen = {}
+    for option in due.BLANKED:
+        variable = f"SPRINGTUNE_{option.upper()}"  # of `springtune run`: a --config would replace that of a profile
+        value = str(config.get(option, os.environ.get(variable, ""))).lower()
+        if value not in ("", "true", "false"):
+            print(f"--config {option}={value}: neither true nor false; give one of them", file=sys.stderr)
+            sys.exit(1)
+        if value:
+            os.environ[variable], chosen[option] = value, value == "true"
+    return chosen
+
+
+UNTOLD = chosen_untold()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
@@ -55,7 +70,7 @@ ON_CLUSTER = workflow.resource_settings.nodes is not None
 # A cluster has room for all jobs: only how long one lasts says how many there are. A child plans as the run did.
 CORES = 1 if ON_CLUSTER or not workflow.is_main_process else workflow.resource_settings.cores or 1
 PLAN = plan(STUDY, RESULTS, CORES, lasting())
-JOBS = due.jobs(STUDY, PLAN)
+JOBS = due.jobs(STUDY, PLAN, UNTOLD)
 # The one that is run; for the paper, those that it reads besides.
 READ = workflow.__dict__.setdefault("studies_read", [])
 READ.append((STUDY, PLAN))

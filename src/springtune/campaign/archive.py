@@ -3,8 +3,8 @@
 It is a zip file that is an RO-Crate (`springtune.campaign.crate`):
 
     ro-crate-metadata.json, README.md, SHA256SUMS
-    code/               the program as it is in the checkout, lock files and studies among it
-    code.diff           what differs from the commit
+    code/               package, rules, lock files and what builds them, as in the checkout; the study
+    code.diff           what of package, rules and study differs from the commit
     inputs/             the study and its files, where they are outside of the checkout
     results/<study>/    dataset, page, figures, tables, summary; what each job made, and how long it took
 """
@@ -12,14 +12,14 @@ It is a zip file that is an RO-Crate (`springtune.campaign.crate`):
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..jobs import atomic, records
 from . import crate
-from .contents import CITATION, METADATA, SUMS, ArchiveError, gather, of_text
+from .contents import CITATION, METADATA, MOST_FILES, MOST_TEXT, SUMS, ArchiveError, gather, of_text
 
 if TYPE_CHECKING:
     from ..study.model import Study
@@ -30,7 +30,13 @@ PACKED_AT = (1980, 1, 1, 0, 0, 0)
 
 
 def write(
-    study: "Study", folder: Path, target: Path, store: bool = False, tell: "Callable[[Contents], None] | None" = None
+    study: "Study",
+    folder: Path,
+    target: Path,
+    store: bool = False,
+    untracked: bool = False,
+    chosen: Mapping[str, bool] | None = None,
+    tell: "Callable[[Contents], None] | None" = None,
 ) -> str:
     """Write the archive of a study, which appears whole or not at all.
 
@@ -43,6 +49,10 @@ def write(
         Zip file to write.
     store : bool, optional
         Whether what the stages stored is packed, too: meshes, references, curves, solutions.
+    untracked : bool, optional
+        Whether files of the packed folders are packed that git does not know.
+    chosen : dict of str to bool, optional
+        What is left out or not, as of `springtune.campaign.due.untold`.
     tell : callable, optional
         Called with the contents before anything is written.
 
@@ -63,7 +73,7 @@ def write(
     except ValueError as error:
         raise ArchiveError(str(error)) from None
     with tempfile.TemporaryDirectory() as scratch:
-        found = gather(study, folder, Path(scratch), store)
+        found = gather(study, folder, Path(scratch), store, untracked, chosen)
         cited = crate.citation(Path(CITATION))
         if tell:
             tell(found)
@@ -71,8 +81,29 @@ def write(
         packed |= {METADATA: of_text(METADATA, crate.metadata(found, cited))}
         sums = "".join(f"{one.sha256}  {name}\n" for name, one in sorted(packed.items()))
         packed |= {SUMS: of_text(SUMS, sums)}
+        check_limits(packed)
         _zip(target, packed.values())
     return records.checksum(target)
+
+
+def check_limits(packed: "Mapping[str, Packed]") -> None:
+    """Refuse what `springtune verify` would not read.
+
+    Parameters
+    ----------
+    packed : dict of str to Packed
+        All files of an archive by name.
+
+    Raises
+    ------
+    ArchiveError
+    """
+    texts = max(packed[name].size for name in (METADATA, SUMS))
+    if len(packed) > MOST_FILES or texts > MOST_TEXT:
+        raise ArchiveError(
+            f"{len(packed)} files, and an archive holds at most {MOST_FILES}, with {MOST_TEXT} bytes of metadata; "
+            "leave out --with-store, or archive parts of the study"
+        )
 
 
 def _zip(target: Path, packed: "Iterable[Packed]") -> None:

@@ -1,6 +1,7 @@
 """Compare what was solved with its references and gather everything in one dataset."""
 
 import sys
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from ..study.model import Study
 
 
-def run(config: str | Path, folder: str | Path, output: str | Path) -> list[Path]:
+def run(config: str | Path, folder: str | Path, output: str | Path, untold: Collection[str] = ()) -> list[Path]:
     """Build the dataset of a study from its stored results.
 
     Parameters
@@ -30,19 +31,23 @@ def run(config: str | Path, folder: str | Path, output: str | Path) -> list[Path
         Where the study's results are.
     output : str or Path
         NetCDF file to write; the summary goes beside it.
+    untold : collection of str, optional
+        Attributes to leave empty, see `springtune.campaign.due.BLANKED`.
 
     Returns
     -------
     list of Path
         Both.
     """
-    return _collected(load_study(config), config, Path(folder), Path(output))
+    return _collected(load_study(config), config, Path(folder), Path(output), untold)
 
 
-def _collected(study: "Study", config: str | Path, folder: Path, output: Path) -> list[Path]:
+def _collected(
+    study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()
+) -> list[Path]:
     groups = mended(lambda: gathered(study, folder), folder)
     try:
-        dataset.write(output, groups, provenance.attributes(study, config))
+        dataset.write(output, groups, provenance.attributes(study, config, untold))
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
     told = output.with_name(summary.FILE)
@@ -51,7 +56,7 @@ def _collected(study: "Study", config: str | Path, folder: Path, output: Path) -
     return [output, told]
 
 
-def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
+def main(config: str, folder: str, output: str, record: str, digest: str, *untold: str) -> None:
     """Build a dataset and write the record of it.
 
     Parameters
@@ -62,12 +67,16 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
         Record to write.
     digest : str
         Of what is asked for.
+    *untold : str
+        Attributes to leave empty.
     """
     study = load_study(config)
     OURS.recall(Path(folder).parent / CODE_FILE)
-    if due.jobs(study, plan(study, Path(folder), 1))[due.COLLECT].digest != digest:
+    chosen = {option: name in untold for option, name in due.BLANKED.items()}
+    if due.jobs(study, plan(study, Path(folder), 1), chosen)[due.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    records.write(record, digest, _collected(study, config, Path(folder), Path(output)))
+    made = _collected(study, config, Path(folder), Path(output), untold)
+    records.write(record, digest, made, untold=list(untold))
 
 
 def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:

@@ -5,16 +5,17 @@ import json
 import os
 import platform
 import shutil
-import subprocess
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+from ..browse import page as browse
 from ..jobs import records
+from ..jobs.atomic import write_text
 from ..jobs.commands import COMMANDS_FILE
-from ..jobs.dependencies import PACKAGE
+from ..jobs.dependencies import OURS, PACKAGE
 from ..output.reading import CHANGED
 from . import due, environment, provenance
 from .plan import plan
@@ -38,6 +39,7 @@ OF_RESULTS = "results"
 CHECKOUT_FILES = (
     "Snakefile",
     "Makefile",
+    "README.md",
     "pyproject.toml",
     "hatch_build.py",
     "LICENSE",
@@ -47,18 +49,21 @@ CHECKOUT_FILES = (
 )
 """Files of a checkout without which nobody could run an archive."""
 
-TREE = (
-    ".containerignore", ".gitignore", "CHANGELOG.md", CITATION, "CONTRIBUTING.md", "Containerfile", "LICENSE",
-    "Makefile", "README.md", "Snakefile", "config", "docs", "examples", "hatch_build.py", "profiles", "pyproject.toml",
-    "requirements", "src", "tests", "tools", "workflow",
-)  # fmt: skip
-"""What a checkout consists of, where there is no git to ask."""
+FOLDERS = {
+    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed"),
+    "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
+    "requirements": (".in", ".txt"),
+}
+"""Folders of a checkout that are packed, package, rules and lock files, and endings of files where there is no git."""
 
-NEW = ("src", "workflow", "tools", "requirements")
-"""Folders whose files are packed although git does not know them: what runs may import them."""
+OF_PROFILES, LINK = "workflow/profiles", "profiles"
+"""Folder that is packed as committed, for a user's own edits never say what a study computes; and the link to it."""
 
 NOT_PACKED = ("__pycache__", ".egg-info", ".pyc", ".DS_Store")
 """Endings of names of files and folders that are made of others."""
+
+MOST_FILES, MOST_TEXT = 100_000, 2**24
+"""Files of an archive, and bytes of its metadata or checksums; parsed these take thirty times as much memory."""
 
 MOST_TOLD = 5
 """Most jobs that are told in a refusal."""
@@ -108,15 +113,26 @@ class Code:
     commit : str
         Empty where there is no git.
     diff : str
-        What differs from it.
+        What of the package, the rules and the study differs from it.
     new : tuple of str
         Files that are packed and that git does not know.
+    left : tuple of str
+        Files of the same folders that are not packed.
+    texts : dict of str to str
+        Files that are packed as committed.
     """
 
     files: dict[str, Path]
     commit: str
     diff: str
     new: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
+    texts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is not that of its commit."""
+        return bool(self.diff or self.new)
 
 
 @dataclass(frozen=True)
@@ -141,6 +157,8 @@ class Contents:
         On which all of it was computed; empty where that is not this one.
     departures : dict of str to tuple of str
         Versions that are locked, and others that the dataset was made with.
+    untold : list of str
+        Attributes of the dataset that are left out on request.
     """
 
     study: "Study"
@@ -153,6 +171,7 @@ class Contents:
     attributes: dict[str, str]
     machine: dict[str, str]
     departures: dict[str, tuple[str, str]]
+    untold: list[str]
 
     @property
     def folder(self) -> str:
@@ -175,12 +194,19 @@ class Contents:
         return sum(one.size for one in self.files.values())
 
 
-def gather(study: "Study", folder: Path, scratch: Path, store: bool = False) -> Contents:
+def gather(
+    study: "Study",
+    folder: Path,
+    scratch: Path,
+    store: bool = False,
+    untracked: bool = False,
+    chosen: Mapping[str, bool] | None = None,
+) -> Contents:
     """What an archive of a study is to consist of.
 
     Parameters
     ----------
-    study, folder, store
+    study, folder, store, untracked, chosen
         As of `springtune.campaign.archive.write`.
     scratch : Path
         Folder for files that are made to be packed.
@@ -199,18 +225,24 @@ def gather(study: "Study", folder: Path, scratch: Path, store: bool = False) -> 
     if checked.faults or checked.stale:
         raise ArchiveError(_unfinished(study, folder, checked.faults, checked.stale))
     made = plan(study, folder, 1)
-    jobs = due.jobs(study, made)
-    code = _code(checkout)
-    names = archived_names(study, provenance.input_files(study), checkout)
+    jobs, untold = due.jobs(study, made), due.untold(folder, chosen)
+    given = provenance.input_files(study)
+    code = _code(study, checkout, {file.resolve() for file in given}, untracked)
+    names = archived_names(study, given, checkout)
     paths = {name: path for path, name in names.items()}
     paths |= {f"{CODE}/{name}": path for name, path in code.files.items()}
     paths |= {f"{OF_RESULTS}/{study.name}/{name}": path for name, path in _made(folder, jobs, made, store)}
     packed = {name: _of_file(name, path) for name, path in paths.items()}
-    dataset = f"{OF_RESULTS}/{study.name}/{due.DATASET}"
-    packed[dataset], attributes, host = _without_host(packed[dataset], scratch)
-    if code.diff:
+    packed |= {f"{CODE}/{name}": of_text(f"{CODE}/{name}", text) for name, text in code.texts.items()}
+    dataset, page = (f"{OF_RESULTS}/{study.name}/{name}" for name in (due.DATASET, due.PAGE))
+    packed[dataset], attributes, host = _without(packed[dataset], {"host", *untold}, scratch)
+    if packed[dataset].sha256 != packed[dataset].original:  # the page has the attributes of the dataset
+        write_text(scratch / due.PAGE, browse.page(scratch / due.DATASET, due.linked(study)))
+        packed[page] = _of_file(page, scratch / due.PAGE)
+    if code.diff and "git_diff" not in untold:
         packed[DIFF] = of_text(DIFF, code.diff)
     own = names[study.path.resolve()]
+    tell_machine = host == platform.node() and "host" not in untold and not _elsewhere(folder)
     found = Contents(
         study=study,
         plan=made,
@@ -220,8 +252,9 @@ def gather(study: "Study", folder: Path, scratch: Path, store: bool = False) -> 
         inputs=tuple(sorted(set(names.values()) - {own})),
         code=code,
         attributes=attributes,
-        machine=environment.machine() if host == platform.node() and not _elsewhere(folder) else {},
+        machine=environment.machine() if tell_machine else {},
         departures=_departures(checkout, attributes),
+        untold=untold,
     )
     packed[README] = of_text(README, _readme(found))
     return found
@@ -270,37 +303,62 @@ def _other_library(packed: Path) -> str:
     return next(others, "")
 
 
-def _unfinished(study: "Study", folder: Path, faults: dict[str, str], stale: Iterable[str]) -> str:
-    said = [f"{name}: {why}" for name, why in faults.items()]
+def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> str:
+    said = [f"{name}: {why}" for name, why in faults]
     said += [f"{name}: the study or the program changed since" for name in stale]
     shown = said[:MOST_TOLD] + ([f"and {len(said) - MOST_TOLD} more"] if len(said) > MOST_TOLD else [])
     remedy = f"springtune run {study.path}"
-    if any(why.endswith(records.DAMAGED) for why in faults.values()):
+    if any(why.endswith(records.DAMAGED) for _, why in faults):
         remedy = f"springtune verify {study.path} --set-aside, then {remedy}"
     lines = [f"{folder}: is not what the study asks for now, and is not archived", *shown, f"make it: {remedy}"]
     return "\n  ".join(lines)
 
 
-def _code(checkout: Path) -> Code:
-    """The program: what git knows of it and what may be imported besides; or all of it where there is no git."""
-    commit = provenance.git_commit(checkout)
-    known = _listed(checkout, "--cached") if commit else []
-    if not known:  # a source distribution, or a checkout inside of another one's ignored folder
-        return Code(dict(_unknown(checkout)), "", "")
-    new = [name for name in _listed(checkout, "--others", "--exclude-standard") if name.partition("/")[0] in NEW]
-    new = [name for name in new if not _is_made(name)]
-    files = dict(_followed(checkout, [*known, *new]))
-    diff = _git(checkout, "diff", "--no-color", "--no-ext-diff", "--binary", "--relative", "HEAD")
-    return Code(files, commit.removesuffix(CHANGED), diff, tuple(sorted(new)))
+def _code(study: "Study", checkout: Path, given: set[Path], untracked: bool) -> Code:
+    """The program: what git knows of it, or what files of a checkout are called where there is no git.
+
+    `given` are the files that the study is made from, which are packed anyway; `untracked` asks for all files of the
+    folders.
+    """
+    commit, texts = provenance.git_commit(checkout), {}
+    known = _git(checkout, "ls-files", "-z", "--cached", "--", *FOLDERS, LINK) if commit else []
+    if known:
+        others = _git(checkout, "ls-files", "-z", "--others", "--", *FOLDERS, "tools")
+        changed = _git(checkout, "diff", "--name-only", "-z", "--relative", "HEAD", "--", OF_PROFILES)
+        texts = {name: provenance.git(checkout, "show", f"HEAD:./{name}") for name in changed}
+    else:  # a source distribution, or a checkout inside of another one's ignored folder
+        commit = ""
+        paths = [path for top in FOLDERS for path in (checkout / top).rglob("*") if path.is_file()]
+        found = [path.relative_to(checkout).as_posix() for path in paths]
+        known = [LINK, *filter(_is_usual, found)]
+        others = [name for name in found if not _is_usual(name)]
+    others += [name for name, text in texts.items() if not text]  # not committed yet
+    others = [name for name in others if not _is_made(name) and (checkout / name).resolve() not in given]
+    asked = {*known, *CHECKOUT_FILES, *others} if untracked else {*known, *CHECKOUT_FILES} - {*others}
+    files = dict(_followed(checkout, asked))
+    left = {name for name, path in files.items() if not path.resolve().is_relative_to(checkout.resolve())}
+    left |= set() if untracked else {*others}
+    needed = {path.relative_to(PACKAGE.parent).as_posix() for path in OURS.files if path.is_relative_to(PACKAGE)}
+    for name in sorted(left):
+        if name.removeprefix("src/") in needed:
+            raise ArchiveError(
+                f"{name}: the study is computed by it, and git does not know it; add it to git, or pack it and all "
+                "others by --untracked"
+            )
+    texts |= {f"{LINK}{name.removeprefix(OF_PROFILES)}": text for name, text in texts.items()}
+    return Code(
+        {name: path for name, path in files.items() if name not in left},
+        commit.removesuffix(CHANGED),
+        provenance.difference(study, checkout, "--binary", "--relative") if commit else "",
+        tuple(sorted(files.keys() & {*others})),
+        tuple(sorted(left)),
+        {name: text for name, text in texts.items() if text and name in files},
+    )
 
 
-def _listed(checkout: Path, *which: str) -> list[str]:
-    return [name for name in _git(checkout, "ls-files", "-z", *which).split("\0") if name]
-
-
-def _git(checkout: Path, *arguments: str) -> str:
-    done = subprocess.run(["git", *arguments], cwd=checkout, capture_output=True)
-    return done.stdout.decode(errors="surrogateescape") if not done.returncode else ""
+def _git(checkout: Path, *arguments: str) -> list[str]:
+    """Names that git lists."""
+    return [name for name in provenance.git(checkout, *arguments).split("\0") if name]
 
 
 def _followed(checkout: Path, names: Iterable[str]) -> Iterator[tuple[str, Path]]:
@@ -317,20 +375,10 @@ def _followed(checkout: Path, names: Iterable[str]) -> Iterator[tuple[str, Path]
                     yield f"{name}/{other.removeprefix(below)}", checkout / other
 
 
-def _unknown(checkout: Path) -> Iterator[tuple[str, Path]]:
-    for top in TREE:
-        path = checkout / top
-        if path.is_file():
-            yield top, path
-        for file in sorted(path.rglob("*")) if path.is_dir() else ():
-            # rglob does not follow a link to a folder below; one that stands here is followed by its name.
-            name = file.relative_to(checkout).as_posix()
-            if file.is_file() and not _is_made(name):
-                yield name, file
-    if (checkout / "profiles").is_symlink():
-        for file in sorted((checkout / "profiles").resolve().rglob("*")):
-            if file.is_file():
-                yield f"profiles/{file.relative_to((checkout / 'profiles').resolve()).as_posix()}", file
+def _is_usual(name: str) -> bool:
+    """Whether a file is packed where there is no git to ask: by its ending, and not hidden."""
+    parts = PurePosixPath(name).parts
+    return name.endswith(FOLDERS[parts[0]]) and not any(part.startswith(".") for part in parts)
 
 
 def _is_made(name: str) -> bool:
@@ -421,10 +469,10 @@ def stored_size(study: "Study", folder: Path) -> int:
     return sum(every[name].stat().st_size for name in every.keys() - few.keys())
 
 
-def _without_host(dataset: Packed, scratch: Path) -> tuple[Packed, dict[str, str], str]:
-    """The dataset without the name of the machine, its attributes, and that name.
+def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Packed, dict[str, str], str]:
+    """The dataset without what some attributes say, its other attributes, and the name of the machine.
 
-    The text of the attribute is overwritten in its place: all else stays as it was, to the byte.
+    The text of an attribute is overwritten in its place: all else stays as it was, to the byte.
     """
     import h5py
     import numpy as np
@@ -436,14 +484,17 @@ def _without_host(dataset: Packed, scratch: Path) -> tuple[Packed, dict[str, str
         attributes = {
             str(name): value.decode() if isinstance(value, bytes) else str(value) for name, value in file.attrs.items()
         }
-        host = attributes.pop("host", "")
-        if host:
-            if file.attrs.get_id("host").dtype.kind != "S":
+        host = attributes.get("host", "")
+        for name in names:
+            text = attributes.pop(name, "")
+            if text and file.attrs.get_id(name).dtype.kind != "S":
+                option = next(option for option, other in due.BLANKED.items() if other == name).replace("_", "-")
                 raise ArchiveError(
-                    f"{dataset.source}: its attribute 'host' has letters besides ASCII, and cannot be blanked in its "
-                    "place; give the machine another name and collect the study again"
+                    f"{dataset.source}: its attribute '{name}' has letters besides ASCII, and cannot be blanked in its "
+                    f"place; run the study again with --{option}"
                 )
-            file.attrs.modify("host", np.bytes_(b"-" * len(host)))
+            if text:
+                file.attrs.modify(name, np.bytes_(b"-" * len(text)))
     packed = _of_file(dataset.name, copy)
     return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), attributes, host
 
@@ -472,7 +523,10 @@ def _readme(found: Contents) -> str:
     study = f"../{found.config}" if not found.config.startswith(f"{CODE}/") else found.config.removeprefix(f"{CODE}/")
     commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
     version = found.attributes["springtune_version"]
-    changed = f"; what differs from the commit is in `{DIFF}`" if found.code.diff else ""
+    changed = ", changed" if found.code.changed else ""
+    changed += (
+        f"; what of package, rules and study differs from the commit is in `{DIFF}`" if DIFF in found.files else ""
+    )
     return f"""# {found.study.title}
 
 The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is

@@ -212,16 +212,17 @@ class _Crate:
         }
         original = found.files[found.dataset].original
         if original != found.files[found.dataset].sha256:
-            told[found.dataset] += f"; its attribute 'host' is blanked, before which its SHA-256 was {original}"
+            blank = " and ".join(repr(name) for name in sorted({"host", *found.untold}))
+            told[found.dataset] += f"; {blank} of its attributes are blanked, before which its SHA-256 was {original}"
         if DIFF in found.files:
-            told[DIFF] = f"what differs in {CODE}/ from commit {found.code.commit}"
+            told[DIFF] = f"what of package, rules and study differs in {CODE}/ from commit {found.code.commit}"
         return told
 
     def _about(self) -> None:
         """The whole: title, authors, licence, and what is in which folder."""
         root, found = self.crate.root_dataset, self.found
         commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
-        commit += ", changed" if found.code.diff or found.code.new else ""
+        commit += ", changed" if found.code.changed else ""
         root["name"], root["version"] = found.study.title, self.version
         root["description"] = (
             f"The study '{found.study.name}' as computed by springtune {self.version} ({commit}): its file, the "
@@ -246,7 +247,7 @@ class _Crate:
     def _sort_into_folders(self) -> None:
         results = f"{self.found.folder}/"
         told = {
-            f"{CODE}/": "the program: a checkout of springtune with its studies and lock files",
+            f"{CODE}/": "the program: package, rules and lock files of springtune, and the study",
             f"{INPUTS}/": "the study and the files that it names",
             results: "dataset, page, figures, tables; done/ has what each job made, benchmarks/ what it took",
         }

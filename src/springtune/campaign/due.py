@@ -3,7 +3,7 @@
 Stages are planned in `springtune.campaign.plan`; here are the jobs after them, and what becomes of all of them.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +33,10 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 """Studies that the paper reads."""
+
+
+BLANKED = {"no_diff": "git_diff", "no_host": "host"}
+"""Attributes that a dataset leaves empty on request, by the option of a run."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +108,25 @@ def linked(study: "Study") -> list[str]:
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
 
-def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
+def untold(folder: Path, chosen: Mapping[str, bool] | None = None) -> list[str]:
+    """Attributes that the dataset of a study leaves empty.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are.
+    chosen : dict of str to bool, optional
+        By the options of a run, see `BLANKED`; what is not chosen is as in the dataset that is there.
+
+    Returns
+    -------
+    list of str
+    """
+    before = (sealed.read(folder / RECORDS / f"{COLLECT}.json", products=dict) or {}).get("untold", [])
+    return [name for option, name in BLANKED.items() if (chosen or {}).get(option, name in before)]
+
+
+def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -> dict[str, Job]:
     """All jobs of a study.
 
     Parameters
@@ -112,6 +134,8 @@ def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
     study : Study
     plan : Plan
         Of its stages.
+    chosen : dict of str to bool, optional
+        As of `untold`.
 
     Returns
     -------
@@ -120,7 +144,8 @@ def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
     """
     folder = plan.folder
     found = [Job(one.name, one.digest, one.products, plan.record(one.name)) for one in plan.jobs.values()]
-    made = [(COLLECT, _collect_digest(study, plan), [DATASET, SUMMARY], "")]
+    collected = hash_of(_collect_digest(study, plan), untold(folder, chosen))
+    made = [(COLLECT, collected, [DATASET, SUMMARY], "")]
     for name, members in output_jobs(study).items():
         files = [file for one in members for file in output_files(one, study)]
         made.append((name, _present_digest(members, files), files, COLLECT))

@@ -4,6 +4,7 @@ import hashlib
 import json
 import platform
 import subprocess
+from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -32,6 +33,9 @@ SOFTWARE = (
 LOCK = Path("requirements/run.txt")
 """Versions that a checkout installs, beside the study or above it."""
 
+COMPARED_WITH_COMMIT = ("src", "Snakefile", "workflow/paper", "workflow/report", "workflow/rules")
+"""Package and rules, from the checkout on. Profiles are not among them: they may hold what is one user's own."""
+
 LONGEST = 40_000
 """Characters of a difference from the commit that are kept."""
 
@@ -39,7 +43,7 @@ PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2
 """Where printed values are from, by the name of their file."""
 
 
-def attributes(study: Study, config: str | Path) -> dict[str, str]:
+def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -> dict[str, str]:
     """Attributes of the root of a study's dataset.
 
     Parameters
@@ -47,6 +51,8 @@ def attributes(study: Study, config: str | Path) -> dict[str, str]:
     study : Study
     config : str or Path
         YAML file of the study.
+    untold : collection of str, optional
+        Attributes to leave empty: ``git_diff``, ``host``.
 
     Returns
     -------
@@ -67,10 +73,10 @@ def attributes(study: Study, config: str | Path) -> dict[str, str]:
         "inputs": json.dumps(inputs(study, folder), sort_keys=True),
         "springtune_version": __version__,
         "git_commit": commit,
-        "git_diff": git_diff(folder) if commit.endswith(CHANGED) else "",
+        "git_diff": git_diff(study, folder) if commit.endswith(CHANGED) and "git_diff" not in untold else "",
         "created": created,
         "software": json.dumps(software, sort_keys=True),
-        "host": platform.node(),
+        "host": "" if "host" in untold else platform.node(),
     }
     return found | _references(study)
 
@@ -100,9 +106,14 @@ def inputs(study: Study, folder: Path) -> dict[str, str]:
     dict of str to str
         By the file's name: seen from the checkout, or from the study where there is none.
     """
-    root = next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
+    root = _checkout(folder)
     files = input_files(study) | ({root / LOCK} if root else set())
     return {_name(file.resolve(), root or folder): _sha256(file) for file in sorted(files)}
+
+
+def _checkout(folder: Path) -> Path | None:
+    """The checkout that holds a folder."""
+    return next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
 
 
 def input_files(study: Study) -> set[Path]:
@@ -133,15 +144,13 @@ def _sha256(file: Path) -> str:
 
 def git_commit(folder: Path) -> str:
     """Commit of the checkout that holds a folder, with `CHANGED` where files differ from it; empty outside of git."""
-    return _git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
+    return git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
 
 
-def git_diff(folder: Path) -> str:
-    """What differs from the commit in the checkout that holds a folder; of a long one the beginning, and its SHA-256.
-
-    Files that git does not know are not part of it.
-    """
-    text = _git(folder, "diff", "--no-color", "--no-ext-diff", "HEAD")
+def git_diff(study: Study, folder: Path) -> str:
+    """What differs from the commit, see `difference`; of a long text the beginning, and its SHA-256."""
+    # Whatever files are written in.
+    text = difference(study, folder).encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
     if len(text) <= LONGEST:
         return text
     digest = hashlib.sha256(text.encode()).hexdigest()
@@ -149,10 +158,37 @@ def git_diff(folder: Path) -> str:
     return f"{kept}... cut here; the whole difference has {len(text)} characters and SHA-256 {digest}\n"
 
 
-def _git(folder: Path, *arguments: str) -> str:
+def difference(study: Study, folder: Path, *options: str) -> str:
+    """What of the package, the rules and the study's own files differs from the commit, and nothing else.
+
+    Files that git does not know are not part of it.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        In the checkout, absolute.
+    *options : str
+        Of ``git diff``.
+
+    Returns
+    -------
+    str
+        Bytes that are no UTF-8 are escaped.
+    """
+    top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
+    files = {file.resolve() for file in input_files(study)} | (
+        {root / name for name in COMPARED_WITH_COMMIT} if root else set()
+    )
+    known = [str(file) for file in sorted(files) if file.is_relative_to(top)]
+    command = ("--literal-pathspecs", "diff", "--no-color", "--no-ext-diff", *options, "HEAD", "--")
+    return git(folder, *command, *known) if known else ""
+
+
+def git(folder: Path, *arguments: str) -> str:
+    """What git says in a folder, empty where it fails or is not there; bytes that are no UTF-8 are escaped."""
     try:
         answer = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, check=True)
     except (OSError, subprocess.CalledProcessError):
         return ""
-    # Whatever files are written in.
-    return answer.stdout.decode(errors="replace").replace("\0", "")
+    return answer.stdout.decode(errors="surrogateescape")

@@ -3,7 +3,10 @@
 import hashlib
 import json
 import os
+import re
 import shutil
+import stat
+import struct
 import subprocess
 import sys
 import zipfile
@@ -11,13 +14,15 @@ import zlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from io import BufferedReader, FileIO
+from math import isfinite
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from ..output import reading
 from . import due, environment
-from .contents import CODE, METADATA, SUMS
+from .contents import CODE, METADATA, MOST_FILES, MOST_TEXT, OF_RESULTS, SUMS
 
 if TYPE_CHECKING:
     from ..output.comparison import Comparison
@@ -30,6 +35,12 @@ OF_MACHINE = "/benchmark"
 
 UNZIPPED = 2**20
 """Bytes that are read at once."""
+
+MOST_RATIO = 100
+"""So many times as large as packed an archive may be; those of studies are some times as large."""
+
+LONGEST_MEMBER = 1000
+"""Characters of a file's name in an archive."""
 
 
 class ReproductionError(ValueError):
@@ -89,32 +100,52 @@ def check(path: Path) -> Checked:
         If it is no archive of a study, or not even its list of contents can be read.
     OSError
     """
+    if path.exists() and not path.is_file():
+        raise ReproductionError(f"{path}: is no file; give an archive")
     with open(path, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return _checked(Checked(path, digest), archive)
-    except zipfile.BadZipFile as error:
-        raise ReproductionError(f"{path}: is no whole zip file ({error}); get it again") from None
+    with _Bounded(FileIO(path)) as file:
+        try:
+            archive = zipfile.ZipFile(file)
+        except UNREADABLE as error:
+            raise ReproductionError(f"{path}: is no whole zip file ({error}); get it again") from None
+        return _checked(Checked(path, digest), archive)
+
+
+UNREADABLE = (
+    zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, ValueError, RuntimeError, OverflowError
+)  # fmt: skip
+"""What zipfile raises where a zip file is damaged; RuntimeError where it is encrypted or of another version."""
+
+
+class _Bounded(BufferedReader):
+    """A file of which zipfile cannot read more at once than the texts of an archive may have: it reads lists whole."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > MOST_TEXT:
+            raise zipfile.BadZipFile(f"more than {MOST_TEXT} bytes at once")
+        return super().read(size)
 
 
 def _checked(found: Checked, archive: zipfile.ZipFile) -> Checked:
     infos = archive.infolist()
-    for info in infos:
-        place = PurePosixPath(info.filename)
-        if place.is_absolute() or ".." in place.parts or "\\" in info.filename:
-            found.faults[info.filename] = "leads out of the archive"
-    names = [info.filename for info in infos if not info.is_dir()]
+    _check_sizes(found.path, infos)
+    names = [info.filename for info in infos if not info.filename.endswith("/")]
     found.faults |= {name: "is there twice" for name, count in Counter(names).items() if count > 1}
+    ordered = sorted(name.replace("/", "\0") for name in names)  # what is below a name comes next
+    pairs = zip(ordered, ordered[1:])
+    above = {one.replace("\0", "/") for one, after in pairs if after.startswith(f"{one}\0")}
+    found.faults |= dict.fromkeys(above, "is a file and a folder")
+    found.faults |= {info.filename: why for info in infos if (why := _unusual(info))}
     if METADATA not in names:
         raise ReproductionError(f"{found.path}: is no archive of a study, it has no {METADATA}; see springtune archive")
     sums, listed = {}, {}
     made = {name: _digest(archive, name) for name in dict.fromkeys(names)}
     if made[METADATA]:
-        listed = _listed(found, archive)
+        listed = _listed(found, archive.read(METADATA))
+        found.faults |= {name: "is missing" for name in (found.config, found.dataset) if name not in made}
     if made.get(SUMS):
-        lines = archive.read(SUMS).decode(errors="replace").splitlines()
-        sums = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+        sums = {name: digest for digest, name in re.findall(SUM, archive.read(SUMS).decode(errors="replace"))}
     else:
         found.faults[SUMS] = "is damaged" if SUMS in names else "is missing"
     for name, digest in made.items():
@@ -129,41 +160,88 @@ def _checked(found: Checked, archive: zipfile.ZipFile) -> Checked:
     return found
 
 
+SUM = re.compile("^([0-9a-f]{64})  (.+)$", re.MULTILINE)
+"""A line of `SUMS`."""
+
+
+def _check_sizes(path: Path, infos: list[zipfile.ZipInfo]) -> None:
+    """Refuse an archive that would take memory or time, by the sizes that it states; no more is unpacked of a file."""
+    if len(infos) > MOST_FILES:
+        raise ReproductionError(f"{path}: has {len(infos)} files, and at most {MOST_FILES} are read; get it again")
+    texts = [(info.filename, info.file_size) for info in infos if info.filename in (METADATA, SUMS)]
+    whole = ("all of it", sum(info.file_size for info in infos))
+    limits = [(*text, MOST_TEXT) for text in texts] + [(*whole, MOST_RATIO * path.stat().st_size)]
+    for name, size, most in limits:
+        if size > most:
+            raise ReproductionError(
+                f"{path}: {name} has {size} bytes unpacked, and at most {most} are read; get it again"
+            )
+
+
+def _unusual(info: zipfile.ZipInfo) -> str:
+    """What about a file is not as in any archive; empty where there is nothing."""
+    name, place = info.filename.removesuffix("/"), PurePosixPath(info.filename)
+    if place.is_absolute() or ".." in place.parts or "\\" in name:
+        return "leads out of the archive"
+    if str(place) != name or len(name) > LONGEST_MEMBER:
+        return "is no plain name"
+    if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "is a link or a device"
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        return "is packed by another method"
+    return ""
+
+
 def _digest(archive: zipfile.ZipFile, name: str) -> str | None:
     """SHA-256 of a file; None where it cannot be unpacked."""
-    made = hashlib.sha256()
+    made, info, size = hashlib.sha256(), archive.getinfo(name), 0
+    if _unusual(info):  # other methods unpack without a bound
+        return None
     try:
         with archive.open(name) as file:
             while part := file.read(UNZIPPED):
                 made.update(part)
-    except (zipfile.BadZipFile, OSError, EOFError, ValueError, RuntimeError, NotImplementedError, zlib.error):
+                size += len(part)
+    except UNREADABLE:
         return None
-    return made.hexdigest()
+    return made.hexdigest() if size == info.file_size else None
 
 
-def _listed(found: Checked, archive: zipfile.ZipFile) -> dict[str, str]:
+def _listed(found: Checked, text: bytes) -> dict[str, str]:
     """Checksums in the metadata, by file; and what it tells of the study."""
     try:
-        graph = {one["@id"]: one for one in json.loads(archive.read(METADATA))["@graph"]}
+        graph = {_text(one["@id"]): one for one in json.loads(text)["@graph"]}
         root, workflow = graph["./"], graph[f"{CODE}/Snakefile"]
         profiles = [one["@id"] for one in _several(root["conformsTo"])]
-        found.title, found.version = root["name"], root["version"]
+        if MADE_BY not in profiles:
+            raise ValueError(MADE_BY)
+        found.title, found.version = _text(root["name"]), _text(root["version"])
         found.config, found.dataset = (
-            unquote(graph[workflow[key]["@id"]]["workExample"]["@id"]) for key in ("input", "output")
+            unquote(_text(graph[workflow[key]["@id"]]["workExample"]["@id"])) for key in ("input", "output")
         )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        profiles = []
-    if MADE_BY not in profiles:
+        folder, found.study, name = PurePosixPath(found.dataset).parts
+        if (folder, name) != (OF_RESULTS, due.DATASET) or ".." in PurePosixPath(found.config).parts:
+            raise ValueError(found.dataset)
+        for name, one in graph.items():
+            if name.startswith("#machine-"):
+                found.machine[_text(one["name"])] = _text(one["value"])
+            if one.get("@type") == "PropertyValue" and name.endswith("-s"):
+                found.seconds += float(one.get("value", 0))
+        if not isfinite(found.seconds):
+            raise ValueError(found.seconds)
+        return {unquote(name): _text(one["sha256"]) for name, one in graph.items() if "sha256" in one}
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         raise ReproductionError(
             f"{found.path}: is no archive of a study of springtune, or its {METADATA} is damaged; get it again"
-        )
-    found.study = PurePosixPath(found.dataset).parent.name
-    for name, one in graph.items():
-        if name.startswith("#machine-"):
-            found.machine[str(one.get("name"))] = str(one.get("value"))
-        if one.get("@type") == "PropertyValue" and name.endswith("-s"):
-            found.seconds += float(one.get("value", 0))
-    return {unquote(name): str(one["sha256"]) for name, one in graph.items() if "sha256" in one}
+        ) from None
+
+
+def _text(value: Any) -> str:
+    """A value that is to be a text; half of a character is none."""
+    if not isinstance(value, str):
+        raise TypeError(value)
+    value.encode()
+    return value
 
 
 def _several(value: Any) -> list[Any]:

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..jobs import sealed
 from ..jobs.damage import ASIDE
 from ..kinds.scenes.lawful import of_own_law
 from ..output.text import aligned, label_text, without_numbers
 from ..problem.status import Status
+from . import due
 from .plan import Plan
 from .workload import clock, computed, results_of
 
@@ -211,7 +213,7 @@ def ending(study: "Study", plan: Plan, since: float) -> str:
     str
         The stored text, what was computed by this run, what it took and where the results are.
     """
-    new, took = _computed(plan, since), clock(time.time() - since)
+    new, took = _computed(study, plan, since), clock(time.time() - since)
     rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
     aside = [path for path in plan.folder.rglob(f"*{ASIDE}") if path.stat().st_ctime >= since]
     if aside:
@@ -253,7 +255,7 @@ def beside(study: "Study", plan: Plan, since: float) -> str:
         A line on what was computed, and of what is not made the logs.
     """
     undone, logs = _undone(plan, since)
-    lines = [f"new in {study.name}: {_computed(plan, since)}"]
+    lines = [f"new in {study.name}: {_computed(study, plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
     return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
 
@@ -308,6 +310,15 @@ def _time(path: Path) -> float:
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 
+def _done(record: Path) -> float:
+    """When a job last made something; minus infinity where it did not.
+
+    A file that is made again for another job leaves the time of its own job's record as it was.
+    """
+    made = (sealed.read(record, products=dict) or {"products": {}})["products"].values()
+    return max([_time(record), *(state[1] / 1e9 for state in made if state)])
+
+
 def _stored(study: "Study", plan: Plan) -> str:
     """The text beside the dataset, if it is of what the stages made."""
     path = plan.folder / FILE
@@ -318,8 +329,8 @@ def _stored(study: "Study", plan: Plan) -> str:
     return path.read_text()
 
 
-def _computed(plan: Plan, since: float) -> str:
-    """What a run computed, stage by stage, and what was there before."""
+def _computed(study: "Study", plan: Plan, since: float) -> str:
+    """What a run computed, stage by stage, what it made again, and what was there before."""
     new: dict[str, int] = {}
     asked: dict[str, int] = {}
     for name, job in plan.jobs.items():
@@ -327,11 +338,16 @@ def _computed(plan: Plan, since: float) -> str:
         number = computed(record)
         if number is not None:
             asked[stage] = asked.get(stage, 0) + len(results_of(job.content))
-            new[stage] = new.get(stage, 0) + (number if _time(record) >= since else 0)
+            new[stage] = new.get(stage, 0) + (number if _done(record) >= since else 0)
     told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
-    if not told:
+    if told:
+        return ", ".join(told) + ("" if new == asked else "; the others were stored before")
+    ran = {name: job for name, job in due.jobs(study, plan).items() if _done(job.record) >= since}
+    if not ran:
         return "nothing: all results were stored before"
-    return ", ".join(told) + ("" if new == asked else "; the others were stored before")
+    files = [path for job in ran.values() for path in (job.record, *map(Path, job.products))]
+    count = sum(_time(path) >= since for path in files)
+    return f"{count} files made again by {', '.join(ran)}; all that is computed was stored before"
 
 
 def _places(folder: Path) -> str:

@@ -3,7 +3,7 @@
 import json
 import random
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..jobs import atomic, records, sealed
-from ..jobs.damage import ASIDE, rename
+from ..jobs import atomic, records, sealed, store
+from ..jobs.damage import ASIDE, DamagedError, rename
 from ..jobs.guard import LIMITS_TOLD
 from ..jobs.keys import installed
+from ..jobs.run_tasks import RECORDS, TASKS
 from ..jobs.spent import Spent
 from ..kinds import kinds, load_study
 from ..kinds.scenes.division import of_scenes
@@ -23,7 +24,7 @@ from ..output import reading
 from ..problem.status import Status
 from ..study.model import SceneSpec
 from . import due
-from .plan import plan
+from .plan import BUNDLES_FILE, plan
 from .summary import SCENES
 
 if TYPE_CHECKING:
@@ -45,6 +46,22 @@ COMPARED = {
 SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
 """Relative differences that are none: with the versions of the software that the dataset was made with, and with
 others, whose factors round differently; equilibria are solved to 1e-10 of the load."""
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file of results is what was written."""
+    try:
+        store.contents(path)
+    except DamagedError:
+        return False
+    return True
+
+
+SEALS: dict[str, Callable[[Path], bool]] = {
+    ".h5": _is_whole,
+    ".json": lambda path: sealed.read(path) is not None,
+}
+"""Whether a file is as it was written, by the checksum in it; by the file's ending."""
 
 
 @dataclass(frozen=True)
@@ -83,14 +100,14 @@ class Files:
     ----------
     compared : int
         Files that were compared with their checksums.
-    faults : dict of str to str
-        By the name of a job, what is not as it made it, or that it has not been done.
+    faults : tuple of tuple of str
+        Names of jobs, each with a file that is not as the job made it, or that it has not been done.
     stale : tuple of str
         Names of jobs that were done, and of which something else is asked for now: the study or the program changed.
     """
 
     compared: int
-    faults: dict[str, str]
+    faults: tuple[tuple[str, str], ...]
     stale: tuple[str, ...]
 
 
@@ -107,19 +124,28 @@ def files(study: "Study", folder: Path) -> Files:
     -------
     Files
     """
-    found = due.jobs(study, plan(study, folder, 1))
-    compared, stale = 0, []
-    faults: dict[str, str] = {}
-    for name, job in found.items():
-        record = sealed.read(job.record, digest=str, products=dict)
-        made = record or {"digest": job.digest, "products": job.products}
-        why = records.fault(job.record, made["digest"], made["products"], wholly=True)
-        compared += len(made["products"]) + 1
-        if why:
-            faults[name] = why
-        elif due.fault(job, found):
+    jobs, stale = due.jobs(study, plan(study, folder, 1)), []
+    notes = [*sorted((folder / TASKS).glob("*_*.json")), *folder.glob(BUNDLES_FILE)]
+    faults = [(path.stem, f"{path}{records.DAMAGED}") for path in notes if not SEALS[".json"](path)]
+    compared = {*map(str, notes)}
+    recorded = {name: job.record for name, job in jobs.items()}
+    if any(name == Path(BUNDLES_FILE).stem for name, _ in faults):  # jobs are planned that are not those of before
+        recorded |= {path.stem: path for path in sorted((folder / RECORDS).glob("*.json"))}
+    for name, path in recorded.items():
+        job, record = jobs.get(name), sealed.read(path, digest=str, products=dict)
+        compared |= {str(path)} if path.exists() else set()
+        if record:
+            own = list(records.faults(path, record["digest"], record["products"], wholly=True))
+            compared |= {made for made, known in record["products"].items() if known and Path(made).exists()}
+        else:  # files that have a checksum of their own are compared with that
+            own = [records.fault(path, "", ())]
+            sealing = [one for one in map(Path, job.products if job else ()) if one.suffix in SEALS and one.exists()]
+            own += [f"{one}{records.DAMAGED}" for one in sealing if not SEALS[one.suffix](one)]
+            compared |= {*map(str, sealing)}
+        faults += [(name, why) for why in own]
+        if job and not own and due.fault(job, jobs):
             stale.append(name)
-    return Files(compared, faults, tuple(stale))
+    return Files(len(compared), tuple(faults), tuple(stale))
 
 
 def set_aside(found: Files) -> list[Path]:
@@ -134,7 +160,8 @@ def set_aside(found: Files) -> list[Path]:
     list of Path
         Their names before.
     """
-    paths = [Path(why.removesuffix(records.DAMAGED)) for why in found.faults.values() if why.endswith(records.DAMAGED)]
+    whys = dict.fromkeys(why for _, why in found.faults if why.endswith(records.DAMAGED))
+    paths = [Path(why.removesuffix(records.DAMAGED)) for why in whys]
     for path in paths:
         rename(path)
     return paths

@@ -36,14 +36,16 @@ NAMED_BY = "SPRINGTUNE_WORKFLOW"
         "springtune run config/mine.yaml --workflow-profile slurm",
     ),
     context_settings={"ignore_unknown_options": True},
-    options_metavar="[--strict] [--max-scenes N]",
+    options_metavar="[--strict] [--max-scenes N] [--no-diff] [--no-host]",
 )
 @max_scenes
 @click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
+@click.option("--no-diff", is_flag=True, help="Leave what differs from the commit out of the dataset.")
+@click.option("--no-host", is_flag=True, help="Leave the machine's name out of the dataset.")
 @click.argument(
     "arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]", shell_complete=studies_here
 )
-def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
+def run(most: int | None, strict: bool, no_diff: bool, no_host: bool, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake in the folder of the checkout, where results/ is; in this folder, if the
@@ -88,6 +90,9 @@ def run(most: int | None, strict: bool, arguments: tuple[str, ...]) -> None:
     workflow = [] if folder == checkout else ["--snakefile", str(checkout / "Snakefile")]
     # A list of targets would take a path that follows it for one more of them, and so would --configfile.
     command = [*_snakemake(), *workflow, *options, "--configfile", str(path)]
+    for option, chosen in (("no_diff", no_diff), ("no_host", no_host)):
+        if chosen:
+            os.environ[f"SPRINGTUNE_{option.upper()}"] = "true"
     os.chdir(folder)
     if not strict or {"-n", "--dry-run", "--dryrun"} & {*options}:
         os.execv(command[0], command)

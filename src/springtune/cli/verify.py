@@ -13,9 +13,6 @@ from .folders import idle, studies
 if TYPE_CHECKING:
     from ..study import Study
 
-TOLD = 20
-"""Most jobs of a study that are told with a fault."""
-
 
 @click.command(
     epilog=examples(
@@ -89,17 +86,14 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
 
     found = verify.files(study, folder)
     click.echo(f"{folder}: {found.compared} files compared with their checksums, faults: {len(found.faults)}")
-    rows = [[name, why] for name, why in found.faults.items()]
-    if rows:
-        click.echo(aligned(rows[:TOLD], 2))
-        if len(rows) > TOLD:
-            click.echo(f"  and {len(rows) - TOLD} more")
+    if found.faults:
+        click.echo(aligned(map(list, found.faults), 2))
         if set_aside:
             idle(folder)
         for path in verify.set_aside(found) if set_aside else ():
             click.echo(f"  set aside: {path}")
         first = "" if set_aside else f"`springtune verify {study.path} --set-aside`, then "
-        click.echo(f"  {first}`springtune run {study.path}` makes it again")
+        click.echo(f"  {first}`springtune run {study.path}` makes them again")
     if found.stale:
         click.echo(f"  out of date, since the study or the program changed: {', '.join(found.stale)}")
     aside = verify.left(folder)

@@ -79,6 +79,11 @@ class Code:
         self._closures: dict[tuple[Path, frozenset[Path], bool], Closure] = {}
         self._taken: dict[Path, tuple[set[Path], set[tuple[str, str]]]] = {}
 
+    @property
+    def files(self) -> frozenset[Path]:
+        """Files that closures were made of so far."""
+        return frozenset(self._sources)
+
     def recall(self, path: Path) -> None:
         """Take what was read before of files with the same content, which costs as much as half a plan.
 

@@ -5,7 +5,7 @@ what it made is still what it was.
 """
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,22 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
 
     Parameters
     ----------
+    path, digest, products, wholly
+        As of `faults`.
+
+    Returns
+    -------
+    str
+        The first of its faults; empty where there is none.
+    """
+    return next(faults(path, digest, products, wholly), "")
+
+
+def faults(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> Iterator[str]:
+    """All reasons for which a job is to run.
+
+    Parameters
+    ----------
     path : str or Path
         Its record.
     digest : str
@@ -66,33 +82,36 @@ def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly:
     wholly : bool, optional
         Whether to compare the checksum of each of them, not only of those whose size or time is another.
 
-    Returns
-    -------
+    Yields
+    ------
     str
-        Empty where it has done what is asked for, and what it made is there as it was.
+        None where it has done what is asked for, and what it made is there as it was.
     """
     path = Path(path)
     if not path.exists():
-        return "not done yet"
+        yield "not done yet"
+        return
     record = sealed.read(path, digest=str, products=dict)
     if record is None:
-        return f"{path}{DAMAGED}"
+        yield f"{path}{DAMAGED}"
+        return
     if record["digest"] != digest:
-        return "something else is asked for"
+        yield "something else is asked for"
+        return
     # A job may make more than it is known to before it runs.
     for product in map(Path, dict.fromkeys([*map(str, products), *record["products"]])):
         known = record["products"].get(str(product))
         try:
             state = product.stat()
         except OSError:
-            if known is None:
-                continue
-            return f"{product}{MISSING}"
+            if known is not None:
+                yield f"{product}{MISSING}"
+            continue
         if known is None:
-            return f"{product} is not what this job made"
+            yield f"{product} is not what this job made"
+            continue
         size, time, content = known
         if (wholly or state.st_mtime_ns != time or state.st_size != size) and (
             state.st_size != size or checksum(product) != content
         ):
-            return f"{product}{DAMAGED}"
-    return ""
+            yield f"{product}{DAMAGED}"
