@@ -374,6 +374,18 @@ class TestVerify:
         assert result.exit_code == 1 and said in " ".join(result.stdout.split()), result.output
         assert "it is not computed again" in result.stdout
 
+    def test_nothing_in_it_forges_a_line(self, packed, tmp_path):
+        """Neither a name of a file, nor what the metadata says of the study."""
+        forged = "a\x1b[2K\n0 faults\r\u202e"
+        content = json.loads(packed["ro-crate-metadata.json"])
+        next(one for one in content["@graph"] if one["@id"] == "./")["name"] = forged
+        changes = {"ro-crate-metadata.json": json.dumps(content).encode(), forged: b""}
+        path = rewritten(packed, tmp_path / "one.zip", **changes)
+        result = CliRunner().invoke(main, ["verify", str(path)], color=True)
+        assert result.exit_code == 1 and r"a\x1b[2K\n0 faults\r\u202e, study one" in result.stdout
+        assert r"a\x1b[2K\n0 faults\r\u202e  was not packed" in result.stdout and "faults: 2" in result.stdout
+        assert not {*result.output} & {"\x1b", "\r", "\u202e"} and "\n0 faults" not in result.output
+
     @pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04"], ids=repr)
     def test_what_is_no_zip(self, tmp_path, content):
         (tmp_path / "one.zip").write_bytes(content)
