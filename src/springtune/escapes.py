@@ -43,12 +43,13 @@ def rst(text: str) -> str:
     Examples
     --------
     >>> print(rst("`click <javascript:alert(1)>`__"))
-    \`click \<javascript\:alert\(1\)\>\`\_\_
+    \ \`click \<javascript\:alert\(1\)\>\`\_\_
     """
-    return PUNCTUATION.sub(r"\\\1", text.strip())
+    # The escaped space is nothing; without it, a line of backslashes would be a transition.
+    return r"\ " + PUNCTUATION.sub(r"\\\1", text.strip())
 
 
-def markdown(text: str) -> str:
+def markdown(text: object) -> str:
     r"""Return Markdown that says a text, also in a cell of a table.
 
     Parameters
@@ -65,7 +66,7 @@ def markdown(text: str) -> str:
     >>> print(markdown("a | b <script>"))
     a \| b \<script\>
     """
-    return re.sub(r"([!-/:-@[-`{-~])", r"\\\1", shown(text).strip())
+    return re.sub(r"([]\\`*_[<>|#~$&])", r"\\\1", shown(text).strip())
 
 
 def no_mathematics(text: str) -> str:

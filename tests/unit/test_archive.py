@@ -32,7 +32,7 @@ REPOSITORY = Path(__file__).parents[2]
 HOST, PERSON = "a-host-of-its-own", "0000-0002-1825-0097"
 
 STUDY = """
-title: One network of a file's mesh
+title: One <script>network</script> of `a file's` [mesh](javascript:x)
 beams: {20x10: {length: 20 mm, height: 10 mm}}
 materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
 mesh_files: {plate: [{file: plate mesh.vtu, beam: 20x10, mesh_size: 5 mm}]}
@@ -184,6 +184,12 @@ class TestContents:
             }
             assert "config/forces.csv" in json.loads(after.attrs["inputs"])
 
+    def test_a_title_is_a_text(self, packed, graph):
+        title = "One <script>network</script> of `a file's` [mesh](javascript:x)"
+        assert graph["./"]["name"] == title
+        heading = packed["README.md"].decode().splitlines()[0]
+        assert heading == r"# One \<script\>network\</script\> of \`a file's\` \[mesh\](javascript:x)"
+
     def test_metadata_says_who_and_under_which_licence_as_citation_does(self, graph):
         root = graph["./"]
         people = [graph[one["@id"]] for one in root["author"]]
@@ -191,7 +197,7 @@ class TestContents:
         assert [one["@type"] for one in people] == ["Person", "Organization"]
         assert people[0]["@id"].endswith(PERSON) and graph[people[0]["affiliation"]["@id"]]["name"] == "Somewhere"
         assert graph[root["license"]["@id"]]["@id"] == "https://spdx.org/licenses/MIT"
-        assert root["keywords"] == "springs" and root["name"] == "One network of a file's mesh"
+        assert root["keywords"] == "springs"
 
     def test_metadata_tells_the_run_and_its_jobs(self, graph):
         workflow = graph[graph["./"]["mainEntity"]["@id"]]

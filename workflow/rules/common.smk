@@ -12,6 +12,7 @@ from snakemake.settings.enums import Quietness
 
 from springtune.campaign import due, locks, workload
 from springtune.campaign.plan import plan, stages
+from springtune.escapes import rst
 from springtune.jobs import commands
 from springtune.jobs.atomic import remove_unfinished
 from springtune.jobs.dependencies import CODE_FILE, OURS
@@ -48,7 +49,7 @@ def lasting():
 
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
-config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
+config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 OURS.recall(RESULTS.parent / CODE_FILE)
 ON_CLUSTER = workflow.resource_settings.nodes is not None
 # A cluster has room for all jobs: only how long one lasts says how many there are. A child plans as the run did.

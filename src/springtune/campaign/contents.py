@@ -12,6 +12,7 @@ from filecmp import cmp
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+from ..escapes import markdown
 from ..jobs import records
 from ..jobs.commands import COMMANDS_FILE
 from ..jobs.dependencies import PACKAGE
@@ -473,7 +474,7 @@ def _readme(found: Contents) -> str:
     commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
     version = found.attributes["springtune_version"]
     changed = f"; what differs from the commit is in `{DIFF}`" if found.code.diff else ""
-    return f"""# {found.study.title}
+    return f"""# {markdown(found.study.title)}
 
 The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is
 described in `{METADATA}`: this is an RO-Crate.

@@ -244,7 +244,11 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
                 for row in one.rows
             ]
             more = [f"  and {one.changed - len(rows)} more; --all shows them"] if one.changed > len(rows) else []
-            yield [f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}", *aligned(rows, 0).splitlines(), *more]
+            yield [
+                f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}",
+                *aligned(rows, 0).splitlines(),
+                *more,
+            ]
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:

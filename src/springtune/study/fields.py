@@ -434,5 +434,7 @@ class Sections:
     def _read(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         listed = [value] if isinstance(value, dict) else value
         if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-            raise refuse(f"{show(value)} instead of keys and values; give those to leave out, such as {{mesh_size: 1 mm}}")
+            raise refuse(
+                f"{show(value)} instead of keys and values; give those to leave out, such as {{mesh_size: 1 mm}}"
+            )
         return handler(listed)
