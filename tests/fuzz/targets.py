@@ -5,29 +5,39 @@ import io
 import json
 import os
 import random as generators
+import re
 import shutil
 import tempfile
 import warnings
 import zipfile
 from contextlib import redirect_stdout
 from functools import cache
+from html.parser import HTMLParser
 from pathlib import Path
 
 import click
 import h5py
+import jinja2
 import meshio
 import numpy as np
 import yaml
+from docutils import nodes
+from docutils.core import publish_doctree
 from harness import Refused, Target, Wrong
+from markdown_it import MarkdownIt
+from matplotlib.figure import Figure
 from mutations import WORDS, spoil_bytes, spoil_tree
 
 import springtune as st
 from springtune.browse.page import page
 from springtune.campaign import reproduction
 from springtune.campaign.contents import METADATA, SUMS
+from springtune.campaign.page import html as tables_page
+from springtune.campaign.page import shown as shown_table
 from springtune.cli.archived import verified
 from springtune.cli.diff import comparison_text
 from springtune.cli.info import info_text
+from springtune.escapes import UNSEEN, markdown, no_mathematics, rst
 from springtune.handover.formats import ENDINGS
 from springtune.kinds import kinds, load_study
 from springtune.kinds.scenes.summary import summary
@@ -44,9 +54,11 @@ from springtune.mesh.group_files import read_shape
 from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.output import reading
+from springtune.output.canvas import png_and_pdf
 from springtune.output.comparison import compare
 from springtune.output.dataset import write
 from springtune.output.export import export
+from springtune.output.style import styled
 
 import synthetic
 
@@ -537,8 +549,122 @@ def read_archive(made):
     return "accepted" if whole else "faulty"
 
 
+# -- texts -------------------------------------------------------------------------------------------------------------
+
+PIECES = (
+    *("`click <javascript:alert(1)>`__", "<script>alert(1)</script>", "$x_{", "$", ".. raw:: html", "*", "**", "|b|"),
+    *("Statistics_", "a__", "http://x.org", "x@y.org", "[1]_", "`a`", "::", "\\", "\\\\", '#panic("x")', "{{ 7*7 }}"),
+    *("{%", "%}", "<!--", "&lt;", "'", '"', "- ", "1. ", "+ ", "===", "```", "~~", "[a](b)", "![a](b)", ">>> ", ":f: "),
+    *(
+        "\n",
+        "\r",
+        "\0",
+        "\x1b[2K",
+        "\t",
+        "\x85",
+        "\u2028",
+        "\u202e",
+        "\ud800",
+        "é",
+        "中",
+        "\u00a0",
+        " ",
+        "  ",
+        "x",
+        "0",
+    ),
+)
+"""Parts of texts that mean something to a terminal, or in RST, HTML, Markdown, Jinja, Typst or a formula."""
+
+FEW_TAGS = {"meta", "style", "html", "head", "body", "title", "h1", "h2", "p", "div", "table", "thead", "tbody", "tr",
+            "th", "td", "a"}  # fmt: skip
+"""Tags of the page of tables."""
+
+
+def texts(random, folder):
+    """A study with a hostile title, source and name of a grid, and the text of all of them."""
+    text = "".join(random.choice(PIECES[: random.choice((44, len(PIECES)))]) for _ in range(random.randrange(1, 9)))
+    path = folder / "study.yaml"
+    # As JSON, which has escapes for all of it, and is YAML.
+    beam = {"beam": "b", "mesh_type": "structured", "mesh_size": "5 mm", "material": "m", "load": "traction"}
+    study = {
+        "title": text,
+        "beams": {"b": {"length": "20 mm", "height": "10 mm"}},
+        "materials": {"m": {"young_modulus": "1 MPa", "poisson_ratio": 0.3}},
+        "grids": {text: beam | {"force": "1 N", "definition": "lattice", "sensitivity": False}},
+    }
+    path.write_text(json.dumps(study))
+    return path, text
+
+
+def read_texts(made):
+    """Read a study, and look at what becomes of its title in a report, a table, a figure and a readme."""
+    path, text = made
+    try:
+        title = load_study(path).title
+    except st.StudyError as error:
+        message = str(error)
+        if not re.match(r"\S+/study.yaml:1: (title|grids)\b.*;", message) or UNSEEN.search(message.replace("\n", "")):
+            raise Wrong(f"is refused without line, key or remedy, or in other characters: {message!r}") from None
+        raise Refused(message) from None
+    if title != text or UNSEEN.search(title):
+        raise Wrong(f"is accepted as {title!r}")
+    said = " ".join(title.split())
+    caption = jinja2.Template((REPOSITORY / "workflow/report/study.rst").read_text())
+    links = "\n\n.. _Statistics: x\n.. _Workflow: x\n"
+    config = {"title": rst(title), "results": "results/study"}
+    document = publish_doctree(
+        caption.render(snakemake={"config": config}) + links, settings_overrides={"report_level": 5}
+    )
+    odd = [
+        type(node).__name__
+        for node in document.findall()
+        if isinstance(node, nodes.raw | nodes.system_message | nodes.problematic)
+    ]
+    named = [node.astext() for node in document.findall(nodes.reference)]
+    if odd or named != ["Statistics", "Workflow"] or " ".join(document[0].astext().split()) != said:
+        raise Wrong(f"is {odd}, links {named} and {document[0].astext()!r} in a report")
+    table = {"stem": "x", "title": title, "note": title, "rows": [{"scene": title}]}
+    tags = Tags(tables_page([], [shown_table(table)], [], {"title": title}))
+    if tags.found - FEW_TAGS or " ".join("".join(tags.texts).split()).count(said) < 4:
+        raise Wrong(f"is {tags.found - FEW_TAGS} and {tags.texts} on a page")
+    heading = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"]).parse(f"# {markdown(title)}")
+    inline = heading[1].children or []
+    if {one.type for one in inline} - {"text", "text_special"} or "".join(
+        one.content for one in inline
+    ).split() != said.split():
+        raise Wrong(f"is {[one.type for one in inline]} in a readme")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of characters that the font has not
+        png_and_pdf(_titled(title).figure)
+    return "accepted"
+
+
+class Tags(HTMLParser):
+    """Tags and texts of a page."""
+
+    def __init__(self, content):
+        super().__init__()
+        self.found, self.texts = set(), []
+        self.feed(content)
+
+    def handle_starttag(self, tag, attributes):
+        self.found.add(tag)
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+@styled
+def _titled(text):
+    panel = Figure(figsize=(2, 1)).subplots()
+    panel.set_title(text)
+    panel.set_yticks([0], [no_mathematics(text)])
+    return panel
+
+
 TARGETS = (
-    Target("studies as bytes", study_bytes, read_study, 29),
+    Target("studies as bytes", study_bytes, read_study, 28),
     Target("studies by structure", study_trees, read_study, 17),
     Target("mesh files as bytes", mesh_bytes, read_mesh, 14),
     Target("mesh files by structure", mesh_structure, read_mesh, 14),
@@ -548,6 +674,7 @@ TARGETS = (
     Target("nets as bytes", net_bytes, read_net, 4),
     Target("archives as bytes", archive_bytes, read_archive, 1),
     Target("archives by structure", archive_structure, read_archive, 2),
+    Target("texts", texts, read_texts, 4),
 )
 
 

@@ -39,7 +39,7 @@ REPOSITORY = Path(__file__).parents[2]
 HOST, PERSON = "a-host-of-its-own", "0000-0002-1825-0097"
 
 STUDY = """
-title: One network of a file's mesh
+title: One <script>network</script> of `a file's` [mesh](javascript:x)
 beams: {20x10: {length: 20 mm, height: 10 mm}}
 materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
 mesh_files: {plate: [{file: plate mesh.vtu, beam: 20x10, mesh_size: 5 mm}]}
@@ -206,6 +206,12 @@ class TestContents:
             }
             assert "config/forces.csv" in json.loads(after.attrs["inputs"])
 
+    def test_a_title_is_a_text(self, packed, graph):
+        title = "One <script>network</script> of `a file's` [mesh](javascript:x)"
+        assert graph["./"]["name"] == title
+        heading = packed["README.md"].decode().splitlines()[0]
+        assert heading == r"# One \<script\>network\</script\> of \`a file's\` \[mesh\](javascript:x)"
+
     def test_metadata_says_who_and_under_which_licence_as_citation_does(self, graph):
         root = graph["./"]
         people = [graph[one["@id"]] for one in root["author"]]
@@ -213,7 +219,7 @@ class TestContents:
         assert [one["@type"] for one in people] == ["Person", "Organization"]
         assert people[0]["@id"].endswith(PERSON) and graph[people[0]["affiliation"]["@id"]]["name"] == "Somewhere"
         assert graph[root["license"]["@id"]]["@id"] == "https://spdx.org/licenses/MIT"
-        assert root["keywords"] == "springs" and root["name"] == "One network of a file's mesh"
+        assert root["keywords"] == "springs"
 
     def test_metadata_tells_the_run_and_its_jobs(self, graph):
         workflow = graph[graph["./"]["mainEntity"]["@id"]]
@@ -497,6 +503,18 @@ class TestVerify:
         result = run("verify", rewritten(packed, tmp_path / "one.zip", **changes), "--reproduce")
         assert result.exit_code == 1 and said in " ".join(result.stdout.split()), result.output
         assert "it is not computed again" in result.stdout
+
+    def test_nothing_in_it_forges_a_line(self, packed, tmp_path):
+        """Neither a name of a file, nor what the metadata says of the study."""
+        forged = "a\x1b[2K\n0 faults\r\u202e"
+        content = json.loads(packed["ro-crate-metadata.json"])
+        next(one for one in content["@graph"] if one["@id"] == "./")["name"] = forged
+        changes = {"ro-crate-metadata.json": json.dumps(content).encode(), forged: b""}
+        path = rewritten(packed, tmp_path / "one.zip", **changes)
+        result = CliRunner().invoke(main, ["verify", str(path)], color=True)
+        assert result.exit_code == 1 and r"a\x1b[2K\n0 faults\r\u202e, study one" in result.stdout
+        assert r"a\x1b[2K\n0 faults\r\u202e  was not packed" in result.stdout and "faults: 2" in result.stdout
+        assert not {*result.output} & {"\x1b", "\r", "\u202e"} and "\n0 faults" not in result.output
 
     @pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04"], ids=repr)
     def test_what_is_no_zip(self, tmp_path, content):

@@ -178,7 +178,11 @@ class TestCombinations:
             ({"exclude": {"mesh_size": "10 mm"}}, "leaves nothing of the grid"),
             ({"exclude": {}}, "no parameter at all"),
             ({"exclude": {"mesh_size": "10 kg"}}, "'10 kg' is of dimension [mass]"),
-            ({"exclude": "10 mm"}, "'10 mm' instead of keys and values"),
+            (
+                {"exclude": "10 mm"},
+                "'10 mm' instead of keys and values; give those to leave out, such as {mesh_size: 1 mm}",
+            ),
+            ({"exclude": [["10 mm"]]}, "a list instead of keys and values; give those to leave out, such as"),
         ],
     )
     def test_refused(self, refusal, keys, said):

@@ -6,6 +6,7 @@ from itertools import combinations
 import matplotlib
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
@@ -23,6 +24,36 @@ from synthetic import dataset
 @pytest.fixture(scope="module")
 def tree():
     return dataset()
+
+
+# -- texts of others ---------------------------------------------------------------------------------------------------
+
+HOSTILE = "$x_{$ </text><script>"
+
+RENAMED = ("beam", "mesh_type", "material", "definition", "shape", "quantity", "refinement")
+"""Dimensions whose labels are somebody's, and not chosen by name in a figure."""
+
+
+def foreign(data):
+    """A group whose labels, messages and sources end in what matplotlib takes for mathematics, and cannot set."""
+    names = {name: [f"{label} {HOSTILE}" for label in data[name].values] for name in RENAMED if name in data.coords}
+    texts = {
+        name: one.copy(data=one.values + f" {HOSTILE}")
+        for name, one in data.data_vars.items()
+        if str(name).endswith(("message", "scene", "source", "remark", *(f"{one}_name" for one in RENAMED)))
+    }
+    return data.assign(texts).assign_coords(names)
+
+
+@each
+def test_a_dollar_sign_in_a_text_is_one(tree, plot):
+    other = xr.DataTree.from_dict({node.path: foreign(node.to_dataset(inherit=False)) for node in tree.subtree})
+    chosen = {name: f"{label} {HOSTILE}" if name in RENAMED else label for name, label in EVERY_PLOT[plot][0].items()}
+    figure = np.ravel(plot(other, **chosen))[0].figure
+    png_and_pdf(figure)  # no exception
+    content = io.StringIO()
+    figure.savefig(content, format="svg")
+    assert "<script>" not in content.getvalue()
 
 
 # -- what a journal takes ----------------------------------------------------------------------------------------------

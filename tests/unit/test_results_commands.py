@@ -9,6 +9,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
+import h5py
 import meshio
 import numpy as np
 import pytest
@@ -73,6 +74,72 @@ def path(tmp_path_factory):
     attributes |= {"inputs": json.dumps({"config/small.yaml": "5" * 64}), "software": json.dumps({"numpy": "2.0"})}
     dataset.write(folder / "dataset.nc", {"/": root, "/sensitivity": curves}, attributes)
     return folder
+
+
+FORGED = "\x1b[2K\n0 faults\r\x07\u202e"
+"""What would forge a line on a terminal."""
+
+
+@pytest.fixture(scope="module")
+def forged(tmp_path_factory):
+    """Datasets as somebody else may have written them: what forges lines wherever a text stands."""
+    root, curves = ROOT.empty(AXES), SENSITIVITY.empty(AXES)
+    root["reference_applies"].values[...] = 1
+    root["status"].values[...], root["deformation_error"].values[...] = 1, 0.01
+    root["status"].values.flat[0], root["message"].values.flat[0] = 5, FORGED
+    names = {name: [f"{label}{FORGED}" for label in root[name].values] for name in ("beam", "material", "definition")}
+    root, curves = root.assign_coords(names), curves.assign_coords({key: names[key] for key in ("beam", "material")})
+    root["residual"].attrs["long_name"] = FORGED
+    attributes = {"springtune_version": FORGED, "study": FORGED, "title": FORGED, "git_commit": FORGED, "host": FORGED}
+    attributes |= {"created": FORGED, "software": json.dumps({FORGED: FORGED}), "inputs": json.dumps({FORGED: FORGED})}
+    folder = tmp_path_factory.mktemp("datasets")
+    for name in ("forged", "other", "named"):
+        (folder / name).mkdir()
+        dataset.write(folder / name / "dataset.nc", {"/": root, "/sensitivity": curves}, attributes)
+        root["displacement"].values[...] = 7.0
+        root["status"].values[...] = 2
+    with h5py.File(folder / "named/dataset.nc", "r+") as file:  # netCDF's own library writes no such names
+        file.move("solver", f"solver{FORGED}")
+        file.move("sensitivity", FORGED)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["info", "{forged}"],
+        ["info", "{named}"],
+        ["diff", "{forged}", "{named}"],
+        ["diff", "{path}", "{forged}"],
+        ["diff", "{forged}", "{path}", "--json"],
+        ["diff", "{forged}", "{other}"],
+        ["accept", "{forged}", "--to", "{out}.yaml"],
+        ["accept", "{forged}", "--to", "{out}.yaml", "--unsolved"],
+        ["export", "{forged}", "--to", "{out}.csv"],
+        ["export", "{forged}", "--to", "{out}.csv", "--group", "nothing"],
+        ["export", "{forged}", "--to", "{out}.csv", "--select", "beam=nothing"],
+        ["export", "{forged}", "--to", "{out}.csv", "--variables", "nothing"],
+        ["export", "{forged}", "--to", "{out}.vtu", "--select", "beam=nothing"],
+        ["browse", "{out}/{forge}"],
+        ["verify", "{out}/{forge}.zip"],
+        ["verify", "{out}/{forge}"],
+        ["merge", "{out}/{forge}.yaml", "a"],
+        ["split", "{out}/{forge}.yaml", "--into", "2"],
+        ["archive", "{out}/{forge}.yaml"],
+        ["scenes", "{out}/{forge}.yaml"],
+        ["{forge}"],
+    ],
+    ids=" ".join,
+)
+def test_nothing_forges_a_line_on_a_terminal(path, forged, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    places = {"path": path, "out": tmp_path / "out", "forge": FORGED}
+    places |= {name: forged / name for name in ("forged", "other", "named")}
+    # As on a terminal: elsewhere click leaves out what it takes for colours.
+    result = CliRunner().invoke(main, [one.format(**places) for one in arguments], color=True)
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exc_info
+    assert result.output and not {*result.output} & {*FORGED} - {*"\n0 faults[2K"}, ascii(result.output)
+    assert not any(line.startswith("0 faults") for line in result.output.splitlines()), result.output
 
 
 class TestInfo:

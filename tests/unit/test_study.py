@@ -680,6 +680,58 @@ def test_broken_file(refusal, case):
     assert refusal(text).startswith(expected)
 
 
+CONTROLS = {
+    "title": (("A small study", r'"two\nlines"'), r"study.yaml:1: title: 'two\nlines' has '\n'; write one line of"),
+    "block": (("A small study", "|\n  two\n  lines"), r"study.yaml:1: title: 'two\nlines' has '\n'; write one line"),
+    "escape": (("A small study", r'"\e[2K"'), r"study.yaml:1: title: '\x1b[2K' has '\x1b'; write one line of"),
+    "direction": (("A small study", "a\u202eb"), r"study.yaml:1: title: 'a\u202eb' has '\u202e'; write one line"),
+    "half a character": (("A small study", r'"a\ud800b"'), r"title: 'a\ud800b' has '\ud800'; write one line"),
+    "name of a grid": (("  pull:", r'  "pu\nll":'), r"study.yaml:15: grids.pu\nll: 'pu\nll' has '\n'; write one line"),
+    "name of a beam": (("  long:", r'  "lo\0ng":'), r"study.yaml:3: beams.lo\x00ng: 'lo\x00ng' has '\x00'; write"),
+    "item": (("[long, short]", r'[long, "sh\rort"]'), r"beam[1]: 'sh\rort' has '\r'; write one line"),
+}
+
+FILES = {
+    "test": ("{young_modulus: 210 GPa, poisson_ratio: 0.3}", r'{uniaxial_test: "uni.csv\0x"}', "uniaxial_test"),
+    "printed": ("beams:", 'printed: "a\\0.csv"\nbeams:', "printed"),
+    "mesh": ("beams:", 'mesh_files: {own: [{file: "a\\0", beam: long, mesh_size: 5 mm}]}\nbeams:', "own[0].file"),
+    "rows": ("    beam: short", r'    rows: "\0.csv"', "rows"),
+}
+
+
+@pytest.mark.parametrize("case", CONTROLS)
+def test_texts_are_one_line_without_control_characters(refusal, case):
+    replacement, expected = CONTROLS[case]
+    message = refusal(changed(replacement))
+    assert expected in message and message.isprintable()
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_no_path_has_a_control_character(refusal, case):
+    old, new, key = FILES[case]
+    message = refusal(changed((old, new)))
+    assert f"{key}: '" in message and r"has '\x00'; write one line" in message and message.isprintable()
+
+
+def test_a_folded_text_of_one_line_is_one(load):
+    assert load(changed(("title: A small study", "title: >\n  A small\n  study"))).title == "A small study"
+
+
+def test_lines_of_a_table_are_lines(refusal, tmp_path):
+    (tmp_path / "rows.csv").write_text('beam,force\nshort,"1 \x1b[2KkN"\n')
+    message = refusal(changed(("    beam: short\n", "    rows: rows.csv\n"), ("    force: 20 kN\n", "")))
+    assert message == r"rows.csv:2: '1 \x1b[2KkN' has '\x1b'; write one line of characters that can be seen"
+
+
+def test_no_other_file_writes_lines_of_a_message(refusal, tmp_path):
+    """Neither a tag, nor the name of a folder."""
+    assert r"'!a\x1b\n0 faults'" in refusal("title: !a%1b%0a0%20faults x\n")
+    (tmp_path / "a\nb").mkdir()
+    with pytest.raises(StudyError) as caught:
+        load_study(tmp_path / "a\nb/none.yaml")
+    assert r"a\nb/none.yaml: cannot be read" in str(caught.value)
+
+
 def test_missing_file_and_folder(tmp_path):
     for path in (tmp_path / "no.yaml", tmp_path):
         with pytest.raises(StudyError, match="cannot be read: .*; give the path of a study"):

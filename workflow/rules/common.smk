@@ -13,6 +13,7 @@ from snakemake_logger_plugin_springtune import LogHandler
 
 from springtune.campaign import due, locks, workload
 from springtune.campaign.plan import plan, stages
+from springtune.escapes import rst
 from springtune.jobs import commands
 from springtune.jobs.atomic import remove_unfinished
 from springtune.jobs.dependencies import CODE_FILE, OURS
@@ -64,7 +65,7 @@ def chosen_untold():
 UNTOLD = chosen_untold()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
-config |= {"title": STUDY.title, "results": str(RESULTS)}  # for the report's text
+config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 OURS.recall(RESULTS.parent / CODE_FILE)
 ON_CLUSTER = workflow.resource_settings.nodes is not None
 # A cluster has room for all jobs: only how long one lasts says how many there are. A child plans as the run did.

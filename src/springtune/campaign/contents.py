@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from ..browse import page as browse
+from ..escapes import markdown
 from ..jobs import records
 from ..jobs.atomic import write_text
 from ..jobs.commands import COMMANDS_FILE
@@ -527,7 +528,7 @@ def _readme(found: Contents) -> str:
     changed += (
         f"; what of package, rules and study differs from the commit is in `{DIFF}`" if DIFF in found.files else ""
     )
-    return f"""# {found.study.title}
+    return f"""# {markdown(found.study.title)}
 
 The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is
 described in `{METADATA}`: this is an RO-Crate.

@@ -37,20 +37,25 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     """
     tables = [table for kind in kinds() if kind.tables for table in kind.module("tables").tables(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("springtune.output", ""), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    )
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
-    written["index.html"] = environment.get_template("page.html").render(
-        tables=scenes,
-        further=[shown(table) for table in tables if "title" in table],
-        beams=_beams(tree.to_dataset()),
-        marks={mark for table in scenes for mark in table["marks"]},
-        attributes=tree.attrs,
-    )
+    further = [shown(table) for table in tables if "title" in table]
+    written["index.html"] = html(scenes, further, _beams(tree.to_dataset()), tree.attrs)
     for name, text in written.items():
         write_text(Path(folder) / name, text)
     return list(written)
+
+
+def html(
+    scenes: list[dict[str, Any]], further: list[dict[str, Any]], beams: list[str], attributes: Mapping[Any, Any]
+) -> str:
+    """The page of the tables of scenes and of others, as `shown` gives them, with the dataset's attributes."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("springtune.output", ""), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    marks = {mark for table in scenes for mark in table["marks"]}
+    return environment.get_template("page.html").render(
+        tables=scenes, further=further, beams=beams, marks=marks, attributes=attributes
+    )
 
 
 def _beams(root: xr.Dataset) -> list[str]:

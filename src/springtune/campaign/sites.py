@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..escapes import shown
 from ..jobs import atomic, records, sealed, store
 from ..jobs.damage import DamagedError
 from ..jobs.guard import Watch
@@ -55,7 +56,16 @@ ELSEWHERE = f"{TASKS}/elsewhere.json"
 
 
 class MergeError(Exception):
-    """Results that do not fit together; the message names them and the remedy."""
+    """Results that do not fit together; the message names them and the remedy.
+
+    Parameters
+    ----------
+    *lines : str
+        Lines of the message.
+    """
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__("\n".join(map(shown, lines)))
 
 
 class _NotStoredError(Exception):
@@ -164,7 +174,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
             places[place].append(site.folder / place)
     if missing and not incomplete:
         remedy = "nothing is merged; --incomplete merges what is there, and the study computes the rest"
-        raise MergeError("\n".join([*missing, remedy]))
+        raise MergeError(*missing, remedy)
     locks.begin([target])
     try:
         written = take_in(study, places, target)
@@ -461,4 +471,4 @@ def told(merged: Merged, parts: Iterable[Path]) -> str:
     lines = [f"{merged.folder}: {len([*parts])} parts, {merged.files} files, {merged.written} of them written"]
     if merged.missing:
         lines += ["still to be computed:", *(f"  {line}" for line in merged.missing)]
-    return "\n".join(lines)
+    return "\n".join(map(shown, lines))

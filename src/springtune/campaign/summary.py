@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..escapes import shown
 from ..jobs import sealed
 from ..jobs.damage import ASIDE
 from ..kinds.scenes.lawful import of_own_law
@@ -133,11 +134,11 @@ def _named(cells: Cells) -> Iterator[str]:
     for cell in cells:
         reasons.setdefault(without_numbers(cell[1]), []).append(cell)
     order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
-    shown = order if len(order) <= NAMED + 1 else order[:NAMED]
-    for labels, message in shown:
-        yield f"  {': '.join(filter(None, (labels, message)))}"
-    if len(shown) < len(order):
-        yield f"  and {len(order) - len(shown)} more"
+    told = order if len(order) <= NAMED + 1 else order[:NAMED]
+    for labels, message in told:
+        yield f"  {shown(': '.join(filter(None, (labels, message))))}"
+    if len(told) < len(order):
+        yield f"  and {len(order) - len(told)} more"
 
 
 def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":

@@ -1,13 +1,18 @@
 """Command line: `springtune COMMAND`."""
 
+import io
+import os
+import sys
 import warnings
+from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 import click
 
 from .. import __version__
+from ..escapes import UNSEEN, shown
 from .examples import examples
 
 
@@ -53,8 +58,58 @@ SAID = f"{__name__}.said"
 """Warnings of a command, in its context."""
 
 
+COMPLETION = "_SPRINGTUNE_COMPLETE"
+"""Variable by which a shell asks click for completions."""
+
+
+class Shown(io.TextIOBase):
+    """Stream on which control characters but line breaks and tabs are shown, whoever prints them.
+
+    Parameters
+    ----------
+    stream : text stream
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]  # typeshed has an attribute
+        """Encoding of the stream."""
+        return self._stream.encoding
+
+    @property
+    def errors(self) -> str | None:  # type: ignore[override]
+        """What becomes of characters that it has not."""
+        return self._stream.errors
+
+    def write(self, text: str) -> int:
+        """Write a text, and say how long it is."""
+        self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush the stream."""
+        self._stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether the stream is a terminal."""
+        return self._stream.isatty()
+
+    def fileno(self) -> int:
+        """Number of the stream's file."""
+        return self._stream.fileno()
+
+
 class Commands(click.Group):
-    """Group whose commands are imported when they are called."""
+    """Group whose commands are imported when they are called, and that sends no control character to a terminal."""
+
+    def main(self, *arguments: Any, **keywords: Any) -> Any:
+        """Run a command."""
+        if COMPLETION in os.environ:  # bytes, and for a shell
+            return super().main(*arguments, **keywords)
+        with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):
+            return super().main(*arguments, **keywords)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands."""
@@ -94,13 +149,13 @@ def main() -> None:
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """
-    shown, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, [])
+    usual, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, [])
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
         if category.__name__ == "AssumptionWarning":  # not imported, so that --help does not wait for it
-            said.append(f"warning: {message}")
+            said.append(f"warning: {shown(message)}")
         else:
-            shown(message, category, *where, **further)
+            usual(message, category, *where, **further)
 
     warnings.showwarning = show
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..escapes import shown
 from .diff import DIFFERENT, Trouble, comparison_text, opened, tolerance
 from .examples import examples
 from .folders import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
@@ -71,8 +72,8 @@ def accept(
         _accept(dataset_path(results), target, names, relative, absolute, unsolved)
     except (OSError, ValueError) as error:
         if str(error).startswith("--"):  # an option names what is not there
-            raise WrongCall(str(error)) from None
-        raise click.ClickException(str(error)) from None
+            raise WrongCall(shown(error)) from None
+        raise click.ClickException(shown(error)) from None
 
 
 def _accept(
@@ -136,7 +137,7 @@ def _tell_unsolved(holes: list[tuple[str, str, str, str]]) -> None:
     click.echo(f"{len(holes)} are not solved:", err=True)
     for group, place, status, why in holes[:LISTED_UNSOLVED]:
         head = "" if group == "/" else f"{group}: "
-        click.echo(f"  {head}{place}: {status}{f', {why}' if why else ''}", err=True)
+        click.echo(shown(f"  {head}{place}: {status}{f', {why}' if why else ''}"), err=True)
     if len(holes) > LISTED_UNSOLVED:
         click.echo(f"  and {len(holes) - LISTED_UNSOLVED} more", err=True)
 
@@ -169,6 +170,6 @@ def _check(results: str | None, target: Path | None, every: bool) -> None:
             departed |= found.different
             click.echo(comparison_text(found, (file, path), sides=("accepted", "now")))
     except (OSError, ValueError) as error:
-        raise Trouble(str(error)) from None
+        raise Trouble(shown(error)) from None
     if departed:
         raise click.exceptions.Exit(DIFFERENT)

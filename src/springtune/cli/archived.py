@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..escapes import shown
 from ..output.text import aligned
 
 if TYPE_CHECKING:
@@ -36,9 +37,9 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
     try:
         found = check(path)
     except ReproductionError as error:
-        raise click.ClickException(str(error)) from None
+        raise click.ClickException(shown(error)) from None
     except OSError as error:
-        raise click.ClickException(f"{path}: cannot be read ({error.strerror}); give an archive") from None
+        raise click.ClickException(shown(f"{path}: cannot be read ({error.strerror}); give an archive")) from None
     _tell(found)
     if found.faults:
         if again:
@@ -54,11 +55,11 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
         with tempfile.TemporaryDirectory() as folder:
             return _compared(reproduce(found, Path(folder), fresh, click.echo))
     except (ReproductionError, OSError, ValueError) as error:
-        raise click.ClickException(f"{path}: not reproduced: {error}") from None
+        raise click.ClickException(shown(f"{path}: not reproduced: {error}")) from None
 
 
 def _tell(found: "Checked") -> None:
-    click.echo(f"{found.path}: {found.title}, study {found.study}, springtune {found.version}")
+    click.echo(shown(f"{found.path}: {found.title}, study {found.study}, springtune {found.version}"))
     click.echo(f"  sha256 {found.sha256}")
     click.echo(f"  {found.files} files compared with their checksums, faults: {len(found.faults)}")
     rows = [[name, why] for name, why in sorted(found.faults.items())]
@@ -71,7 +72,7 @@ def _tell(found: "Checked") -> None:
 def _compared(made: "Reproduced") -> bool:
     """Tell of two datasets; whether they are the same, as far as they can be."""
     for name, (before, after) in made.others.items():
-        click.echo(f"  {name}: {before} in the archive, {after} here")
+        click.echo(shown(f"  {name}: {before} in the archive, {after} here"))
     from ..output.comparison import RELATIVE
 
     if made.ended_otherwise:

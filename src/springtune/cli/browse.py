@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from ..escapes import shown
 from .examples import examples
 
 
@@ -28,7 +29,7 @@ def browse(dataset: Path, port: int, no_open: bool) -> None:
         check_opens(dataset)
         server = Server(dataset, port)
     except (OSError, ValueError) as error:
-        raise click.ClickException(str(error)) from None
+        raise click.ClickException(shown(error)) from None
     try:
         with server:
             click.echo(f"{server.address}\nCtrl-C ends it.")

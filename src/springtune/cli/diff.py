@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..output.text import aligned, cell_text
+from ..escapes import shown
+from ..output.text import aligned, cell_text, paragraphs
 from .examples import examples
 from .folders import dataset_path
 
@@ -119,7 +120,7 @@ def diff(
                 sides = ("accepted", "now") if kept else ("before", "after")
                 click.echo(comparison_text(found, paths, sides, None if every else rows, config))
     except (OSError, ValueError) as error:
-        raise Trouble(str(error)) from None
+        raise Trouble(shown(error)) from None
     if found.different:
         raise click.exceptions.Exit(DIFFERENT)
 
@@ -186,7 +187,7 @@ def comparison_text(
         parts.append(_changes(found, changes, sides, most))
     if found.attributes or found.config:
         parts.append(_told(found, config))
-    return "\n\n".join("\n".join(part) for part in parts)
+    return paragraphs(parts)
 
 
 def _summary(found: "Comparison", sides: Sequence[str]) -> str:
@@ -243,7 +244,11 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
                 for row in one.rows
             ]
             more = [f"  and {one.changed - len(rows)} more; --all shows them"] if one.changed > len(rows) else []
-            yield [f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}", aligned(rows, 0), *more]
+            yield [
+                f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}",
+                *aligned(rows, 0).splitlines(),
+                *more,
+            ]
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
@@ -270,8 +275,8 @@ def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str],
     total = sum(one.changed for group in found.groups for one in group.values)
     more = [f"  and {total - len(rows) + 1} more; --all shows them"] if total > len(rows) - 1 else []
     return [
-        "values that changed", aligned([head, *counts], 0, (1, 2)), "",
-        "the largest changes, measured by the tolerance", aligned(rows, 0, (1, 2, 3)), *more,
+        "values that changed", *aligned([head, *counts], 0, (1, 2)).splitlines(), "",
+        "the largest changes, measured by the tolerance", *aligned(rows, 0, (1, 2, 3)).splitlines(), *more,
     ]  # fmt: skip
 
 
@@ -284,7 +289,7 @@ def _told(found: "Comparison", config: bool) -> list[str]:
     """Attributes that differ, and what of the studies' files."""
     lines = ["told, and no difference of results"]
     rows = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
-    lines += [aligned(rows, 0)] if rows else []
+    lines += aligned(rows, 0).splitlines()
     if found.config:
         less, more = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
         lines.append(

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from ..escapes import shown
 from .examples import examples
 from .options import WrongCall
 
@@ -47,6 +48,6 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
         with reading.open(path) as tree, reading.guarded(path):
             click.echo(write(tree, target, group, names, selected(pairs), force))
     except RequestError as error:
-        raise WrongCall(str(error)) from None
+        raise WrongCall(shown(error)) from None
     except (OSError, ValueError) as error:
-        raise click.ClickException(str(error)) from None
+        raise click.ClickException(shown(error)) from None

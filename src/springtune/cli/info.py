@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from ..output.text import aligned, bytes_text, label_text, without_numbers
+from ..escapes import shown
+from ..output.text import aligned, bytes_text, label_text, paragraphs, without_numbers
 from ..problem.status import Status
 from .examples import examples
 
@@ -34,7 +35,7 @@ def info(path: Path) -> None:
         with reading.open(path) as tree, reading.guarded(path):
             click.echo(info_text(tree, path / "dataset.nc" if path.is_dir() else path))
     except (OSError, ValueError) as error:
-        raise click.ClickException(str(error)) from None
+        raise click.ClickException(shown(error)) from None
 
 
 def info_text(tree: "xr.DataTree", path: Path) -> str:
@@ -56,7 +57,7 @@ def info_text(tree: "xr.DataTree", path: Path) -> str:
     errors = _errors(tree)
     parts += [errors] if errors else []
     parts += [_groups(tree), _provenance(tree)]
-    return "\n\n".join("\n".join(lines) for lines in parts)
+    return paragraphs(parts)
 
 
 def _head(tree: "xr.DataTree", path: Path) -> list[str]:
@@ -137,7 +138,7 @@ def _errors(tree: "xr.DataTree") -> list[str]:
             rows.append([f"  {definition}", *kind, *numbers, place])
     right = range(1 + several, 4 + several)
     head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
-    return [head, aligned(rows, 0, right)] if rows[1:] else []
+    return [head, *aligned(rows, 0, right).splitlines()] if rows[1:] else []
 
 
 def _groups(tree: "xr.DataTree") -> list[str]:
@@ -147,7 +148,7 @@ def _groups(tree: "xr.DataTree") -> list[str]:
         rows.append(
             [f"  {node.path}", len(node.data_vars), ", ".join(f"{name} {size}" for name, size in sizes.items())]
         )
-    return ["groups, their variables and dimensions", aligned(rows, 0, (1,))]
+    return ["groups, their variables and dimensions", *aligned(rows, 0, (1,)).splitlines()]
 
 
 def _provenance(tree: "xr.DataTree") -> list[str]:

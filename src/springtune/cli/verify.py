@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from ..escapes import shown
 from ..output.text import aligned
 from .examples import examples
 from .folders import idle, studies
@@ -91,7 +92,7 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
         if set_aside:
             idle(folder)
         for path in verify.set_aside(found) if set_aside else ():
-            click.echo(f"  set aside: {path}")
+            click.echo(shown(f"  set aside: {path}"))
         first = "" if set_aside else f"`springtune verify {study.path} --set-aside`, then "
         click.echo(f"  {first}`springtune run {study.path}` makes them again")
     if found.stale:
@@ -106,7 +107,7 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
     try:
         made = list(verify.again(folder, study.path.parent, scenes, seed))
     except (StudyError, ValueError, OSError) as error:
-        click.echo(f"no scene is computed again: {error}")
+        click.echo(f"no scene is computed again: {shown(error)}")
         return len(found.faults) + 1
     wrong = [one for one in made if not one.agrees]
     largest = max((one.difference for one in made if one.agrees), default=0.0)
@@ -116,5 +117,5 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
     )
     for one in wrong:
         change = f"{one.before}, now {one.after}" if one.before != one.after else f"differs by {one.difference:.1e}"
-        click.echo(f"  {one.labels}: {change}")
+        click.echo(shown(f"  {one.labels}: {change}"))
     return len(found.faults) + len(wrong)

@@ -8,6 +8,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 P = ParamSpec("P")
@@ -107,9 +108,21 @@ def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
     @wraps(plot)
     def inside(*arguments: P.args, **keywords: P.kwargs) -> Drawn:
         with matplotlib.rc_context(SETTINGS):
-            return plot(*arguments, **keywords)
+            drawn = plot(*arguments, **keywords)
+        for panel in np.ravel(np.asarray(drawn, dtype=object)):
+            _as_written(panel)
+        return drawn
 
     return inside
+
+
+def _as_written(panel: Axes) -> None:
+    """Take texts as they are: a label with dollar signs is no formula. Powers of ten beside ticks are."""
+    legend = panel.get_legend()
+    found = [panel.xaxis.label, panel.yaxis.label, *panel.get_children(), *panel.figure.get_children()]
+    for one in (*found, *(legend.get_texts() if legend else ())):
+        if isinstance(one, Text):
+            one.set_parse_math(False)
 
 
 def panels(

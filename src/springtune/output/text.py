@@ -4,12 +4,18 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import SupportsFloat
 
+from ..escapes import shown
 from ..problem.parameters import SWEPT, with_unit
+
+
+def paragraphs(parts: Iterable[Iterable[str]]) -> str:
+    """Paragraphs of lines with an empty line between, each line one line on the terminal whatever values it has."""
+    return "\n\n".join("\n".join(map(shown, lines)) for lines in parts)
 
 
 def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
     """Rows in columns, those in `right` flush right."""
-    texts = [[str(cell) for cell in row] for row in rows]
+    texts = [[shown(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*texts)]
     lines = []
     for row in texts:

@@ -4,7 +4,7 @@ import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from .messages import Key, Problems
+from .messages import Key, Problems, unseen
 
 LARGEST_TABLE = 5_000_000
 """Bytes of the largest CSV file that is read."""
@@ -51,6 +51,8 @@ def read_lines(
     reader = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
     try:
         for row in reader:
+            for why in filter(None, (unseen(cell.strip()) for cell in row)):
+                own.add((), why, reader.line_num)
             if any(cell.strip() for cell in row):
                 yield reader.line_num, row
     except csv.Error as error:

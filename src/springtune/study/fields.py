@@ -296,7 +296,7 @@ class Values(OneOrMore):
             raise refuse(f"{show(spacing)} is no spacing; give {' or '.join(SPACINGS)}", "spacing")
         points = _COUNT.read(given["points"]) if isinstance(given["points"], str) else 0
         if not points:
-            raise refuse(f"{show(given['points'])} instead of {_COUNT.words}", "points")
+            raise refuse(f"{show(given['points'])} instead of a number; give {_COUNT.words}", "points")
         first, last = handler([given["from"], given["to"]])
         if not first < last:
             remedy = "exchange them" if last < first else "give that one value, or a larger 'to'"
@@ -434,5 +434,7 @@ class Sections:
     def _read(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         listed = [value] if isinstance(value, dict) else value
         if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-            raise refuse(f"{show(value)} instead of keys and values, or a list of such")
+            raise refuse(
+                f"{show(value)} instead of keys and values; give those to leave out, such as {{mesh_size: 1 mm}}"
+            )
         return handler(listed)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from pydantic_core import PydanticCustomError
 
+from ..escapes import UNSEEN, shown
+
 Key = str | int
 """A step of a path into a file: a key of a mapping, a number in a list."""
 
@@ -16,7 +18,12 @@ SHOWN_PROBLEMS = 5
 
 
 class StudyError(ValueError):
-    """A study that cannot be run; the message names file, line, key, value and remedy.
+    r"""A study that cannot be run; the message names file, line, key, value and remedy.
+
+    Parameters
+    ----------
+    *lines : str
+        Lines of the message; control characters in them are shown as ``\x1b``.
 
     Examples
     --------
@@ -27,6 +34,12 @@ class StudyError(ValueError):
     ...     print(error)
     config/papers.yaml: cannot be read: No such file or directory; give the path of a study such as config/paper.yaml
     """
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__(*map(shown, lines))
+
+    def __str__(self) -> str:
+        return "\n".join(self.args)
 
 
 class Problems:
@@ -106,7 +119,7 @@ class Problems:
         messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
         more = len(messages) - SHOWN_PROBLEMS
         messages[SHOWN_PROBLEMS:] = [f"... and {more} more"] if more > 0 else []
-        raise StudyError("\n".join(messages))
+        raise StudyError(*messages)
 
 
 def refuse(message: str, *path: Key) -> PydanticCustomError:
@@ -153,4 +166,10 @@ def show(value: object) -> str:
 
 def clipped(text: str) -> str:
     """Text of which a message shows the beginning."""
-    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
+    return shown(text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}...")
+
+
+def unseen(text: str) -> str:
+    """What is wrong with a text that is not one line of characters that can be seen, and the remedy; or nothing."""
+    found = UNSEEN.search(text)
+    return f"{show(text)} has '{shown(found[0])}'; write one line of characters that can be seen" if found else ""

@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from .messages import Key, Problems, StudyError, show
+from .messages import Key, Problems, StudyError, show, unseen
 
 LARGEST_STUDY = 500_000
 """Bytes of the largest study that is read."""
@@ -162,6 +162,15 @@ def _check_value(node: yaml.Node, file: str) -> None:
             _values.constructed_objects.clear()
 
 
+def _check_seen(text: str, path: tuple[Key, ...], node: yaml.Node, file: str) -> None:
+    """Refuse line breaks and control characters: texts are shown on terminals, and are parts of files."""
+    why = unseen(text)
+    if why:
+        problems = Problems(file)
+        problems.add(path, why, node.start_mark.line + 1)
+        problems.stop()
+
+
 def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Key, ...], int], file: str) -> Any:
     if node is None:
         return None
@@ -170,7 +179,10 @@ def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Ke
         return None
     lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.ScalarNode):
-        return node.value
+        # The line break that ends a block is not the text's.
+        text = node.value.rstrip("\n") if node.style in ("|", ">") else node.value
+        _check_seen(text, path, node, file)
+        return text
     if isinstance(node, yaml.SequenceNode):
         return [_content(item, (*path, number), lines, file) for number, item in enumerate(node.value)]
     content: dict[str, Any] = {}
@@ -188,6 +200,7 @@ def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Ke
                 merged = inherited | merged
             continue
         inside = (*path, key.value)
+        _check_seen(key.value, inside, key, file)
         if key.value in content:
             problems = Problems(file, {inside: line})
             problems.add(inside, f"'{key.value}' is given twice, first in line {lines[inside]}; rename or remove one")

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from ...escapes import markdown
 from ...jobs.atomic import write_text
 from ...output.tables import markdown_table
 from ...problem.status import Status
@@ -104,7 +105,7 @@ def _holes(approaches, sizes, status, message):
     lines = []
     for why, places in found.items():
         named = [f"`{name}` ({', '.join(f'{1e3 * size:g}' for size in at)} mm)" for name, at in places.items()]
-        lines.append(f"- {', '.join(named)}: {why}")
+        lines.append(f"- {', '.join(named)}: {markdown(why)}")
     return lines
 
 
@@ -150,7 +151,7 @@ def _solvers(data):
 
 def _curve(data):
     if data.curve_message.item():
-        return [f"None was timed: {data.curve_message.item()}."]
+        return [f"None was timed: {markdown(data.curve_message.item())}."]
     rows = [
         [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
         for count in data.curve_count.values
@@ -171,7 +172,7 @@ def _explicit(data):
         wrong = float(data.explicit_error.sel(mesh_size=size, precision=data.precision.values[-1]))
         rows.append([f"{1e3 * size:g} mm", *numbers, f"{wrong:.1e}"])
     if not rows:
-        words = {str(word) for word in data.explicit_message.values if word}
+        words = {markdown(word) for word in data.explicit_message.values if word}
         return [f"None was timed{': ' + '; '.join(sorted(words)) if words else ''}."]
     heads = [f"{kind}, {threads} thread{'s' if threads > 1 else ''}" for threads, kind in ways]
     heads = ["structured mesh", *heads, f"error, {data.precision.values[-1]}"]
@@ -183,7 +184,7 @@ def _explicit(data):
              f"cache, in GB/s. A plain copy of memory moves {copies}. The numbers of a run do not depend on threads; "
              "errors are those of displacements against double precision, over the largest.", ""]  # fmt: skip
     told = zip(data.mesh_size.values, data.explicit_message.values)
-    lost = [f"- {1e3 * size:g} mm: {word}" for size, word in told if word]
+    lost = [f"- {1e3 * size:g} mm: {markdown(word)}" for size, word in told if word]
     return lines + markdown_table(heads, rows) + (["", *lost] if lost else [])
 
 

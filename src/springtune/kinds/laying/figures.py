@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...escapes import no_mathematics
 from ...output import labels, style
 from ...output.dataset import STATUS
 from ...output.selection import cells, choose, group, labels_of
@@ -141,6 +142,6 @@ def _dots(panel, laid, names, variable):
             said = ", ".join(STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])) or "not asked for"
             panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
                        fontsize=style.SMALL, color="0.25")  # fmt: skip
-    panel.set_yticks(range(len(names)), names)
+    panel.set_yticks(range(len(names)), map(no_mathematics, names))
     panel.set_ylim(len(names) - 0.4, -0.6)
     panel.margins(x=0.12)

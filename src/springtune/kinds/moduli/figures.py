@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.ticker import NullLocator
 
+from ...escapes import no_mathematics
 from ...output import labels, style
 from ...output.dataset import STATUS, most_requested
 from ...output.selection import choose, group, labelled_beam, labels_of, unswept
@@ -316,9 +317,9 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         image = _heat(panel, *(cells[name].transpose("mesh_size", "definition", "load").values
                                for name in ("deformation_error", "status")), beyond)  # fmt: skip
         doubted |= bool(beyond.any())
-        panel.set_xticks(range(len(loads)), loads)
+        panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
         panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
-        panel.set_yticks(range(len(names)), names)
+        panel.set_yticks(range(len(names)), map(no_mathematics, names))
         panel.set_title(material)
         panel.grid(False)
     if figure is not None:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 
+from ...escapes import no_mathematics
 from ...output import labels, style
 from ...output.dataset import NO_NODE, STATUS
 from ...output.selection import choose, group
@@ -292,7 +293,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
                            textcoords="offset points", fontsize=style.SMALL, color="0.4")  # fmt: skip
     if nowhere:
         labels.note(panel, f"nowhere solved: {', '.join(nowhere)}")
-    panel.set_yticks(range(len(rows)), [row["name"] for row in rows])
+    panel.set_yticks(range(len(rows)), [no_mathematics(row["name"]) for row in rows])
     panel.tick_params(axis="y", length=0)
     style.plain(panel, "x")
     handles, names = panel.get_legend_handles_labels()

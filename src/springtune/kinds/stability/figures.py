@@ -5,6 +5,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 
+from ...escapes import no_mathematics
 from ...output import labels, style
 from ...output.dataset import STATUS
 from ...output.selection import group
@@ -438,7 +439,7 @@ def plot_stability_strains(data, ax=None):
             colour = "white" if flags[i, j] in (3, 5) else "black"
             panel.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
         panel.set_xticks(np.arange(len(strains)) + 0.5, [f"{100 * x:g}".replace("-", "−") for x in strains])
-        panel.set_yticks(np.arange(len(names)) + 0.5, names)
+        panel.set_yticks(np.arange(len(names)) + 0.5, map(no_mathematics, names))
     axes[-1].set_xlabel("Strain of a linear sheet under the load [%]")
     kinds = {1: "solved", 4: "unstable: negative pivots; 0.5: limit point there; f: flutter; path: on the way",
              3: "none found: share reached"}  # fmt: skip
@@ -502,7 +503,7 @@ def plot_stability_buckling(data, ax=None):
         for bar, message in zip(bars, data.buckling_message.sel(rows=rows, definition=names).values):
             bar.set_hatch("///" if message else "")  # nothing bifurcates
     left.axhspan(-2, 2, color="0.9", zorder=0)
-    left.set_xticks(places, names, rotation=20)
+    left.set_xticks(places, map(no_mathematics, names), rotation=20)
     left.legend()
     arches = {name: data.sel(definition=name) for name in names}
     known = {name: arch for name, arch in arches.items() if np.isfinite(arch.arch_load.values).any()}

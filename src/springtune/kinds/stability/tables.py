@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from ...escapes import markdown
 from ...jobs.atomic import write_text
 from ...output.dataset import STATUS
 from ...output.tables import markdown_table
@@ -210,7 +211,7 @@ def _buckling(data):
     ]
     heads = ["definition", *(f"{count} rows" for count in data.rows.values)]
     why = dict.fromkeys(str(one) for one in data.buckling_message.values[restricted.values])
-    notes = ["", *(f"\\* {one}" for one in why)] if why else []
+    notes = ["", *(f"\\* {markdown(one)}" for one in why)] if why else []
     return ["### Buckling load of a slender column over Euler's", "", *markdown_table(heads, rows), *notes]
 
 
@@ -222,7 +223,7 @@ def _scenes(root):
         labels = {name: root[name].values[i] for name, i in zip(root.status.dims, place)}
         cell = root.sel(labels)
         labels["mesh_size"] = f"{1e3 * labels['mesh_size']:g} mm"
-        rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)], str(cell.message.item())])
+        rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)], markdown(cell.message.item())])
     solved = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
     return (
         ["### Scenes of the study", "", solved, "", *markdown_table(["scene", "status", "message"], rows), ""]

@@ -1,0 +1,88 @@
+"""Texts that somebody else wrote, put where a terminal, RST, Markdown or matplotlib would read more into them."""
+
+import re
+
+UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Control characters, line breaks, marks that turn the direction of writing, and halves of characters."""
+
+PUNCTUATION = re.compile(r"([^\w\s]|_)")
+"""Whatever a markup language may give a meaning to."""
+
+
+def shown(text: object) -> str:
+    r"""Return a text as one line whose control characters can be read and do nothing.
+
+    Parameters
+    ----------
+    text : object
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(shown("12 faults\x1b[2K\r0 faults\n"))
+    12 faults\x1b[2K\r0 faults\n
+    """
+    return UNSEEN.sub(lambda found: ascii(found[0])[1:-1], str(text))
+
+
+def rst(text: str) -> str:
+    r"""Return reStructuredText that says a text.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(rst("`click <javascript:alert(1)>`__"))
+    \ \`click \<javascript\:alert\(1\)\>\`\_\_
+    """
+    # The escaped space is nothing; without it, a line of backslashes would be a transition.
+    return r"\ " + PUNCTUATION.sub(r"\\\1", text.strip())
+
+
+def markdown(text: object) -> str:
+    r"""Return Markdown that says a text, also in a cell of a table.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(markdown("a | b <script>"))
+    a \| b \<script\>
+    """
+    return re.sub(r"([]\\`*_[<>|#~$&])", r"\\\1", shown(text).strip())
+
+
+def no_mathematics(text: str) -> str:
+    r"""Return a text of a figure in which a dollar sign is one.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(no_mathematics("$x_{"))
+    \$x_{
+    """
+    return text.replace("$", r"\$")

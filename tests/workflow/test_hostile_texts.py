@@ -1,0 +1,138 @@
+"""A study whose texts mean something elsewhere, from its file to all that is made of it: none is more than a text."""
+
+import csv
+import io
+import json
+import re
+import zipfile
+from html.parser import HTMLParser
+
+import pyarrow.parquet
+import pytest
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.browse.page import page
+from springtune.cli import main
+
+HOSTILE = (
+    "`click <javascript:alert(1)>`__ <script>alert(1)</script> $x_{$ #panic('x') .. raw:: html *a* |b| \\ {{ 7*7 }} {x}"
+)
+
+STUDY = """
+title: %s
+beams: {long: {length: 20 mm, height: 10 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+shapes:
+  plate:
+    outline:
+      - {from: [0, 0]}
+      - {from: [20 mm, 0], group: right}
+      - {from: [20 mm, 10 mm]}
+      - {from: [0, 10 mm], group: left}
+    loads:
+      pull:
+        supports: {left: fixed}
+        forces: {right: [1 kN, 0]}
+        quantities: {end: {displacement: x, of: right, expected: 9.5 um, source: %s}}
+shape_grids:
+  %s: {shape: plate, mesh_size: 5 mm, material: steel, definition: lattice, kinematics: linear,
+       reference: false}
+refine:
+  %s: {beam: long, material: steel, load: traction, force: 1 kN, mesh_size: 5 mm, definition: lattice,
+       kinematics: linear, parameter: stiffness_scale, from: 0.9, to: 1.1, points: 3, most: 3}
+grids:
+  %s: {beam: long, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
+       definition: lattice, kinematics: linear, sensitivity: false}
+printed: printed.csv
+outputs: [tables, refinement, shapes]
+""" % (5 * (json.dumps(HOSTILE),))
+
+PRINTED = {
+    "table": 1, "beam": "long", "mesh_type": "structured", "mesh_size_mm": 5, "material": "steel", "load": "traction",
+    "force_N": 1000, "stiffness_N_per_m": 1, "reference_displacement_mm": 1, "displacement_mm": 1,
+    "deformation_error_percent": 1, "remark": HOSTILE,
+}  # fmt: skip
+"""A printed cell, with a remark."""
+
+
+class Tags(HTMLParser):
+    """Texts of a page, its scripts, and its links."""
+
+    def __init__(self, content):
+        super().__init__()
+        self.texts, self.tags, self.links = [], [], []
+        self.feed(content)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.links += [value for name, value in attributes if name in ("href", "src")]
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+@pytest.fixture(scope="module")
+def results(run):
+    """Folder of the results of one run, and its report."""
+    text = io.StringIO()
+    csv.writer(text).writerows([PRINTED.keys(), PRINTED.values()])
+    run.write("printed.csv", text.getvalue())
+    run.write("hostile.yaml", STUDY)
+    code, output = run.snakemake("hostile.yaml")
+    assert code == 0 and HOSTILE in output, output
+    return run.folder / "results/hostile"
+
+
+def test_the_dataset_has_them_as_they_are(results):
+    with st.open(results) as tree:
+        assert tree.attrs["title"] == HOSTILE
+        assert HOSTILE in tree["shapes"].source.values
+        assert tree["refinement"].refinement.values.tolist() == [HOSTILE]
+        assert HOSTILE in tree.paper_remark.values
+
+
+def test_the_report_has_no_link_script_or_formula_of_theirs(run, results):
+    code, output = run.snakemake("hostile.yaml", "--report", run.folder / "report.zip")
+    assert code == 0 and "WARNING" not in output and "(ERROR" not in output, output
+    with zipfile.ZipFile(run.folder / "report.zip") as archive:
+        content = archive.read("report/report.html").decode()
+    described = json.loads(re.search(r"workflow_desc = (\".*\");?$", content, re.MULTILINE)[1])
+    found = Tags(described)
+    assert HOSTILE in "".join(found.texts).replace("\n", " ")
+    assert "script" not in found.tags
+    assert not [link for link in found.links if "alert" in link]
+    assert "alert(1)</script>" not in content
+
+
+def test_tables_and_pages_show_them(results):
+    content = (results / "tables/index.html").read_text()
+    found = Tags(content)
+    assert content.count("<script") == 0 and not [link for link in found.links if ":" in link]
+    assert sum(HOSTILE in text for text in found.texts) >= 3  # title, source, remark
+    for name in ("table_1.csv", "refinement.csv"):
+        with (results / "tables" / name).open() as file:
+            assert HOSTILE in [cell for row in csv.reader(file) for cell in row]
+    browsed = Tags(page(results / "dataset.nc"))
+    assert HOSTILE in browsed.texts and "alert(1)</script>" not in page(results / "dataset.nc")
+
+
+def test_figures_show_them(results):
+    assert (results / "figures/refinement.png").stat().st_size and (results / "figures/refinement.pdf").stat().st_size
+    with st.open(results) as tree:
+        (panel,) = st.plot_refinement(tree)
+        content = io.StringIO()
+        panel.figure.savefig(content, format="svg")
+    assert HOSTILE.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;") in content.getvalue()
+
+
+def test_commands_and_exports_have_them(results, tmp_path):
+    info = CliRunner().invoke(main, ["info", str(results)])
+    assert info.exit_code == 0 and info.stdout.startswith(f"{HOSTILE}\n")
+    for ending in ("csv", "parquet"):
+        target = tmp_path / f"refinement.{ending}"
+        done = CliRunner().invoke(main, ["export", str(results), "--group", "refinement", "--to", str(target)])
+        assert done.exit_code == 0, done.output
+    with (tmp_path / "refinement.csv").open() as file:
+        assert {row["refinement"] for row in csv.DictReader(file)} == {HOSTILE}
+    assert set(pyarrow.parquet.read_table(tmp_path / "refinement.parquet")["refinement"].to_pylist()) == {HOSTILE}
