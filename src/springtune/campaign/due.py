@@ -16,6 +16,7 @@ from ..jobs.run_tasks import RECORDS
 from ..kinds import KINDS, kinds, outputs
 from ..kinds.base import FORMATS
 from ..kinds.scenes.shown import keeps_fields
+from .provenance import inputs
 from .plan import Plan, table_files
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
 
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
-    """Digest of a study's dataset: of the study as it is expanded, not of its text."""
+    """Digest of a study's dataset: of the study as it is expanded, and of the files that the dataset names."""
     collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
     code = [stage_key("campaign.collect")]
     code += [stage_key(f"kinds.{name}.{part}") for name in KINDS for part in ("kind", "collect")]
@@ -163,6 +164,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
         printed,
         stages,
         code,
+        inputs(study, study.path.resolve().parent),
     )
 
 
