@@ -152,6 +152,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
         If a run computes one of the folders.
     """
     target = Path("results", study.name)
+    locks.check_claim(target, study.path)
     for folder in (target, *folders):
         locks.is_held(folder)
     sites = [_site(study, folder) for folder in folders]
@@ -167,6 +168,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
         raise MergeError("\n".join([*missing, remedy]))
     locks.begin([target])
     try:
+        locks.claim(target, study.path)
         written = take_in(study, places, target)
         left = adopt(study, target, os.cpu_count() or 1)
     finally:
