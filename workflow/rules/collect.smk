@@ -26,5 +26,5 @@ rule collect:
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.campaign.collect {params.config:q} {params.folder:q} {output.dataset:q} {output.done:q} {params.digest:q}"
-        " > {log:q} 2>&1"
+        "python -m springtune.campaign.collect {params.config:q} {params.folder:q} {output.dataset:q}"
+        " {output.done:q} {params.digest:q} > {log:q} 2>&1"

@@ -60,5 +60,5 @@ rule paper:
     benchmark:
         "results/paper/benchmarks/paper.tsv"
     shell:
-        "python -m springtune.publication.build {params.source:q} {params.folder:q} {output.paper:q} {output.done:q} {params.digest:q}"
-        " {input.datasets:q} > {log:q} 2>&1"
+        "python -m springtune.publication.build {params.source:q} {params.folder:q} {output.paper:q}"
+        " {output.done:q} {params.digest:q} {input.datasets:q} > {log:q} 2>&1"

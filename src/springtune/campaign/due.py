@@ -16,8 +16,8 @@ from ..jobs.run_tasks import RECORDS
 from ..kinds import KINDS, kinds, outputs
 from ..kinds.base import FORMATS
 from ..kinds.scenes.shown import keeps_fields
-from .provenance import inputs
 from .plan import Plan, table_files
+from .provenance import inputs
 
 if TYPE_CHECKING:
     from ..kinds.base import Output

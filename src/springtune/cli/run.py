@@ -50,9 +50,9 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake in the folder of the checkout, where results/ is; in this folder, if the
-    environment variable SPRINGTUNE_WORKFLOW names a checkout; in another one by --results. All options but those below are Snakemake's. Exits with 0
-    when everything is made, scenes that could not be solved included, with 1 when the study is wrong or a job failed,
-    and with 2 when it was called in a wrong way.
+    environment variable SPRINGTUNE_WORKFLOW names a checkout; in another one by --results. All options but those
+    below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
+    the study is wrong or a job failed, and with 2 when it was called in a wrong way.
     """
     from ..kinds import load_study  # here, so that --help does not wait for it
     from ..problem.geometry import AssumptionWarning
