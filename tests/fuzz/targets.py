@@ -428,7 +428,8 @@ def read_net(path):
 PARTS = (
     *"abz09._- ~!@#$%^&*()+=[]{}|;:'\",<>?\\`\t\n\r\x1b\x7füßЖ中\u202e\u2028\U0001f600\udcff",
     "$(touch PWNED)", "`touch PWNED`", "; touch PWNED;", "& touch PWNED &", "| touch PWNED", "> PWNED ",
-    "\ntouch PWNED\n", "{input}", "{params.config}", "{{}}", "${HOME}", "$'x'", "''", "'\\''", "--", "%s", "%j", "..", "\\n",
+    "\ntouch PWNED\n", "{input}", "{params.config}", "{{}}", "${HOME}", "$'x'", "''", "'\\''", "--", "%s", "%j", "..",
+    "\\n",
 )  # fmt: skip
 """What names are put together from; a surrogate stands for a byte that is not UTF-8."""
 
