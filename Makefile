@@ -6,6 +6,8 @@
 #                                        new examples for the others
 # make clean                             removes all results, when you say yes; YES=1 does
 STUDY ?= config/paper.yaml
+# Recipes read it from the environment: no character of a path is the shell's then.
+export STUDY
 VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
@@ -13,11 +15,11 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 .PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
 
 study: $(VENV)/.run
-	springtune run $(STUDY)
+	springtune run "$$STUDY"
 
 # One file with the study's results, captions and run times, to be opened without a network.
 report: study
-	snakemake --configfile $(STUDY) --report results/$(basename $(notdir $(STUDY)))/report.zip
+	name=$${STUDY##*/} && snakemake --configfile="$$STUDY" --report "results/$${name%.*}/report.zip"
 
 paper: $(VENV)/.run
 	snakemake paper
@@ -84,7 +86,7 @@ test-storage: $(VENV)/.test
 SHARE ?= 1
 MUTANTS := build/mutants/packages
 mutants: $(VENV)/.test $(MUTANTS)
-	PYTHONPATH=$(CURDIR)/src:$(MUTANTS) python tools/mutants.py --share $(SHARE)
+	PYTHONPATH="$$PWD/src:$(MUTANTS)" python tools/mutants.py --share $(SHARE)
 
 $(MUTANTS): requirements/mutants.txt
 	python -m uv pip install --quiet --require-hashes --no-deps --target $@ --requirement $<

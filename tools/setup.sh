@@ -26,9 +26,8 @@ fi
 debian_pip() {
     apt=$venv/apt
     mkdir -p "$apt/lists/partial" "$apt/cache/archives/partial"
-    options="-qq -o Dir::State::lists=$PWD/$apt/lists -o Dir::Cache=$PWD/$apt/cache -o Debug::NoLocking=1"
-    # shellcheck disable=SC2086  # several options
-    apt-get $options update && (cd "$apt" && apt-get $options download python3-pip-whl) || return 1
+    set -- -qq -o "Dir::State::lists=$PWD/$apt/lists" -o "Dir::Cache=$PWD/$apt/cache" -o Debug::NoLocking=1
+    apt-get "$@" update && (cd "$apt" && apt-get "$@" download python3-pip-whl) || return 1
     dpkg-deb -x "$apt"/python3-pip-whl_*.deb "$apt/unpacked"
     wheel=$(echo "$apt"/unpacked/usr/share/python-wheels/pip-*.whl)
     "$python" "$wheel/pip" install --quiet --no-index --find-links "$apt/unpacked/usr/share/python-wheels" pip

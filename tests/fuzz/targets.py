@@ -1,4 +1,4 @@
-"""What is fed: studies, mesh files, datasets, nets and archives, as bytes and by their structure."""
+"""What is fed: studies, mesh files, datasets, nets and archives, as bytes and by their structure; texts and paths."""
 
 import hashlib
 import io
@@ -7,6 +7,8 @@ import os
 import random as generators
 import re
 import shutil
+import subprocess
+import sys
 import tempfile
 import warnings
 import zipfile
@@ -14,6 +16,7 @@ from contextlib import redirect_stdout
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import click
 import h5py
@@ -27,18 +30,21 @@ from harness import Refused, Target, Wrong
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 from mutations import WORDS, spoil_bytes, spoil_tree
+from snakemake.utils import format as rendered
 
 import springtune as st
 from springtune.browse.page import page
-from springtune.campaign import reproduction
+from springtune.campaign import due, reproduction
 from springtune.campaign.contents import METADATA, SUMS
 from springtune.campaign.page import html as tables_page
 from springtune.campaign.page import shown as shown_table
+from springtune.campaign.plan import plan
 from springtune.cli.archived import verified
 from springtune.cli.diff import comparison_text
 from springtune.cli.info import info_text
 from springtune.escapes import UNSEEN, markdown, no_mathematics, rst
 from springtune.handover.formats import ENDINGS
+from springtune.jobs import commands
 from springtune.kinds import kinds, load_study
 from springtune.kinds.scenes.summary import summary
 from springtune.mechanics.moduli import axial_moduli
@@ -663,11 +669,91 @@ def _titled(text):
     return panel
 
 
+# -- paths -------------------------------------------------------------------------------------------------------------
+
+PARTS = (
+    *"abz09._- ~!@#$%^&*()+=[]{}|;:'\",<>?\\`\t\n\r\x1b\x7füßЖ中\u202e\u2028\U0001f600\udcff",
+    "$(touch PWNED)", "`touch PWNED`", "; touch PWNED;", "& touch PWNED &", "| touch PWNED", "> PWNED ",
+    "\ntouch PWNED\n", "{input}", "{params.config}", "{{}}", "${HOME}", "$'x'", "''", "'\\''", "--", "%s", "%j", "..",
+    "\\n",
+)  # fmt: skip
+"""What names are put together from; a surrogate stands for a byte that is not UTF-8."""
+
+STUDY = b"""
+title: A path
+beams: {small: {length: 50 mm, height: 20 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  one: {beam: small, mesh_type: structured, mesh_size: 10 mm, material: steel, load: traction, force: 20 kN,
+        definition: lattice}
+"""
+
+
+@cache
+def _shell_blocks():
+    """Commands of all rules, as Snakemake puts them together; that of a job on another machine is one of these."""
+    texts = [path.read_text() for path in sorted((REPOSITORY / "workflow/rules").glob("*.smk"))]
+    blocks = re.findall(r"shell:\n((?:\s+\".*\"\n)+)", "".join(texts))
+    found = ["".join(re.findall(r'"(.*)"', block)) for block in blocks]
+    return [one for one in found if one != "{params.command}"]
+
+
+def _name(random):
+    name = "".join(random.choice(PARTS) for _ in range(random.choice((1, 2, 3, 8))))
+    return f"{name}_" if name in (".", "..") else name
+
+
+def paths(random, folder):
+    stem = _name(random) if random.random() < 0.2 else random.choice(("mine", "-mine", "a.b"))
+    path = folder / _name(random) / f"{stem}.yaml"
+    path.parent.mkdir()
+    path.write_bytes(STUDY)
+    return path
+
+
+def plan_paths(path):
+    """Plan a study in a folder of some name; each command of a rule gives its program what the rule has."""
+    os.chdir(path.parent)
+    try:
+        study = load_study(path.name)
+    except st.StudyError as error:
+        raise Refused(str(error)) from None
+    here = Path.cwd()
+    why = commands.refusal(Path(path.name), here, here, Path(sys.executable), on_cluster=False)
+    if why:
+        raise Refused(why)
+    jobs = due.jobs(study, plan(study, Path("results") / study.name, 2))
+    # A function stands for Python; it says what it is called with.
+    script, expected = [r"""python() { printf '%s\0' "$@"; }"""], {}
+    for number, block in enumerate(_shell_blocks()):
+        log = f"{number}{here.name}.log"
+        known = {
+            "log": log,
+            "params.config": str(path),
+            "params.source": str(here),
+            "params.digest": jobs["collect"].digest,
+        }
+        values = {name: known.get(name, [here.name, str(here)]) for name in re.findall(r"\{([a-z.]+)", block)}
+        whole = {name: value for name, value in values.items() if "." not in name}
+        for name in values.keys() - whole.keys():
+            holder, _, part = name.partition(".")
+            vars(whole.setdefault(holder, SimpleNamespace()))[part] = values[name]
+        script.append(rendered(block, **whole) + ("" if "log" in values else " > " + rendered("{log:q}", log=log)))
+        words = block.partition(" > ")[0].split()[1:]
+        given = [values.get(word.strip("{}").removesuffix(":q"), word) for word in words]
+        expected[log] = [word for one in given for word in ([one] if isinstance(one, str) else one)]
+    subprocess.run(["sh", "-c", "\n".join(script)], check=True)
+    found = {one.name: one.read_bytes().decode().split("\0")[:-1] for one in here.iterdir() if one.name != path.name}
+    if found != expected:
+        raise Wrong(f"commands with {str(path)!r} do not have it as it is")
+    return "accepted"
+
+
 TARGETS = (
-    Target("studies as bytes", study_bytes, read_study, 28),
-    Target("studies by structure", study_trees, read_study, 17),
-    Target("mesh files as bytes", mesh_bytes, read_mesh, 14),
-    Target("mesh files by structure", mesh_structure, read_mesh, 14),
+    Target("studies as bytes", study_bytes, read_study, 25),
+    Target("studies by structure", study_trees, read_study, 15),
+    Target("mesh files as bytes", mesh_bytes, read_mesh, 13),
+    Target("mesh files by structure", mesh_structure, read_mesh, 13),
     Target("files of shapes", shape_files, read_shape_file, 8),
     Target("datasets as bytes", dataset_bytes, read_dataset, 7),
     Target("datasets by structure", dataset_structure, read_dataset, 4),
@@ -675,6 +761,7 @@ TARGETS = (
     Target("archives as bytes", archive_bytes, read_archive, 1),
     Target("archives by structure", archive_structure, read_archive, 2),
     Target("texts", texts, read_texts, 4),
+    Target("paths", paths, plan_paths, 4),
 )
 
 

@@ -33,8 +33,8 @@ reference_displacement_mm,displacement_mm,deformation_error_percent,remark
 1,a,structured,5,steel,traction,1000,170e6,0.01,0.011,10,
 """
 
-TIMES = re.compile("seconds|created|history|git_|^config|^inputs")
-"""Names of values that are others in every run or checkout, and of the texts that a study was read from."""
+TIMES = re.compile("seconds|created|history|git_")
+"""Names of values that are others in every run or checkout."""
 
 
 class Run(Campaign):

@@ -132,24 +132,25 @@ DEFINITIONS = "[paper, lattice, calibrated]"
 
 STUDY = {
     "nothing": Row(lambda: None),
-    "comment added": Row(text(("title:", "# A comment.\ntitle:"))),
+    "comment added": Row(text(("title:", "# A comment.\ntitle:")), AFTER),
     "config touched": Row(lambda: touch(driver.CONFIG)),
-    "config indented otherwise": Row(text(("    beam: [a, b]\n", "    beam:\n      - a\n      - b\n"))),
-    "quantity in another unit": Row(text(("length: 20 mm", "length: 2 cm"))),
+    "config indented otherwise": Row(text(("    beam: [a, b]\n", "    beam:\n      - a\n      - b\n")), AFTER),
+    "quantity in another unit": Row(text(("length: 20 mm", "length: 2 cm")), AFTER),
     "title changed": Row(text(("title: What", "title: All that")), AFTER),
     # Outputs: none of them solves anything.
-    "output sensitivity added": Row(text((OUTPUT, "outputs: [size, sensitivity]")), "present_sensitivity browse"),
+    "output sensitivity added": Row(text((OUTPUT, "outputs: [size, sensitivity]")), f"{AFTER} present_sensitivity"),
     "output deformed added": Row(text((OUTPUT, "outputs: [size, deformed]")), AFTER),
-    "output tables added": Row(text((OUTPUT, "outputs: [size, tables]")), "present_scenes browse"),
-    "output definitions added": Row(text((OUTPUT, "outputs: [size, definitions]")), "present_definitions browse"),
-    "output laying added": Row(text((OUTPUT, "outputs: [size, laying]")), "present_laying browse"),
-    "output stability added": Row(text((OUTPUT, "outputs: [size, stability]")), "present_stability"),
-    "output replaced": Row(text((OUTPUT, "outputs: [sensitivity]")), "present_sensitivity browse"),
+    "output tables added": Row(text((OUTPUT, "outputs: [size, tables]")), AFTER),
+    "output definitions added": Row(text((OUTPUT, "outputs: [size, definitions]")), f"{AFTER} present_definitions"),
+    "output laying added": Row(text((OUTPUT, "outputs: [size, laying]")), f"{AFTER} present_laying"),
+    "output stability added": Row(text((OUTPUT, "outputs: [size, stability]")), f"{AFTER} present_stability"),
+    "output replaced": Row(text((OUTPUT, "outputs: [sensitivity]")), "collect present_sensitivity browse"),
     "outputs reordered": Row(
         then(
             text((OUTPUT, "outputs: [size, tables, laying]")),
             text(("[size, tables, laying]", "[laying, tables, size]")),
-        )
+        ),
+        f"{AFTER} present_laying",
     ),
     # Values added. Another size is another mean of best stiffnesses, so calibrated scenes are solved again.
     "mesh size added": Row(SIZE, SIZES, {"mesh": 2, "curve": 8, "linear": 20, "nonlinear": 20, "moduli": 1}),
@@ -194,19 +195,19 @@ STUDY = {
         then(text(("[5 mm, 4 mm]", "[4 mm]")), text(("mesh_size: [4 mm]", "mesh_size: [5 mm, 4 mm]"))), SIZES
     ),
     # Values reordered.
-    "mesh sizes reordered": Row(text(("[5 mm, 4 mm]", "[4 mm, 5 mm]"))),
-    "beams reordered": Row(text(("beam: [a, b]", "beam: [b, a]"))),
-    "loads reordered": Row(text(("[traction, compression]", "[compression, traction]"))),
-    "definitions reordered": Row(text((DEFINITIONS, "[calibrated, paper, lattice]"))),
-    "kinematics reordered": Row(text(("[linear, nonlinear]", "[nonlinear, linear]"))),
+    "mesh sizes reordered": Row(text(("[5 mm, 4 mm]", "[4 mm, 5 mm]")), AFTER),
+    "beams reordered": Row(text(("beam: [a, b]", "beam: [b, a]")), AFTER),
+    "loads reordered": Row(text(("[traction, compression]", "[compression, traction]")), AFTER),
+    "definitions reordered": Row(text((DEFINITIONS, "[calibrated, paper, lattice]")), AFTER),
+    "kinematics reordered": Row(text(("[linear, nonlinear]", "[nonlinear, linear]")), AFTER),
     "declared beams reordered": Row(text(("".join(BEAMS), "".join(reversed(BEAMS)))), AFTER),
     "measurements reordered": Row(
-        then(text((DEFINITIONS, "[area, lattice, calibrated]")), text(("[area, lattice,", "[lattice, area,")))
+        then(text((DEFINITIONS, "[area, lattice, calibrated]")), text(("[area, lattice,", "[lattice, area,"))), AFTER
     ),
     # Labels.
     "beam renamed": Row(text(*RENAMED), AFTER),
     "material renamed": Row(text(("steel", "iron")), AFTER),
-    "grid renamed": Row(text(("  two:\n", "  mine:\n"))),
+    "grid renamed": Row(text(("  two:\n", "  mine:\n")), AFTER),
     # What is computed.
     "thickness changed": Row(
         text(("a: {length: 20 mm,", "a: {thickness: 2 mm, length: 20 mm,")),
@@ -243,7 +244,7 @@ STUDY = {
     "printed table edited": Row(
         lambda: Path("printed.csv").write_text(driver.PRINTED.replace("0.011", "0.012")), AFTER
     ),
-    "printed table commented": Row(lambda: Path("printed.csv").write_text("# As printed.\n" + driver.PRINTED)),
+    "printed table commented": Row(lambda: Path("printed.csv").write_text("# As printed.\n" + driver.PRINTED), AFTER),
     "mesh file edited": Row(lambda: driver.write_mesh("own.inp", 3e-4), f"mesh {CURVES}", {"mesh": 1, "nonlinear": 1}),
     "mesh file touched": Row(lambda: touch(Path("own.inp"))),
     "mesh file moved": Row(moved, f"mesh {CURVES}"),

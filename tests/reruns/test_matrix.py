@@ -1,5 +1,6 @@
 """What runs again when something changes: exactly these jobs, exactly these results, and the dataset of a fresh run."""
 
+import hashlib
 import importlib.metadata
 import json
 import os
@@ -70,6 +71,18 @@ def fresh(tmp_path_factory, complete):
 def test_exactly_these_jobs_are_to_run(changed):
     run = driver.Run(changed.cores)
     assert {run.called(name) for name in run.due()} == set(changed.jobs.split())
+
+
+@pytest.mark.parametrize("changed", ["comment added", "printed table commented"], indirect=True)
+def test_a_dataset_has_the_files_that_are_there(changed):
+    """Comments, too; nothing is computed for them."""
+    jobs, solved = driver.Run().finish()
+    found = driver.dataset(Path())
+    assert found["config"] == driver.CONFIG.read_text()
+    files = {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in json.loads(found["inputs"])}
+    assert json.loads(found["inputs"]) == files and {"small.yaml", "printed.csv", "own.inp"} <= files.keys()
+    assert found["config_sha256"] == files["small.yaml"]
+    assert jobs == set(changed.jobs.split()) and solved == {}
 
 
 @pytest.mark.slow

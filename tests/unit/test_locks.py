@@ -7,12 +7,23 @@ from pathlib import Path
 
 import psutil
 import pytest
+from click.testing import CliRunner
 
 from springtune.campaign import locks
+from springtune.cli import main
 from springtune.jobs import sealed
 from springtune.jobs.processes import this_host
 
 STUDY = Path("results/mine")
+
+SMALL = """
+title: A study
+beams: {small: {length: 50 mm, height: 20 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  one: {beam: small, mesh_type: structured, mesh_size: 10 mm, material: steel, load: traction, force: 20 kN,
+        definition: lattice}
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -100,3 +111,73 @@ def test_processes_of_two_machines_with_one_number_have_notes_of_their_own(lock,
     monkeypatch.setattr(platform, "node", lambda: "login.cluster")
     locks.begin([Path("results/other")])
     assert len(list(locks.RUNS.iterdir())) == 2
+
+
+class TestClaims:
+    """A folder of results belongs to one config; here `w/mine.yaml` is the file of the run before."""
+
+    @pytest.fixture(autouse=True)
+    def configs(self):
+        for folder in ("w", "config"):
+            Path(folder).mkdir()
+            Path(folder, "mine.yaml").write_text(f"title: {folder}\n")
+        locks.claim(STUDY, Path("w/mine.yaml"))
+
+    def test_another_study_of_the_same_name_is_refused_with_the_remedy(self):
+        with pytest.raises(locks.LockedError) as caught:
+            locks.check_claim(STUDY, Path("config/mine.yaml"))
+        assert str(caught.value) == (
+            "results/mine: holds the results of w/mine.yaml, another study of the same name; rename one of the two, or "
+            "call: springtune run config/mine.yaml --results FOLDER"
+        )
+
+    @pytest.mark.parametrize("given", ["w/mine.yaml", "./w/mine.yaml", "{here}/w/mine.yaml", "link.yaml"])
+    def test_the_same_study_by_another_path_is_not(self, given):
+        Path("link.yaml").symlink_to("w/mine.yaml")
+        Path("w/mine.yaml").write_text("title: edited\n")
+        locks.check_claim(STUDY, Path(given.format(here=Path.cwd())))
+
+    def test_the_same_content_elsewhere_is_not(self):
+        Path("config/mine.yaml").write_bytes(Path("w/mine.yaml").read_bytes())
+        locks.check_claim(STUDY, Path("config/mine.yaml"))
+
+    def test_a_config_that_was_moved_is_not(self):
+        Path("w/mine.yaml").replace("config/mine.yaml")
+        locks.check_claim(STUDY, Path("config/mine.yaml"))
+
+    def test_a_folder_that_was_moved_with_its_config_knows_it(self, tmp_path, monkeypatch):
+        (tmp_path / "moved").mkdir()
+        for name in ("results", "w", "config"):
+            Path(name).rename(tmp_path / "moved" / name)
+        monkeypatch.chdir(tmp_path / "moved")
+        locks.check_claim(STUDY, Path("w/mine.yaml"))
+        with pytest.raises(locks.LockedError):
+            locks.check_claim(STUDY, Path("config/mine.yaml"))
+
+    def test_a_config_outside_is_known_by_its_whole_path(self, tmp_path, monkeypatch):
+        (tmp_path / "run").mkdir()
+        monkeypatch.chdir(tmp_path / "run")
+        locks.claim(STUDY, Path("../w/mine.yaml"))
+        assert locks.claimed(STUDY) == tmp_path / "w/mine.yaml"
+        locks.check_claim(STUDY, Path("../w/mine.yaml"))
+        with pytest.raises(locks.LockedError):
+            locks.check_claim(STUDY, tmp_path / "config/mine.yaml")
+
+    @pytest.mark.parametrize("spoil", [Path.unlink, lambda path: path.write_text("cut")], ids=["missing", "damaged"])
+    def test_a_folder_without_a_note_is_of_any_study_of_its_name(self, spoil):
+        spoil(STUDY / "tasks/study.json")
+        locks.check_claim(STUDY, Path("config/mine.yaml"))
+
+    def test_commands_refuse_another_study_and_know_the_one_of_a_folder(self):
+        (STUDY / "dataset.nc").touch()
+        Path("config/mine.yaml").write_text(SMALL)
+        refusal = "results/mine: holds the results of w/mine.yaml, another study of the same name; rename"
+        for command in (
+            ["clean", "config/mine.yaml", "--remove"],
+            ["merge", "config/mine.yaml", "results/mine"],
+            ["diff", "config/mine.yaml", "results/mine"],
+        ):
+            told = CliRunner().invoke(main, command)
+            assert told.exit_code and refusal in told.output, told.output
+        told = CliRunner().invoke(main, ["clean", "results/mine"])
+        assert told.exit_code == 1 and "w/mine.yaml: beams: 'beams' is missing" in told.output

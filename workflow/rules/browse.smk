@@ -24,5 +24,5 @@ rule browse:
     benchmark:
         RESULTS / "benchmarks/browse.tsv"
     shell:
-        "python -m springtune.campaign.browse {input.dataset} {output.page} {output.done} {params.digest} {params.files}"
-        " > {log} 2>&1"
+        "python -m springtune.campaign.browse {input.dataset:q} {output.page:q} {output.done:q}"
+        " {params.digest:q} {params.files:q} > {log:q} 2>&1"

@@ -14,7 +14,8 @@ rule collect:
         ),
         done=JOBS["collect"].record,
     params:
-        config=str(CONFIG),
+        # As it is: braces in it are no wildcards.
+        config=lambda wildcards: str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
         untold=due.untold(RESULTS, UNTOLD),
@@ -26,5 +27,5 @@ rule collect:
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.campaign.collect {params.config} {params.folder} {output.dataset} {output.done} {params.digest}"
-        " {params.untold} > {log} 2>&1"
+        "python -m springtune.campaign.collect {params.config:q} {params.folder:q} {output.dataset:q}"
+        " {output.done:q} {params.digest:q} {params.untold:q} > {log:q} 2>&1"

@@ -154,9 +154,10 @@ def begin():
     """What happens when jobs are about to run, and not when the Snakefile is read."""
     try:
         locks.begin([one.folder for _, one in READ])
-        for _, one in READ:
+        for study, one in READ:
             remove_unfinished(one.folder)
             remove_unfinished(one.folder.parent, below=False)  # of what studies share
+            locks.claim(one.folder, study.path)
             one.write()
         OURS.remember(RESULTS.parent / CODE_FILE)
         if ON_CLUSTER:
@@ -197,7 +198,7 @@ LOOKING = {
 
 
 def release():
-    """Remove the lock of a run that was killed; who only looks leaves it where it is."""
+    """Refuse a folder of another study, and remove the lock of a run that was killed; who only looks leaves it there."""
     state = Path(".snakemake")
     if not os.access(state if state.exists() else ".", os.W_OK):
         why = f"{Path.cwd()} cannot be written, and Snakemake wants to even where it only looks"
@@ -205,14 +206,15 @@ def release():
         sys.exit(1)
     looking = DISPLAY is not None and DISPLAY.common_settings.dryrun
     looking |= any(word.partition("=")[0] in LOOKING for word in sys.argv[1:])
-    if looking or not workflow.is_main_process:
+    if not workflow.is_main_process:
         return
     disk = os.statvfs(".")
-    if disk.f_blocks and not disk.f_bavail:
+    if not looking and disk.f_blocks and not disk.f_bavail:
         print(f"{Path.cwd()}: the disk is full; make room, then call the same command again", file=sys.stderr)
         sys.exit(1)
     try:
-        removed = locks.release(RESULTS)
+        locks.check_claim(RESULTS, CONFIG)
+        removed = "" if looking else locks.release(RESULTS)
     except locks.LockedError as error:
         print(error, file=sys.stderr)
         sys.exit(1)

@@ -2,8 +2,6 @@
 
 from snakemake.target_jobs import parse_target_jobs_cli_args
 
-from springtune.jobs import commands
-
 
 def told():
     """What the run has noted of the one job that this process is to do; None where it does not say."""

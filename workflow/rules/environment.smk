@@ -7,6 +7,7 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
+from springtune.jobs import commands
 from springtune.jobs.run_tasks import STATE, source_state
 
 BEGUN = time.time()
@@ -45,3 +46,15 @@ def chosen_config():
 
 
 CONFIG = chosen_config()
+
+if workflow.is_main_process:
+    why = commands.refusal(
+        CONFIG,
+        Path.cwd(),
+        Path(workflow.basedir),
+        Path(sys.executable),
+        on_cluster=workflow.resource_settings.nodes is not None,
+    )
+    if why:
+        print(why, file=sys.stderr)
+        sys.exit(1)

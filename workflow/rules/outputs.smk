@@ -29,5 +29,5 @@ for job, made in MADE.items():
         benchmark:
             RESULTS / f"benchmarks/{job}.tsv"
         shell:
-            "python -m springtune.campaign.present {input.dataset} {params.folder} {output.done} {params.digest}"
-            " {params.outputs} > {log} 2>&1"
+            "python -m springtune.campaign.present {input.dataset:q} {params.folder:q} {output.done:q} {params.digest:q}"
+            " {params.outputs:q} > {log:q} 2>&1"

@@ -48,7 +48,8 @@ rule paper:
         ),
         done="results/paper/done/paper.json",
     params:
-        source=str(PAPER_SOURCE),
+        # As it is: braces in it are no wildcards.
+        source=lambda wildcards: str(PAPER_SOURCE),
         folder=lambda wildcards, output: str(Path(output.paper).with_suffix("")),
         digest=PAPER.digest if PAPER_WANTED else "none",
     resources:
@@ -59,5 +60,5 @@ rule paper:
     benchmark:
         "results/paper/benchmarks/paper.tsv"
     shell:
-        "python -m springtune.publication.build {params.source} {params.folder} {output.paper} {output.done} {params.digest}"
-        " {input.datasets} > {log} 2>&1"
+        "python -m springtune.publication.build {params.source:q} {params.folder:q} {output.paper:q}"
+        " {output.done:q} {params.digest:q} {input.datasets:q} > {log:q} 2>&1"

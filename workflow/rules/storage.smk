@@ -54,11 +54,12 @@ if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets
         input:
             packs_there,
         params:
-            config=str(CONFIG),
+            # As it is: braces in it are no wildcards.
+            config=lambda wildcards: str(CONFIG),
         benchmark:
             RESULTS / "benchmarks/fetch.tsv"
         shell:
-            "python -m springtune.campaign.packs fetch {params.config} {input}"
+            "python -m springtune.campaign.packs fetch {params.config:q} {input:q}"
 
 else:
 
@@ -88,7 +89,7 @@ else:
             benchmark:
                 RESULTS / f"benchmarks/pack_{stage}.tsv"
             shell:
-                "python -m springtune.campaign.packs pack {params.folder} {output} {input} > {log} 2>&1"
+                "python -m springtune.campaign.packs pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
 
     rule upload:
         message:
@@ -102,4 +103,4 @@ else:
         benchmark:
             RESULTS / "benchmarks/upload.tsv"
         shell:
-            "python -m springtune.campaign.packs copy {output} {input} > {log} 2>&1"
+            "python -m springtune.campaign.packs copy {output:q} {input:q} > {log:q} 2>&1"

@@ -17,6 +17,7 @@ from ..kinds import KINDS, kinds, outputs
 from ..kinds.base import FORMATS
 from ..kinds.scenes.shown import keeps_fields
 from .plan import Plan, table_files
+from .provenance import inputs
 
 if TYPE_CHECKING:
     from ..kinds.base import Output
@@ -157,7 +158,7 @@ def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -
 
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
-    """Digest of a study's dataset: of the study as it is expanded, not of its text."""
+    """Digest of a study's dataset: of the study as it is expanded, and of the files that the dataset names."""
     collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
     code = [stage_key("campaign.collect")]
     code += [stage_key(f"kinds.{name}.{part}") for name in KINDS for part in ("kind", "collect")]
@@ -188,6 +189,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
         printed,
         stages,
         code,
+        inputs(study, study.path.resolve().parent),
     )
 
 

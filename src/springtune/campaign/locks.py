@@ -1,11 +1,13 @@
-"""Who runs what in a folder, and locks that a run which was killed has left.
+"""Who runs what in a folder, whose results it holds, and locks that a run which was killed has left.
 
 Snakemake locks the files of a run by lists of them, does not say by whom, and at the end of a run removes the locks of
 all others in its folder. So a run notes its process beside them; a lock is stale when that process is gone.
 """
 
+import filecmp
 import os
 import re
+import shlex
 import sys
 import time
 from collections.abc import Collection, Iterable, Iterator
@@ -14,13 +16,73 @@ from typing import Any
 
 from ..jobs import sealed
 from ..jobs.processes import lives, this_host
+from ..jobs.run_tasks import TASKS
 
 LOCKS, RUNS = Path(".snakemake/locks"), Path(".snakemake/springtune")
 """Snakemake's locks, and notes of processes, from the folder on that a run is called in."""
 
+STUDY_FILE = f"{TASKS}/study.json"
+"""File in a study's folder: the path of the config that was run last."""
 
-class LockedError(Exception):
-    """Another process computes a study; the message names it and the remedy."""
+
+class LockedError(ValueError):
+    """Another process computes a study, or its folder is another study's; the message has the reason and the remedy."""
+
+
+def claim(folder: Path, config: Path) -> None:
+    """Note the study that a folder belongs to.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are: ``results/<study>`` in the folder that runs are called in.
+    config : Path
+        The study's file. A path in the folder of runs is noted from there on, so that both can be moved.
+    """
+    place, path = (Path(os.path.abspath(one)) for one in (folder.parent.parent, config))
+    note = {"config": str(path.relative_to(place) if path.is_relative_to(place) else path)}
+    if sealed.read(folder / STUDY_FILE) != note:
+        sealed.write(folder / STUDY_FILE, note)
+
+
+def claimed(folder: Path) -> Path | None:
+    """File of the study that a folder belongs to; None where it is not known or not there.
+
+    Parameters
+    ----------
+    folder : Path
+        As of `claim`.
+
+    Returns
+    -------
+    Path or None
+    """
+    note = sealed.read(folder / STUDY_FILE, config=str)
+    path = folder.parent.parent / note["config"] if note else None
+    return path if path and path.is_file() else None
+
+
+def check_claim(folder: Path, config: Path) -> None:
+    """Refuse a folder that belongs to another study of the same name.
+
+    A file that was moved, a link to it and a file with the same content are the same study. A folder without a note is
+    of any study of its name.
+
+    Parameters
+    ----------
+    folder, config : Path
+        As of `claim`.
+
+    Raises
+    ------
+    LockedError
+        If the folder is of another study, whose file is still there.
+    """
+    other = claimed(folder)
+    if other is None or not config.is_file() or filecmp.cmp(other, config, shallow=False):
+        return
+    remedy = f"rename one of the two, or call: springtune run {shlex.quote(str(config))} --results FOLDER"
+    raise LockedError(f"{folder}: holds the results of {other}, another study of the same name; {remedy}")
 
 
 def begin(folders: Iterable[Path]) -> None:

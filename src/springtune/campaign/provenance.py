@@ -10,6 +10,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..jobs.keys import installed
+from ..jobs.records import checksum
 from ..kinds import kinds
 from ..output.reading import CHANGED
 from ..study.model import Study
@@ -108,7 +109,7 @@ def inputs(study: Study, folder: Path) -> dict[str, str]:
     """
     root = _checkout(folder)
     files = input_files(study) | ({root / LOCK} if root else set())
-    return {_name(file.resolve(), root or folder): _sha256(file) for file in sorted(files)}
+    return {_name(file.resolve(), root or folder): checksum(file) for file in sorted(files)}
 
 
 def _checkout(folder: Path) -> Path | None:
@@ -136,10 +137,6 @@ def input_files(study: Study) -> set[Path]:
 def _name(file: Path, root: Path) -> str:
     """Name of a file without what is the machine's own."""
     return file.relative_to(root).as_posix() if file.is_relative_to(root) else f"{file.parent.name}/{file.name}"
-
-
-def _sha256(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def git_commit(folder: Path) -> str:

@@ -331,7 +331,7 @@ def reproduce(found: Checked, folder: Path, fresh: bool, say: Callable[[str], No
     around = {name: value for name, value in os.environ.items() if name not in UNWANTED}
     around |= {"PYTHONPATH": str(code / "src"), "PYTHONNOUSERSITE": "1"}
     around["PATH"] = os.pathsep.join([str(program.parent), around.get("PATH", os.defpath)])
-    command = [str(program), "-m", "snakemake", target, "--configfile", config]
+    command = [str(program), "-m", "snakemake", target, f"--configfile={config}"]
     done = subprocess.run(command, cwd=code, env=around, stdout=sys.stderr)
     if done.returncode or not (code / target).is_file():
         raise ReproductionError(

@@ -162,6 +162,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
         If a run computes one of the folders.
     """
     target = Path("results", study.name)
+    locks.check_claim(target, study.path)
     for folder in (target, *folders):
         locks.is_held(folder)
     sites = [_site(study, folder) for folder in folders]
@@ -177,6 +178,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
         raise MergeError(*missing, remedy)
     locks.begin([target])
     try:
+        locks.claim(target, study.path)
         written = take_in(study, places, target)
         left = adopt(study, target, os.cpu_count() or 1)
     finally:

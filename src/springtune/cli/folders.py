@@ -32,6 +32,7 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
     click.ClickException
         If there is no such folder, or no study of its name.
     """
+    from ..campaign.locks import LockedError, check_claim, claimed
     from ..kinds import load_study
 
     if given is not None and not given.is_dir():
@@ -39,13 +40,17 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
         folder = RESULTS_FOLDER / study.name
         if not folder.is_dir():
             raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
+        try:
+            check_claim(folder, given)
+        except LockedError as error:
+            raise click.ClickException(str(error)) from None
         yield study, folder
         return
     if given is None and not RESULTS_FOLDER.is_dir():
         raise click.ClickException(f"{RESULTS_FOLDER}: there is no such folder; go to where studies were run")
     folders = [given] if given else sorted(path for path in RESULTS_FOLDER.iterdir() if path.is_dir())
     for folder in folders:
-        config = folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
+        config = claimed(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
         if config.is_file():
             yield load_study(config), folder
         elif given:
@@ -91,15 +96,18 @@ def dataset_path(given: str) -> Path:
     Raises
     ------
     ValueError
-        If there is none.
+        If there is none, or it is of another study of that name.
     """
+    from ..campaign.locks import check_claim
+
     path = Path(given)
     if path.suffix in (".yaml", ".yml"):
         from ..output.expected import is_expected
 
         if is_expected(path):
             return path
-        path = RESULTS_FOLDER / path.stem
+        config, path = path, RESULTS_FOLDER / path.stem
+        check_claim(path, config)
     for file in (path, path / DATASET, RESULTS_FOLDER / path / DATASET):
         if file.is_file():
             return file

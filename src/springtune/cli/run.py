@@ -36,22 +36,27 @@ NAMED_BY = "SPRINGTUNE_WORKFLOW"
         "springtune run config/mine.yaml --workflow-profile slurm",
     ),
     context_settings={"ignore_unknown_options": True},
-    options_metavar="[--strict] [--max-scenes N] [--no-diff] [--no-host]",
+    options_metavar="[--strict] [--max-scenes N] [--results FOLDER] [--no-diff] [--no-host]",
 )
 @max_scenes
+@click.option(
+    "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
+)
 @click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
 @click.option("--no-diff", is_flag=True, help="Leave what differs from the commit out of the dataset.")
 @click.option("--no-host", is_flag=True, help="Leave the machine's name out of the dataset.")
 @click.argument(
     "arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]", shell_complete=studies_here
 )
-def run(most: int | None, strict: bool, no_diff: bool, no_host: bool, arguments: tuple[str, ...]) -> None:
+def run(
+    most: int | None, results: Path | None, strict: bool, no_diff: bool, no_host: bool, arguments: tuple[str, ...]
+) -> None:
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake in the folder of the checkout, where results/ is; in this folder, if the
-    environment variable SPRINGTUNE_WORKFLOW names a checkout. All options but those below are Snakemake's. Exits with 0
-    when everything is made, scenes that could not be solved included, with 1 when the study is wrong or a job failed,
-    and with 2 when it was called in a wrong way.
+    environment variable SPRINGTUNE_WORKFLOW names a checkout; in another one by --results. All options but those
+    below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
+    the study is wrong or a job failed, and with 2 when it was called in a wrong way.
     """
     from ..kinds import load_study  # here, so that --help does not wait for it
     from ..problem.geometry import AssumptionWarning
@@ -64,7 +69,8 @@ def run(most: int | None, strict: bool, no_diff: bool, no_host: bool, arguments:
         raise click.UsageError("give the study itself, without --configfile: springtune run config/mine.yaml")
     late = [] if named else [one for one in options if one.endswith((".yaml", ".yml"))]
     if late:
-        raise click.UsageError(f"name the study first: springtune run {late[0]} {options[0]}")
+        first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
+        raise click.UsageError(f"name the study first: springtune run {first}")
     second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
     if named and second:
         raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
@@ -83,17 +89,23 @@ def run(most: int | None, strict: bool, no_diff: bool, no_host: bool, arguments:
     except StudyError as error:
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
-    folder = Path.cwd() if os.environ.get(NAMED_BY) else checkout
+    folder = results.absolute() if results else Path.cwd() if os.environ.get(NAMED_BY) else checkout
     if folder != Path.cwd():
         click.echo(f"results go to {folder / 'results' / study.name}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == checkout else ["--snakefile", str(checkout / "Snakefile")]
-    # A list of targets would take a path that follows it for one more of them, and so would --configfile.
-    command = [*_snakemake(), *workflow, *options, "--configfile", str(path)]
     for option, chosen in (("no_diff", no_diff), ("no_host", no_host)):
         if chosen:
             os.environ[f"SPRINGTUNE_{option.upper()}"] = "true"
-    os.chdir(folder)
+    # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
+    # begins with - is not an option behind =.
+    command = [*_snakemake(), *workflow, *options, f"--configfile={path}"]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.chdir(folder)
+    except OSError as error:
+        why = f"{error.strerror}; name a folder that can be written"
+        raise click.ClickException(f"--results {folder}: {why}") from None
     if not strict or {"-n", "--dry-run", "--dryrun"} & {*options}:
         os.execv(command[0], command)
     code = _called(command)
