@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from ..jobs import records
 from ..jobs.commands import COMMANDS_FILE
 from ..jobs.dependencies import PACKAGE
-from ..output.reading import CHANGED
+from ..output.reading import CHANGED, check_links
 from . import due, environment, provenance
 from .plan import plan
 from .sites import ELSEWHERE
@@ -430,6 +430,10 @@ def _without_host(dataset: Packed, scratch: Path) -> tuple[Packed, dict[str, str
     import numpy as np
 
     assert isinstance(dataset.source, Path)
+    try:
+        check_links(dataset.source)
+    except ValueError as error:
+        raise ArchiveError(str(error)) from None
     copy = scratch / due.DATASET
     shutil.copyfile(dataset.source, copy)
     with h5py.File(copy, "a") as file:
