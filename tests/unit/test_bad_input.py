@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import struct
+import tracemalloc
 import zlib
 
 import numpy as np
@@ -413,8 +414,13 @@ class TestCounts:
             text = text.replace(data[0], array)
             text = text.replace("</VTKFile>", f'<AppendedData encoding="base64">_{bomb}</AppendedData></VTKFile>')
         path.write_text(text)
-        with pytest.raises(MeshError, match=r"vtu: .*is damaged.*; write it again"):
-            read_beam_mesh(path, 0.1, 0.02)
+        tracemalloc.start()
+        try:
+            with pytest.raises(MeshError, match=r"vtu: .*is damaged.*; write it again"):
+                read_beam_mesh(path, 0.1, 0.02)
+            assert tracemalloc.get_traced_memory()[1] < 0.7e9
+        finally:
+            tracemalloc.stop()
 
     def test_a_study_says_it_in_a_line(self, tmp_path):
         ending, options, _, other = COUNTS["gmsh, text"]
