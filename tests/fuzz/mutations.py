@@ -1,6 +1,8 @@
 """Ways to spoil bytes and trees."""
 
 import copy
+import re
+import struct
 
 WORDS = (
     "nan",
@@ -78,6 +80,23 @@ def spoil_bytes(random, content, words=()):
         if not content:
             break
     return bytes(content)
+
+
+COUNTS = (4_000_000_000, 100_000_000, 2**62, 10**6)
+"""Counts that no file of some kilobytes has."""
+
+
+def spoil_counts(random, content):
+    """Bytes with a whole number of the text, or 4 or 8 of the bytes, in place of a count that cannot be."""
+    count = random.choice(COUNTS)
+    numbers = list(re.finditer(rb"(?<![\w.+-])\d+(?![\w.])", content))
+    if numbers and (b"\0" not in content or random.random() < 0.3):
+        found = random.choice(numbers)
+        return content[: found.start()] + str(count).encode() + content[found.end() :]
+    form = random.choice(("<Q", "<I", ">Q", ">I"))
+    new = struct.pack(form, count % 2 ** (64 if form[1] == "Q" else 32))
+    at = random.randrange(max(1, len(content) - len(new)))
+    return content[:at] + new + content[at + len(new) :]
 
 
 def places(tree, path=()):

@@ -13,7 +13,7 @@ import tempfile
 import warnings
 import zipfile
 from contextlib import redirect_stdout
-from functools import cache
+from functools import cache, partial
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,7 +29,7 @@ from docutils.core import publish_doctree
 from harness import Refused, Target, Wrong
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
-from mutations import WORDS, spoil_bytes, spoil_tree
+from mutations import WORDS, spoil_bytes, spoil_counts, spoil_tree
 from snakemake.utils import format as rendered
 
 import springtune as st
@@ -133,6 +133,7 @@ def read_study(path):
 # -- mesh files --------------------------------------------------------------------------------------------------------
 
 FORMATS = {"vtu": "vtu", "msh": "gmsh", "inp": "abaqus", "vtk": "vtk", "off": "off", "su2": "su2", "xdmf": "xdmf"}
+FORMATS |= {"ply": "ply", "mesh": "medit", "dat": "tecplot", "h5m": "h5m"}
 """Formats by ending."""
 
 OLD = {"msh": "gmsh22", "vtk": "vtk42", "vtu": "vtu"}
@@ -175,7 +176,8 @@ NUMBERS = ("nan", "inf", "-1", "1e308", "1e999", "999999999999", "0", "429496729
 def mesh_bytes(random, folder):
     ending, content = random.choice(_files())
     path = folder / f"mesh.{ending}"
-    path.write_bytes(spoil_bytes(random, content, NUMBERS))
+    spoil = spoil_counts if random.random() < 0.3 else partial(spoil_bytes, words=NUMBERS)
+    path.write_bytes(spoil(random, content))
     return path
 
 
@@ -353,7 +355,7 @@ def dataset_structure(random, folder):
             name = random.choice(names)
             if name not in file:
                 continue
-            one, kind = file[name], random.randrange(7)
+            one, kind = file[name], random.randrange(11)
             try:
                 if kind == 0:
                     del file[name]
@@ -372,6 +374,21 @@ def dataset_structure(random, folder):
                     file[name] = values
                 elif kind == 6:
                     file.move(name, f"{name}_other")
+                elif kind == 7:  # data of other files
+                    del file[name]
+                    file[name] = h5py.ExternalLink("/etc/passwd", name)
+                elif kind in (8, 9, 10) and isinstance(one, h5py.Dataset):
+                    shape = one.shape
+                    del file[name]
+                    if kind == 8:
+                        file.create_dataset(name, shape, "u1", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
+                    elif kind == 9:
+                        layout = h5py.VirtualLayout(shape, "f8")
+                        layout[...] = h5py.VirtualSource("other.nc", name, shape)
+                        file.create_virtual_dataset(name, layout)
+                    else:  # a chunk is read as one
+                        long = {"maxshape": (None,), "chunks": (random.choice((10**6, 10**8, 5 * 10**8)),)}
+                        file.create_dataset(name, (3,), "f8", compression="gzip", **long)[:] = 1.0
             except (OSError, KeyError, ValueError, RuntimeError, TypeError):
                 continue
     return path, random.randrange(5)

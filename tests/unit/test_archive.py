@@ -616,7 +616,10 @@ class TestVerify:
 
     def test_what_is_no_regular_file_is_not_read(self, tmp_path):
         os.mkfifo(tmp_path / "one.zip")
-        refused(run("verify", tmp_path / "one.zip"), "one.zip: is no file; give an archive")
+        refused(
+            run("verify", tmp_path / "one.zip"),
+            "one.zip: cannot be read (a pipe or a device, not a file); give an archive",
+        )
 
     def test_what_could_not_be_checked_is_not_written(self):
         def files(number, size):

@@ -1,10 +1,21 @@
 """Input that is refused, and what it said or did before it was: found by the targets of tests/fuzz, or by people."""
 
+import base64
+import os
+import re
+import shutil
+import struct
+import tracemalloc
+import zlib
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import springtune as st
 from springtune.browse.page import page
+from springtune.cli import main
+from springtune.inputs import virtual_memory
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
@@ -17,6 +28,7 @@ from springtune.mesh import (
     structured,
     write_mesh,
 )
+from springtune.mesh.group_files import read_shape
 from springtune.output import reading
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
@@ -330,6 +342,173 @@ class TestFiles:
         assert not list(tmp_path.iterdir())
 
 
+PLATE = right(0.1, 0.02, 0.01)
+
+
+def stated(blocks, count):
+    """Counts at the head of a section of Gmsh's format 4.1: blocks, nodes or elements, the smallest and the last."""
+    return struct.pack("<4Q", blocks, count, 1, count)
+
+
+STATED = 4_000_000_000
+
+COUNTS = {
+    # by the format of meshio: ending, options, what states a count of points or cells, and what states another one
+    "gmsh": ("msh", {}, stated(1, len(PLATE.points)), stated(1, STATED)),
+    "gmsh, elements": ("msh", {}, stated(1, len(PLATE.triangles)), stated(STATED, STATED)),
+    "gmsh, text": ("msh", {"binary": False}, b"$Nodes\n1 %d", b"$Nodes\n1 4000000000"),
+    "gmsh22": ("msh", {}, b"$Nodes\n%d\n", b"$Nodes\n4000000000\n"),
+    "gmsh22, text": ("msh", {"binary": False}, b"$Nodes\n%d\n", b"$Nodes\n4000000000\n"),
+    "vtk42": ("vtk", {}, b"POINTS %d", b"POINTS 4000000000"),
+    "vtk51": ("vtk", {}, b"POINTS %d", b"POINTS 4000000000"),
+    "vtk51, text": ("vtk", {"binary": False}, b"POINTS %d", b"POINTS 4000000000"),
+    "off": ("off", {}, b"%d", b"4000000000"),
+    "su2": ("su2", {}, b"NPOIN= %d", b"NPOIN= 4000000000"),
+    "ply": ("ply", {"binary": False}, b"vertex %d", b"vertex 4000000000"),
+    "medit": ("mesh", {}, b"Vertices\n%d", b"Vertices\n4000000000"),
+    "ansys": ("msh", {}, b"(3010 (1 1 %x", b"(3010 (1 1 ee6b2800"),
+    "tecplot": ("dat", {}, b"NODES = %d", b"NODES = 4000000000"),
+}
+
+
+def plate_file(folder, name, ending, options):
+    """A good file of `PLATE`, in a format of meshio."""
+    meshio = pytest.importorskip("meshio")
+    path = folder / f"plate.{ending}"
+    points = PLATE.points if name == "su2" else np.column_stack([PLATE.points, np.zeros(len(PLATE.points))])
+    mesh = meshio.Mesh(points, [("triangle", PLATE.triangles)])
+    mesh.write(path, file_format=name.partition(",")[0], **options)
+    return path
+
+
+class TestCounts:
+    """Files of some kilobytes that state billions of points or cells: what they took, or why they were refused."""
+
+    @pytest.mark.parametrize("name", COUNTS)
+    def test_a_stated_count_is_no_reason_to_take_memory(self, tmp_path, name):
+        ending, options, sound, other = COUNTS[name]
+        path = plate_file(tmp_path, name, ending, options)
+        assert len(read_shape(path).mesh.points) == len(PLATE.points)
+        sound = sound % len(PLATE.points) if b"%" in sound else sound
+        content = path.read_bytes()
+        assert sound in content
+        path.write_bytes(content.replace(sound, other, 1))
+        for read in (read_shape, lambda path: read_beam_mesh(path, 0.1, 0.02))[: 1 if name == "tecplot" else 2]:
+            with pytest.raises(MeshError, match=r"plate\.\w+: .*is damaged[^\n]*; write it again$"):
+                read(path)
+
+    @pytest.mark.parametrize("format", ["binary", "appended"])
+    def test_blocks_of_vtu_that_are_zeros_by_the_gigabyte(self, tmp_path, format):
+        """A megabyte of zlib for 1.3 GB of coordinates."""
+        block = zlib.compress(bytes(2**26))
+        count = 20
+        head = struct.pack(f"<{3 + count}I", count, 2**26, 2**26, *[len(block)] * count)
+        bomb = (base64.b64encode(head) + base64.b64encode(count * block)).decode()
+        path = plate_file(tmp_path, "vtu", "vtu", {})
+        text = path.read_text()
+        data = re.search(r'<DataArray[^>]*Name="Points"[^>]*>(.*?)</DataArray>', text, re.DOTALL)
+        if format == "binary":
+            text = text.replace(data[1], bomb)
+        else:
+            array = data[0].replace(data[1], "").replace('format="binary"', 'format="appended" offset="0"')
+            text = text.replace(data[0], array)
+            text = text.replace("</VTKFile>", f'<AppendedData encoding="base64">_{bomb}</AppendedData></VTKFile>')
+        path.write_text(text)
+        tracemalloc.start()
+        try:
+            with pytest.raises(MeshError, match=r"vtu: .*is damaged.*; write it again"):
+                read_beam_mesh(path, 0.1, 0.02)
+            assert tracemalloc.get_traced_memory()[1] < 0.7e9
+        finally:
+            tracemalloc.stop()
+
+    def test_a_study_says_it_in_a_line(self, tmp_path):
+        ending, options, _, other = COUNTS["gmsh, text"]
+        path = plate_file(tmp_path, "gmsh, text", ending, options)
+        path.write_bytes(path.read_bytes().replace(b"$Nodes\n1 %d" % len(PLATE.points), other))
+        (tmp_path / "study.yaml").write_text(
+            "title: x\nmaterials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}\n"
+            "shapes: {p: {file: plate.msh, loads: {pull: {supports: {left: fixed}, forces: {right: [1 N, 0]},"
+            " quantities: {work: energy}}}}}\n"
+            "shape_grids: {g: {shape: p, load: pull, material: steel, definition: lattice}}\n"
+        )
+        asked = CliRunner().invoke(main, ["scenes", str(tmp_path / "study.yaml")])
+        said = [line for line in asked.output.splitlines() if "plate.msh" in line]
+        assert asked.exit_code == 1 and isinstance(asked.exception, SystemExit), asked.output
+        assert len(said) == 1 and "is damaged" in said[0] and "; write it again" in said[0]
+
+    def test_the_bound_is_gone_afterwards(self, tmp_path):
+        resource = pytest.importorskip("resource")
+        before = resource.getrlimit(resource.RLIMIT_AS)
+        path = plate_file(tmp_path, "vtu", "vtu", {})
+        read_beam_mesh(path, 0.1, 0.02)
+        path.write_bytes(path.read_bytes()[:300])
+        with pytest.raises(MeshError):
+            read_beam_mesh(path, 0.1, 0.02)
+        assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+class TestOfOtherKinds:
+    """Pipes, devices and folders in the place of files: what opened a pipe without a writer never came to an end."""
+
+    @pytest.fixture(params=["a pipe", "/dev/zero", "a folder"])
+    def odd(self, request, tmp_path):
+        path = tmp_path / "odd.csv"
+        if request.param == "a pipe":
+            os.mkfifo(path)
+        elif request.param == "a folder":
+            path.mkdir()
+        else:
+            path.symlink_to(request.param)
+        return path
+
+    TEXTS = {
+        "rows": SMALL.replace("beam: a}", "beam: a, rows: odd.csv}"),
+        "printed": SMALL + "printed: odd.csv\n",
+        "uniaxial_test": SMALL.replace("young_modulus: 210 GPa, poisson_ratio: 0.3", "uniaxial_test: odd.csv"),
+        "mesh_files": SMALL.replace("mesh_type: structured", "mesh_type: own")
+        + "mesh_files: {own: [{file: odd.csv, beam: a, mesh_size: 5 mm}]}\n",
+    }
+
+    @pytest.mark.parametrize("key", TEXTS)
+    def test_a_file_that_a_study_names(self, tmp_path, odd, key):
+        (tmp_path / "study.yaml").write_text(self.TEXTS[key])
+        with pytest.raises(
+            st.StudyError, match="odd.csv'.*(a pipe or a device, not a file|Is a directory|not a file); "
+        ):
+            st.load_study(tmp_path / "study.yaml")
+
+    @pytest.mark.parametrize("key", ["rows", "printed", "uniaxial_test"])
+    def test_every_csv_file_has_one_limit(self, tmp_path, key):
+        (tmp_path / "odd.csv").write_bytes(b"stretch,stress [MPa]\n" + b"1.5,1\n" * 1_000_000)
+        (tmp_path / "study.yaml").write_text(self.TEXTS[key])
+        with pytest.raises(st.StudyError, match=r"odd.csv' cannot be read: larger than 5 MB; "):
+            st.load_study(tmp_path / "study.yaml")
+
+    @pytest.mark.parametrize(
+        "command",
+        [("scenes",), ("run",), ("split", "--into", "2"), ("clean",), ("info",), ("verify",), ("browse",), ("accept",),
+         ("export", "--to", "x.csv"), ("which",)],
+        ids=lambda command: command[0],
+    )  # fmt: skip
+    def test_what_a_command_is_given(self, tmp_path, odd, command, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        name, *options = command
+        told = CliRunner().invoke(main, [name, odd.name, *options])
+        assert told.exit_code and isinstance(told.exception, SystemExit) and "odd.csv" in told.output, told.output
+
+    def test_archives_and_what_is_compared(self, tmp_path, odd):
+        archive = odd.rename(odd.with_suffix(".zip"))
+        told = CliRunner().invoke(main, ["verify", str(archive)])
+        assert told.exit_code == 1 and "odd.zip: cannot be read (" in told.output
+        told = CliRunner().invoke(main, ["diff", str(archive), str(archive)])
+        assert told.exit_code == 2 and "odd.zip" in told.output
+
+    def test_a_mesh(self, odd):
+        with pytest.raises(MeshError, match="odd.csv: there is no such file; give"):
+            read_beam_mesh(odd, 0.1, 0.02)
+
+
 class TestDatasets:
     @pytest.fixture
     def path(self, tmp_path):
@@ -371,3 +550,127 @@ class TestDatasets:
             del file["status"]
         told = CliRunner().invoke(main, ["info", str(path)])
         assert told.exit_code == 1 and "is damaged, or not as springtune writes it (AttributeError" in told.stderr
+
+    def links(self, name, path):
+        """Change a dataset so that data of another file are in it."""
+        import h5py
+
+        with h5py.File(path, "r+") as file:
+            shape, attributes = file["deformation_error"].shape, dict(file["deformation_error"].attrs)
+            del file["deformation_error"]
+            if name == "an external link":
+                file["deformation_error"] = h5py.ExternalLink(path.with_name("other.nc"), "/deformation_error")
+            elif name == "stored outside of the file":
+                external = [("/etc/passwd", 0, h5py.h5f.UNLIMITED)]
+                file.create_dataset("deformation_error", shape, "u1", external=external)
+            else:
+                layout = h5py.VirtualLayout(shape, "f8")
+                layout[:] = h5py.VirtualSource(path.with_name("other.nc"), "deformation_error", shape)
+                file.create_virtual_dataset("deformation_error", layout)
+            if name != "an external link":
+                for key in ("DIMENSION_LIST", "units", "_Netcdf4Dimid", "_Netcdf4Coordinates"):
+                    if key in attributes:
+                        file["deformation_error"].attrs[key] = attributes[key]
+
+    @pytest.mark.parametrize("name", ["an external link", "stored outside of the file", "a virtual dataset"])
+    def test_data_of_other_files_are_refused_wherever_a_dataset_is_opened(self, path, name, monkeypatch):
+        from springtune.publication.datasets import PaperError
+        from springtune.publication.datasets import read as for_paper
+
+        monkeypatch.chdir(path.parent)
+        shutil.copy(path, path.with_name("other.nc"))
+        self.links(name, path)
+        says = rf"dataset.nc: 'deformation_error' is {name}[^;]*; data of other files are not read"
+        for call in (st.open, page):
+            with pytest.raises(ValueError, match=says):
+                call(path)
+        with pytest.raises(PaperError, match=says):
+            for_paper([path])
+        commands = ["info", "diff . other.nc", "diff other.nc .", "export --to x.csv", "browse", "accept", "which"]
+        for command in commands:
+            first, *rest = command.split()
+            told = CliRunner().invoke(main, [first, *([] if "other.nc" in rest else ["dataset.nc"]), *rest])
+            assert told.exit_code and re.search(says, told.output), f"{command}: {told.output}"
+        assert not path.with_name("x.csv").exists()
+
+    def test_a_net_and_a_mesh_file_are_refused_likewise(self, tmp_path):
+        h5py = pytest.importorskip("h5py")
+        springs = st.Scene(BEAM, MESH, STEEL, "traction", "1 kN", definition="lattice").springs
+        net = tmp_path / "net.h5"
+        springs.write(net, errors=False)
+        mesh = plate_file(tmp_path, "h5m", "h5m", {"add_global_ids": False})
+        for path, name in ((net, "points"), (mesh, "tstt/nodes/coordinates")):
+            with h5py.File(path, "r+") as file:
+                shape = file[name].shape
+                del file[name]
+                file.create_dataset(name, shape, "f8", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
+        with pytest.raises(ValueError, match="'points' is stored outside of the file, in '/etc/passwd'"):
+            st.SpringNet.read(net)
+        with pytest.raises(MeshError, match="'tstt/nodes/coordinates' is stored outside of the file, in '/etc/passwd'"):
+            read_beam_mesh(mesh, 0.1, 0.02)
+
+    @pytest.mark.parametrize("place", ["/etc/plate.h5", "../plate.h5", "plate.h5"])
+    def test_xdmf_is_refused_wherever_its_numbers_are(self, tmp_path, place):
+        (tmp_path / "here").mkdir()
+        path = plate_file(tmp_path / "here", "xdmf", "xdmf", {})
+        path.write_text(path.read_text().replace("plate.h5", place))
+        path = path.rename(path.with_name("own.xdmf"))
+        with pytest.raises(MeshError, match="own.xdmf: parts of it are in other files"):
+            read_beam_mesh(path, 0.1, 0.02)
+
+    def test_a_gigabyte_is_the_most_that_a_small_dataset_says_it_holds(self, path):
+        """A chunk is read as one, so that a single number of it took a gigabyte and more."""
+        netCDF4 = pytest.importorskip("netCDF4")
+        with netCDF4.Dataset(path, "a") as file:
+            file.createDimension("n", 10)
+        import h5py
+
+        sound = path.read_bytes()
+        for made in ({"shape": (140_000_000,), "chunks": (1024,)},
+                     {"shape": (10,), "maxshape": (None,), "chunks": (140_000_000,)}):  # fmt: skip
+            path.write_bytes(sound)
+            with h5py.File(path, "r+") as file:
+                file.create_dataset("many", dtype="f8", compression="gzip", **made)
+            for call in (st.open, page):
+                with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 1\.1\d GB in .* MB\)"):
+                    call(path)
+
+    @pytest.mark.parametrize("count", [20_000, 140_000])
+    def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path, count):
+        """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes."""
+        import h5py
+
+        h5netcdf = pytest.importorskip("h5netcdf")
+        with h5netcdf.File(path, "a") as file:
+            for name, length in (("one", 1), ("many", count)):
+                file.dimensions[f"n_{name}"] = length
+                file.create_variable(name, (f"n_{name}",), h5py.string_dtype(), chunks=(length,))
+        with h5py.File(path, "r+") as file:
+            file["one"][0] = "x" * (2_500_000_000 // count)
+            _, place = file["one"].id.read_direct_chunk((0,))
+            file["many"].id.write_direct_chunk((0,), place * count)
+        before = virtual_memory()
+        with pytest.raises(ValueError, match="more than 1 GB|cannot be read"), st.open(path) as tree:
+            tree["many"].load()
+        with pytest.raises(ValueError, match="more than 1 GB|cannot be read|is damaged"):
+            page(path)
+        assert virtual_memory() < before + 1.2e9
+
+    def test_a_large_dataset_of_texts_and_fields_opens_at_once(self, tmp_path):
+        """As it was opened, each text took the room of the longest one: 2 GB for a file of 28 MB."""
+        import xarray as xr
+
+        from springtune.output.dataset import write
+
+        count = 150_000
+        texts = np.full(count, "", dtype=object)
+        texts[::1000] = "x" * 2000  # 1.2 GB at one width
+        data = xr.Dataset({"field": (("cell", "particle"), np.ones((count, 20))), "message": ("cell", texts)})
+        write(tmp_path / "dataset.nc", {"/": data}, {"springtune_version": "1"})
+        st.open(tmp_path / "dataset.nc").close()  # what it imports is there then
+        before = virtual_memory()
+        with st.open(tmp_path / "dataset.nc") as tree:
+            assert tree.message.dtype == object and virtual_memory() < before + 20e6
+            assert tree.message.isel(cell=slice(999, 1002)).values.tolist() == ["", "x" * 2000, ""]
+            assert int((tree.message != "").sum()) == count // 1000
+            assert float(tree.field.sum()) == 20 * count

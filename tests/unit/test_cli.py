@@ -152,7 +152,9 @@ def test_a_missing_dataset_is_told_with_what_to_run(tmp_path, command):
 
 class TestBench:
     def test_dataset_without_a_benchmark_is_refused(self, tmp_path):
-        xr.DataTree.from_dict({"/": xr.Dataset()}).to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+        xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "1"})}).to_netcdf(
+            tmp_path / "old.nc", engine="h5netcdf"
+        )
         result = run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc")
         assert result.exit_code == 1 and "has no group /benchmark; run config/benchmark.yaml" in result.stderr
         assert "none.nc" in run("bench", tmp_path / "none.nc").stderr
@@ -167,7 +169,9 @@ class TestBench:
             data = xr.Dataset(
                 {"seconds": (dims, seconds), "seconds_spread": (dims, 0.0 * np.array(seconds))}, coordinates
             )
-            xr.DataTree.from_dict({"/benchmark": data}).to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+            xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "1"}), "/benchmark": data}).to_netcdf(
+                tmp_path / f"{name}.nc", engine="h5netcdf"
+            )
         assert run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc").exit_code == 0
         result = run("bench", tmp_path / "new.nc", "--compare", tmp_path / "old.nc")
         assert result.exit_code == 1 and "  3.00  y  slower" in result.stdout

@@ -16,7 +16,7 @@ SOURCE = REPOSITORY / "src/springtune"
 PARSED = {path: ast.parse(path.read_bytes()) for path in sorted(SOURCE.rglob("*.py"))}
 
 LAYERS = (
-    ("escapes", "registry", "units"),
+    ("escapes", "inputs", "registry", "units"),
     ("linalg", "mesh", "problem"),
     ("mechanics",),
     ("springs", "reference"),

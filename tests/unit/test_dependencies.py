@@ -338,7 +338,7 @@ REFERENCE = {"kinds.scenes.reference", "kinds.samples.interpolate", "kinds.shape
 VERSIONS = {
     "matplotlib": set(),
     "xarray": set(),
-    "h5py": set(),
+    "h5py": {"from a file"},
     "pint": set(),
     "pydantic": set(),
     "snakemake": set(),

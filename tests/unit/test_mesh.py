@@ -1,6 +1,7 @@
 """Meshes: geometry that holds for any size, quality figures, and files."""
 
 import hashlib
+import resource
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from springtune.cli import main
+from springtune.inputs import virtual_memory
 from springtune.kinds.scenes.mesh import make
 from springtune.mesh import (
     MESH_TYPES,
@@ -288,8 +290,14 @@ class TestSlits:
 
         path = save(tmp_path / "own.vtu", self.MESH.points, {3: self.MESH.triangles})
         monkeypatch.setattr(meshio, "read", read)
-        with pytest.raises(expected):
-            read_beam_mesh(path, 0.1, 0.02)
+        before = resource.getrlimit(resource.RLIMIT_AS)
+        # Of a limit that somebody else has set, and that is tighter than that of reading a file.
+        resource.setrlimit(resource.RLIMIT_AS, (virtual_memory() + 10**8, before[1]))
+        try:
+            with pytest.raises(expected):
+                read_beam_mesh(path, 0.1, 0.02)
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, before)
 
     @pytest.mark.parametrize("name", ["own.xdmf", "own.inp"])
     def test_parts_in_other_files_are_refused(self, tmp_path, name):

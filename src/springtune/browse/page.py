@@ -16,10 +16,11 @@ import h5py
 import jinja2
 from markupsafe import Markup
 
+from ..inputs import bounded
 from ..kinds import KINDS
-from ..output.reading import REMEDY, check_size, guarded
+from ..output.reading import REMEDY, check_links, guarded, most_of
 from ..output.views import View
-from .payload import held, packed
+from .payload import packed
 
 SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
 """Modules of the page's own script, in the order in which they are put together."""
@@ -72,11 +73,11 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
     try:
-        with guarded(path), h5py.File(path) as opened:
+        check_links(path)
+        with guarded(path), bounded(most_of(path)), h5py.File(path) as opened:
             # Asked first: of what it cannot read h5netcdf leaves a half-made file that complains when it is forgotten.
             opened.attrs.get("_nc3_strict")
             with h5netcdf.File(opened, decode_vlen_strings=True) as file:
-                check_size(path, held(file))
                 groups, contents = packed(file)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error}); {REMEDY}") from None

@@ -9,7 +9,6 @@ are sorted by their place in a number, since those of one place are alike, and e
 import zlib
 from collections.abc import Iterator
 from itertools import accumulate
-from math import prod
 from typing import Any
 
 import h5netcdf
@@ -59,21 +58,6 @@ def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]],
         for row, begin in zip(described["variables"], ends):
             row["at"] = begin
     return [described for described, _ in found], contents
-
-
-def held(group: h5netcdf.Group) -> float:
-    """Bytes of all arrays of a file, as it says itself.
-
-    Parameters
-    ----------
-    group : h5netcdf.Group
-
-    Returns
-    -------
-    float
-    """
-    own = sum(float(prod(one.shape)) * one.dtype.itemsize for one in group.variables.values())
-    return own + sum(held(child) for child in group.groups.values())
 
 
 def _lighten(found: list[Packed], room: int) -> None:

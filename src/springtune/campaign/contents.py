@@ -17,7 +17,7 @@ from ..jobs import records
 from ..jobs.atomic import write_text
 from ..jobs.commands import COMMANDS_FILE
 from ..jobs.dependencies import OURS, PACKAGE
-from ..output.reading import CHANGED
+from ..output.reading import CHANGED, check_links
 from . import due, environment, provenance
 from .plan import plan
 from .sites import ELSEWHERE
@@ -479,6 +479,10 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
     import numpy as np
 
     assert isinstance(dataset.source, Path)
+    try:
+        check_links(dataset.source)
+    except ValueError as error:
+        raise ArchiveError(str(error)) from None
     copy = scratch / due.DATASET
     shutil.copyfile(dataset.source, copy)
     with h5py.File(copy, "a") as file:

@@ -20,6 +20,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
+from ..inputs import fault
 from ..output import reading
 from . import due, environment
 from .contents import CODE, METADATA, MOST_FILES, MOST_TEXT, OF_RESULTS, SUMS
@@ -100,8 +101,9 @@ def check(path: Path) -> Checked:
         If it is no archive of a study, or not even its list of contents can be read.
     OSError
     """
-    if path.exists() and not path.is_file():
-        raise ReproductionError(f"{path}: is no file; give an archive")
+    why = fault(path)
+    if why:
+        raise ReproductionError(f"{path}: cannot be read ({why}); give an archive")
     with open(path, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     with _Bounded(FileIO(path)) as file:

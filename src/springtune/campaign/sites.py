@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from ..escapes import shown
+from ..inputs import check_alone
 from ..jobs import atomic, records, sealed, store
 from ..jobs.damage import DamagedError
 from ..jobs.guard import Watch
@@ -28,6 +29,7 @@ from ..jobs.run_tasks import RECORDS, TASKS
 from ..jobs.spent import Spent
 from ..kinds.division import part_of
 from ..kinds.scenes.plan import scene_key
+from ..output.reading import check_links
 from ..study.messages import clipped
 from ..study.model import Part
 from ..study.partial import digest_of, is_part, whole_text
@@ -233,10 +235,11 @@ def _site(study: "Study", folder: Path) -> Site:
     if not path.is_file():
         raise MergeError(f"{folder}: has no {due.DATASET}; run this part to its end, where it was computed")
     try:
+        check_links(path)
         with h5py.File(path) as file:
             attributes = {name: _text(value) for name, value in file.attrs.items()}
-    except OSError:
-        raise MergeError(f"{path}: is damaged; run this part again, where it was computed") from None
+    except (OSError, ValueError) as error:
+        raise MergeError(f"{error}; run this part again, where it was computed") from None
     text = attributes.get("config", "")
     if not is_part(text):
         raise MergeError(f"{folder}: is not of a part of a study; give the results of what `springtune split` wrote")
@@ -390,6 +393,10 @@ def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Cal
     before = store.contents(target) if store.stored(target) else {}
     found, origin = dict(before), dict.fromkeys(before, target)
     for path in paths:
+        try:
+            check_alone(path)
+        except (OSError, ValueError) as error:
+            raise MergeError(f"{error}; run this part again, where it was computed") from None
         for key, result in store.contents(path).items():
             if key not in found or (store.LIMITS in found[key] and store.LIMITS not in result):
                 found[key], origin[key] = result, path

@@ -74,7 +74,7 @@ def bench(dataset: Path, compare: Path | None, write: bool, page: Path) -> None:
 
 def _loaded(path: Path, group: str) -> "xr.DataTree":
     """Dataset that has a group, in memory; what is wrong with it is told with the study to run."""
-    import xarray as xr
+    from ..output import reading
 
     study = {"moduli": "definitions"}.get(group, group)
     remedy = f"run config/{study}.yaml"
@@ -82,12 +82,13 @@ def _loaded(path: Path, group: str) -> "xr.DataTree":
     if not file.is_file():
         raise click.ClickException(f"{path}: there is no such dataset; {remedy}")
     try:
-        with xr.open_datatree(file, engine="netcdf4") as tree:
+        reading.check_opens(file)
+        with reading.open(file) as tree:
             if group not in tree:
                 raise click.ClickException(f"{path}: has no group /{group}; {remedy}")
             return tree.load()
     except (OSError, RuntimeError, ValueError) as error:
-        raise click.ClickException(f"{path}: cannot be read ({error}); {remedy}") from None
+        raise click.ClickException(f"{error}; {remedy}") from None
 
 
 def _tables(command: str, text: "Callable[[xr.DataTree], str]", group: str, dataset: Path, page: Path | None) -> None:

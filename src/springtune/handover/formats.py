@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..inputs import DataElsewhere, check_alone
 from ..jobs.atomic import check_folder, replacing, write_text
 from ..mesh.formats import LONGEST_SAID
 from .mujoco import mjcf
@@ -123,7 +124,7 @@ def read(path: str | Path) -> Content:
             warnings.simplefilter("ignore")
             return _checked(form.read(path))
     except (Exception, SystemExit) as error:  # of a damaged file the libraries raise whatever they trip over
-        if isinstance(error, OSError) and error.errno is not None:
+        if isinstance(error, DataElsewhere) or (isinstance(error, OSError) and error.errno is not None):
             raise
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
@@ -572,6 +573,7 @@ def _header_in(group: Any) -> dict[str, Any]:
 def _read_h5(path: Path) -> Content:
     import h5py
 
+    check_alone(path)
     with h5py.File(path) as file:
         arrays = {name: file[name][()] for name in ARRAYS if name in file}
         groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]

@@ -30,6 +30,7 @@ PACKAGE = Path(__file__).parents[1]
 
 CARRIED = {
     ("browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
+    ("inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
     ("jobs/processes.py", "psutil"): "it says which processes live",
     ("jobs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("output/dataset.py", "h5py"): "texts go into a dataset as they are",

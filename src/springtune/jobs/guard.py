@@ -13,7 +13,8 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
+
+from ..inputs import virtual_memory
 
 PLACES = 4096
 """Bytes of the name of a task."""
@@ -60,7 +61,7 @@ class Watch:
         """
         self._write(key)
         before = resource.getrlimit(resource.RLIMIT_AS)
-        used = _virtual_memory()
+        used = virtual_memory()
         if used:
             # A limit that the user, or a cluster, has set for the whole job is kept.
             most = [limit for limit in before if limit != resource.RLIM_INFINITY]
@@ -79,14 +80,6 @@ class Watch:
 
     def _write(self, key: str) -> None:
         self._name[:PLACES] = key.encode().ljust(PLACES, b"\0")
-
-
-def _virtual_memory() -> int:
-    """Bytes that this process has mapped; 0 where the system does not say."""
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[0]) * mmap.PAGESIZE
-    except OSError:
-        return 0
 
 
 def go_with_parent() -> None:

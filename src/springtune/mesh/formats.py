@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
 from .box import box_fault, on_sides
 from .cells import Mesh, MeshError, no_cells, signed_areas
 from .groups import GroupedMesh
@@ -30,14 +31,20 @@ PHYSICAL = "gmsh:physical"
 LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
-BEYOND_MEMORY = 1e12
-"""What no file of `LARGEST_FILE` holds [bytes]."""
-
 COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
 """Endings of files that have a part of a mesh."""
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
+
+HDF5 = b"\x89HDF\r\n"
+"""What files of HDF5 begin with, some after a block of their own."""
+
+READ_MEMORY, READ_MEMORY_SHARE = 5e8, 40.0
+"""Memory that reading a file may take [bytes], and how often its size besides: no sound file takes as much."""
+
+READ_SECONDS, READ_SECONDS_SHARE = 2.0, 3e-6
+"""Seconds of the processor that it may take, and for each byte besides: some readers wait for lines for ever."""
 
 MOST_IN_FILE = 1_000_000
 """Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
@@ -190,25 +197,18 @@ def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.nda
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
 
 
-def _is_the_machines(error: BaseException) -> bool:
-    """Whether a file cannot be read for reasons that are not its own: the system's errors, and a lack of memory.
-
-    A damaged file may claim to hold more than any memory.
-    """
-    if isinstance(error, MemoryError):
-        claimed = float(np.prod(getattr(error, "shape", 0), dtype=float)) * 8
-        return claimed < BEYOND_MEMORY
-    return isinstance(error, OSError) and error.errno is not None
+def _is_the_machines(error: BaseException, memory: float) -> bool:
+    """Whether a file cannot be read for reasons that are not its own: the system's errors, and a lack of memory."""
+    if isinstance(error, MemoryError) and not isinstance(error, BeyondBound):
+        return float(np.prod(getattr(error, "shape", 0), dtype=float)) * 8 <= memory
+    return isinstance(error, OSError) and (error.errno or 0) > 0  # netCDF has numbers of its own, below
 
 
 def file_content(path: str | Path) -> Any:
     """What meshio reads from a file; a MeshError says why it does not."""
-    try:
-        size = Path(path).stat().st_size if Path(path).is_file() else -1
-    except (OSError, ValueError):  # a name that no file can have
-        size = -1
-    if size < 0:
+    if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
+    size = Path(path).stat().st_size
     if size == 0:
         raise MeshError(f"{path}: the file is empty; write the mesh again")
     if size > LARGEST_FILE:
@@ -216,20 +216,35 @@ def file_content(path: str | Path) -> Any:
         raise MeshError(
             f"{path}: {size / 1e6:.0f} MB, and at most {most} are read; write a coarser mesh, or binary VTU"
         )
-    if Path(path).suffix.lower() in COMPANIONS or b"*include" in Path(path).read_bytes().lower():
+    content = Path(path).read_bytes()
+    if Path(path).suffix.lower() in COMPANIONS or b"*include" in content.lower():
         raise MeshError(
             f"{path}: parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
         )
+    if HDF5 in content:
+        try:
+            check_alone(path)
+        except OSError:  # meshio says it
+            pass
+        except DataElsewhere as error:
+            raise MeshError(str(error)) from None
     import meshio
 
-    told = io.StringIO()
+    told, memory = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size
     try:
         # meshio tells people of what it leaves out, and exits where it does not know the format.
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            return meshio.read(path)
+            with bounded(memory, READ_SECONDS + READ_SECONDS_SHARE * size):
+                return meshio.read(path)
+    except MemoryError as error:
+        if _is_the_machines(error, memory):
+            raise
+        raise MeshError(
+            f"{path}: is damaged: it states more points or cells than its {size / 1e3:.3g} kB can hold; write it again"
+        ) from None
     except (Exception, SystemExit) as error:
-        if _is_the_machines(error):
+        if _is_the_machines(error, memory):
             raise
         said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
         said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()

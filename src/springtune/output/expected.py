@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from .. import __version__
+from ..inputs import fault
 from ..jobs.atomic import write_text
 from ..problem.status import Status
 from . import dataset, reading
@@ -247,6 +248,8 @@ def _known(array: xr.DataArray) -> xr.DataArray:
 
 def is_expected(path: str | Path) -> bool:
     """Whether a file in YAML holds expected values, and is no study."""
+    if fault(path):
+        return False
     try:
         with open(path, encoding="utf-8") as file:
             return any(line.startswith(f"{ACCEPTED}:") for _, line in zip(range(50), file))

@@ -1,14 +1,18 @@
 """Opening the dataset of a study."""
 
+import math
 import os
 import signal
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from ..inputs import BeyondBound, bounded, check_alone
 
 if TYPE_CHECKING:
+    import h5py
     import xarray
 
     from .dataset import Label
@@ -22,14 +26,17 @@ CHANGED = "+changes"
 
 REMEDY = "give the dataset.nc of a study, or run the study again"
 
-DEFLATED = 1100.0
-"""Bytes that one byte of a file can stand for, at most: deflate gets to 1032 [1]."""
+MOST_HELD = 1e9
+"""Bytes that opening a dataset may take, and all that it says it holds, whatever the size of its file."""
+
+DEFLATED = 30.0
+"""How often its size a larger file may hold [1]; datasets of mostly holes are smaller than `MOST_HELD`."""
+
+BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
+"""What the name of an array begins with that is a dimension without labels, and never read."""
 
 OPENED_WITHIN = 4
 """Seconds of the processor after which a file that is not open yet is taken to be damaged."""
-
-LARGE_ARRAY = 2**20
-"""Bytes beyond which an array is not read before something of it is asked for."""
 
 LONGEST_REASON = 200
 """Most characters of an error that are shown."""
@@ -67,8 +74,6 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     Traceback (most recent call last):
     FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc
     """
-    import xarray
-
     path = Path(path)
     file = path / "dataset.nc" if path.is_dir() else path
     if not file.is_file():
@@ -76,47 +81,30 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
     check_links(file)
+    from .lazy import opened
+
     try:
-        tree = xarray.open_datatree(file, engine="netcdf4")
+        with bounded(MOST_HELD):
+            tree = opened(file, most_of(file))
     except Exception as error:  # of a damaged file the libraries raise whatever they trip over
         raise ValueError(f"{file}: cannot be read ({_said(error)}); {REMEDY}") from None
-    try:
-        if "springtune_version" not in tree.attrs:
-            raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
-        check_size(file, sum(data.nbytes for node in tree.subtree for data in node.variables.values()))
-    except ValueError:
+    if "springtune_version" not in tree.attrs:
         tree.close()
-        raise
+        raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
     return tree
 
 
 @contextmanager
 def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
-    """Context of a dataset as this version writes it, of whose large arrays is read what is asked of them.
-
-    Small ones are in memory. `open` reads texts whatever their number: xarray makes arrays of one width of them.
+    """Context of a dataset of which small arrays are in memory, and of large ones is read what is asked of them.
 
     Parameters
     ----------
     path : str or Path
     """
-    import netCDF4
-    import numpy as np
-    import xarray as xr
-    from xarray.backends import NetCDF4DataStore
+    from .lazy import LARGE_ARRAY
 
-    class Store(NetCDF4DataStore):
-        def open_store_variable(self, name: str, var: Any) -> Any:
-            var.set_var_chunk_cache(0)  # no chunk is read twice
-            found = super().open_store_variable(name, var)
-            if found.encoding["dtype"] is str and found.nbytes > LARGE_ARRAY:
-                found.encoding["dtype"] = np.dtype(object)
-            return found
-
-    store: Any = Store
-    with netCDF4.Dataset(path) as file:
-        groups = {"/": file, **{f"/{name}": group for name, group in file.groups.items()}}
-        tree = xr.DataTree.from_dict({name: xr.open_dataset(store(group)) for name, group in groups.items()})
+    with open(path) as tree:
         for node in tree.subtree:
             for array in node.variables.values():
                 if array.nbytes <= LARGE_ARRAY:
@@ -161,7 +149,7 @@ def check_opens(path: str | os.PathLike[str]) -> None:
 
 
 def check_links(path: Path) -> None:
-    """Refuse a file on which the library of netCDF would end this process, or never come to an end.
+    """Refuse a file on which the library of netCDF would end this process, or never end, or look into other files.
 
     So it does on some whose head is damaged, and where another program has changed the attributes by which arrays and
     dimensions know each other. HDF5's own library says so in some milliseconds.
@@ -174,16 +162,21 @@ def check_links(path: Path) -> None:
     Raises
     ------
     ValueError
+        If it is such a file, its data are in another one, or it says that it holds more than it can.
     """
     import h5py
 
     found: list[str] = []
+    held = 0
 
     def look(name: bytes) -> None:
+        nonlocal held
         one = h5py.h5o.open(file.id, name)
         if not isinstance(one, h5py.h5d.DatasetID):
             return
-        rank = one.get_space().get_simple_extent_ndims()
+        if not h5py.Dataset(one).attrs.get("NAME", b"").startswith(BARE_DIMENSION):
+            held += _held(one)
+        rank = one.rank
         for attribute, kind, shape in (
             (b"DIMENSION_LIST", h5py.h5t.VLEN, (rank,)),
             (b"_Netcdf4Coordinates", h5py.h5t.INTEGER, (rank,)),
@@ -191,38 +184,38 @@ def check_links(path: Path) -> None:
             (b"CLASS", h5py.h5t.STRING, ()),
         ):
             if h5py.h5a.exists(one, attribute):
-                held = h5py.h5a.open(one, attribute)
-                if held.get_type().get_class() != kind or held.shape != shape:
+                held_there = h5py.h5a.open(one, attribute)
+                if held_there.get_type().get_class() != kind or held_there.shape != shape:
                     found.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
 
     try:
-        with guarded(path), h5py.File(path) as file:
-            h5py.h5o.visit(file.id, look)
+        with guarded(path), bounded(MOST_HELD):
+            check_alone(path)
+            with h5py.File(path) as file:
+                h5py.h5o.visit(file.id, look)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({_said(error)}); {REMEDY}") from None
     if found:
         raise ValueError(
             f"{path}: is damaged, or changed by another program ({found[0]} is none of netCDF's); {REMEDY}"
         )
-
-
-def check_size(path: Path, held: float) -> None:
-    """Refuse a file that says it holds more than any compression would let it: it is damaged.
-
-    Parameters
-    ----------
-    path : Path
-    held : float
-        Bytes of all arrays together, as it says.
-
-    Raises
-    ------
-    ValueError
-    """
-    size = path.stat().st_size
-    if held > DEFLATED * size:
-        said = f"it says that it holds {held / 1e9:.3g} GB in {size / 1e6:.3g} MB"
+    if held > most_of(path):
+        said = f"it says that it holds {held / 1e9:.3g} GB in {path.stat().st_size / 1e6:.3g} MB"
         raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
+
+
+def _held(one: "h5py.h5d.DatasetID") -> int:
+    """Bytes of an array, or of a part of it that is read at once where that is more."""
+    import h5py
+
+    stored = one.get_create_plist()
+    chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
+    return max(math.prod(one.shape), math.prod(chunk)) * int(one.get_type().get_size())
+
+
+def most_of(path: Path) -> float:
+    """Bytes that the content of a file may take in memory."""
+    return max(MOST_HELD, DEFLATED * path.stat().st_size)
 
 
 @contextmanager
@@ -255,7 +248,8 @@ def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def _said(error: Exception) -> str:
-    text = f"{type(error).__name__}: {error}" if not isinstance(error, OSError | ValueError) else str(error)
+    for_people = isinstance(error, OSError | ValueError | BeyondBound)
+    text = str(error) if for_people else f"{type(error).__name__}: {error}"
     text = " ".join(text.split())
     return text if len(text) <= LONGEST_REASON else f"{text[: LONGEST_REASON - 3]}..."
 

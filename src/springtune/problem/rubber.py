@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..inputs import LARGEST_CSV, read
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
 from .quantities import positive
 
@@ -97,9 +98,9 @@ class TensileTest:
         (24, 7.6)
         """
         try:
-            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            why = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error.strerror
+            lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
+        except ValueError as error:
+            why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
             raise TestDataError(f"'{path}' cannot be read: {why}; {TWO_COLUMNS}") from None
         rows = [(number, row) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
                 for row in csv.reader([line])]  # fmt: skip

@@ -4,10 +4,8 @@ import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from ..inputs import LARGEST_CSV, read
 from .messages import Key, Problems, unseen
-
-LARGEST_TABLE = 5_000_000
-"""Bytes of the largest CSV file that is read."""
 
 
 def read_lines(
@@ -38,13 +36,9 @@ def read_lines(
         If the file cannot be read.
     """
     try:
-        with open(path, "rb") as file:
-            found = file.read(LARGEST_TABLE + 1)
-        if len(found) > LARGEST_TABLE:
-            raise ValueError(f"it is larger than {LARGEST_TABLE // 1_000_000} MB")
-        text = found.decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else getattr(error, "strerror", error)
+        text = read(path, LARGEST_CSV).decode("utf-8-sig")
+    except ValueError as error:
+        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
         problems.add(where, f"'{path}' cannot be read: {why}; {remedy}")
         problems.stop()
     # Empty lines in place of comments, so that the reader's line numbers are the file's.

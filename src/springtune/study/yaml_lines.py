@@ -5,6 +5,7 @@ from typing import Any
 
 import yaml
 
+from ..inputs import BeyondSize, read
 from .messages import Key, Problems, StudyError, show, unseen
 
 LARGEST_STUDY = 500_000
@@ -44,14 +45,14 @@ def read_study(path: str | Path) -> tuple[str, Any, dict[tuple[Key, ...], int]]:
     """
     example = "give the path of a study such as config/paper.yaml"
     try:
-        with open(path, "rb") as file:
-            found = file.read(LARGEST_STUDY + 1)
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise StudyError(f"{path}: cannot be read: {why}; {example}") from None
-    if len(found) > LARGEST_STUDY:
+        found = read(path, LARGEST_STUDY)
+    except BeyondSize:
         most = f"{LARGEST_STUDY // 1000} kB"
-        raise StudyError(f"{path}: larger than {most}, which no study is; {example}, or split it into several")
+        raise StudyError(
+            f"{path}: larger than {most}, which no study is; {example}, or split it into several"
+        ) from None
+    except ValueError as error:
+        raise StudyError(f"{path}: cannot be read: {error}; {example}") from None
     try:
         text = found.decode()
     except UnicodeDecodeError as error:

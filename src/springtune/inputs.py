@@ -1,0 +1,205 @@
+"""Files of others: regular ones of a bounded size are read, within a bounded memory, and nothing beside them."""
+
+import errno
+import mmap
+import os
+import signal
+import stat
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+LARGEST_CSV = 5_000_000
+"""Bytes of the largest CSV file that is read."""
+
+
+_bounds = threading.RLock()
+"""One thread at a time sets a bound, which is one of the process."""
+
+
+class BeyondSize(ValueError):
+    """A file is larger than what is read."""
+
+
+class DataElsewhere(ValueError):
+    """Data of a file are in another one."""
+
+
+class BeyondBound(MemoryError):
+    """Reading a file takes more memory or time than it may."""
+
+
+def fault(path: str | Path) -> str:
+    """Why a file is not opened: it is not there, or no regular file. A pipe may block, and a device never ends.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    str
+        Empty where the file may be opened.
+
+    Examples
+    --------
+    >>> fault("nothing.csv"), fault("/"), fault("/dev/null")
+    ('No such file or directory', 'Is a directory', 'a pipe or a device, not a file')
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError) as error:  # a ValueError is of a name that no file can have
+        return getattr(error, "strerror", None) or str(error)
+    if stat.S_ISDIR(mode):
+        return os.strerror(errno.EISDIR)
+    return "" if stat.S_ISREG(mode) else "a pipe or a device, not a file"
+
+
+def read(path: str | Path, most: int) -> bytes:
+    """Content of a regular file.
+
+    Parameters
+    ----------
+    path : str or Path
+    most : int
+        Bytes of the largest file that is read.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ValueError
+        That says why it is not read, as `fault` does, or that it is too large.
+    """
+    why = fault(path)
+    if not why:
+        try:
+            with open(path, "rb") as file:
+                found = file.read(most + 1)
+        except OSError as error:
+            why = error.strerror or str(error)
+        else:
+            if len(found) > most:
+                raise BeyondSize(f"larger than {most / 1e6:g} MB")
+    if why:
+        raise ValueError(why)
+    return found
+
+
+def virtual_memory() -> int:
+    """Bytes that this process has mapped; 0 where the system does not say."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[0]) * mmap.PAGESIZE
+    except OSError:
+        return 0
+
+
+@contextmanager
+def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
+    """Context that takes at most so many bytes on top of what the process has, and so many seconds of the processor.
+
+    A damaged file may state any number of points. The bound of memory is one of the process, so other threads share
+    it; that of seconds is kept in the main thread alone. Where the system has no such bound there is none, and one of
+    memory that is tighter already stays.
+
+    Parameters
+    ----------
+    memory : float
+    seconds : float, optional
+        0 for no bound.
+
+    Raises
+    ------
+    BeyondBound
+        In place of a MemoryError that this bound has caused, and after these seconds.
+    """
+    with _bounds, _timed(seconds):
+        used = virtual_memory()
+        if not used:
+            yield
+            return
+        import resource
+
+        before = resource.getrlimit(resource.RLIMIT_AS)
+        bound = used + int(memory)
+        if any(limit != resource.RLIM_INFINITY and limit <= bound for limit in before):
+            yield
+            return
+        resource.setrlimit(resource.RLIMIT_AS, (bound, before[1]))
+        try:
+            yield
+        except BeyondBound:
+            raise
+        except MemoryError as error:
+            raise BeyondBound(f"it takes more than {memory / 1e9:.3g} GB") from error
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+@contextmanager
+def _timed(seconds: float) -> Iterator[None]:
+    """Context that ends by BeyondBound after some seconds of the processor."""
+    if not seconds or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def stop(number: int, frame: object) -> None:
+        raise BeyondBound(f"it takes more than {seconds:g} s")
+
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def check_alone(path: str | Path) -> None:
+    """Refuse an HDF5 file whose data are elsewhere: in another file of the machine, whatever that is.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    DataElsewhere
+        That names the link or dataset, and where it points.
+    OSError
+        If it is not an HDF5 file.
+    """
+    import h5py
+
+    names: dict[str, str] = {}
+    links: list[bytes] = []
+
+    def look(name: bytes, info: "h5py.h5l.LinkInfo") -> None:
+        if info.type == h5py.h5l.TYPE_HARD:
+            links.append(name)
+        elif info.type != h5py.h5l.TYPE_SOFT:
+            names[_text(name)] = "an external link"
+
+    try:
+        with h5py.File(path) as file:
+            file.id.links.visit(look, info=True)
+            for link in links:  # afterwards: what is raised within a visit is not always passed on
+                one = h5py.h5o.open(file.id, link)
+                if isinstance(one, h5py.h5d.DatasetID):
+                    stored = one.get_create_plist()
+                    if stored.get_external_count():
+                        outside = _text(stored.get_external(0)[0])
+                        names[_text(link)] = f"stored outside of the file, in {outside!r}"
+                    if stored.get_layout() == h5py.h5d.VIRTUAL:
+                        names[_text(link)] = "a virtual dataset"
+    except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
+        raise OSError(f"damaged: {error}") from None
+    for name, what in names.items():
+        raise DataElsewhere(f"{path}: {name!r} is {what}; data of other files are not read: write them into this one")
+
+
+def _text(name: bytes) -> str:
+    return name.decode(errors="replace")
