@@ -90,7 +90,9 @@ def test_stability_has_the_names_of_the_contract(tree):
     assert solved.any() and data.strain_displacement.where(solved).notnull().sum() == solved.sum()
     assert (data.strain_message.where(data.strain_status.isin([3, 4]), "why") != "").all()
     solved = data.contrast_status == 1
-    assert solved.sel(stiffness_contrast=slice(None, 1e12)).all() and not solved.sel(stiffness_contrast=1e16).any()
+    # At 1e12 one solver leaves ten digits, and another none: the same status by both.
+    assert solved.sel(stiffness_contrast=slice(None, 1e10)).all()
+    assert not solved.sel(stiffness_contrast=slice(1e12, None)).any()
     assert (data.contrast_error.where(solved).fillna(0) <= 2 * data.contrast_estimate.clip(1e-12)).all()
     euler = data.buckling_load.sel(definition="delingette") / data.euler_load.sel(definition="delingette")
     assert abs(euler - 1).max() <= 0.02
