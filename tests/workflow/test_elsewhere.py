@@ -86,6 +86,13 @@ def test_no_character_of_a_path_is_the_shells(repository, tmp_path):
     assert not [*tmp_path.rglob("PWNED*")] and not (repository / "PWNED").exists()
 
 
+def test_no_path_ends_the_script_of_a_report():
+    """Snakemake writes paths of parameters into it as they are."""
+    one = Path("here/a<")
+    for path in (one / "script>b<script>alert(1)<" / "script>mine.yaml", Path("<!--<script>/mine.yaml")):
+        assert "use no <" in commands.refusal(path, Path("/home"), Path("/home"), Path("/bin/python"), on_cluster=False)
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [

@@ -57,6 +57,8 @@ def refusal(config: Path, folder: Path, checkout: Path, python: Path, on_cluster
         if on_cluster and not ON_CLUSTERS.fullmatch(str(path)):
             why = "the plugin for Slurm passes paths to a shell without quotes"
             return f"{str(path)!r}: {why}; use letters, digits and @ + = : , . / _ - in names of files and folders"
+    if re.search("</script|<!--|<script", str(config), re.IGNORECASE):
+        return f"{str(config)!r}: Snakemake writes it into a report as it is; use no < in names of files and folders"
     if "\\" in str(folder):
         return f"{str(folder)!r}: the netCDF library reads \\ in a path as /; run in a folder without \\ in its name"
     if os.pathsep in str(python.parent):
