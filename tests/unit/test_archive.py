@@ -273,6 +273,7 @@ class TestContents:
                 file.write(f"# changed {name}\n")
         Path("workflow/profiles/own.yaml").write_text("# changed token")
         git("add", "workflow/profiles/own.yaml")
+        assert "collect" in do("config/one.yaml")  # the dataset has the study's text
         result = run("archive", "results/one")
         assert "packed as it is, with code.diff\n" in result.stdout, result.output
         assert "(--untracked packs them): workflow/profiles/own.yaml\n" in result.stdout

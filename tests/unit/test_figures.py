@@ -369,7 +369,8 @@ def test_the_stage_draws_what_it_is_told(tree, tmp_path):
     path = tmp_path / "dataset.nc"
     chosen = {"beam": ["100x20"], "material": ["steel"], "load": ["traction"]}
     small, curves = tree.to_dataset().sel(chosen), tree["sensitivity"].to_dataset().sel(chosen)
-    xr.DataTree.from_dict({"/": small, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
+    root = small.assign_attrs(springtune_version="1")
+    xr.DataTree.from_dict({"/": root, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
     stems = [
         "size_structured_steel_traction",
         "size_free_steel_traction",

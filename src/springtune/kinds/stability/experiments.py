@@ -302,7 +302,7 @@ def slivers(setup):
     return {name if name.startswith("sliver") else f"sliver_{name}": values for name, values in result.items()}
 
 
-LOST = 1e-2
+MOST_LOST = 1e-2
 """Largest share of the digits that rounding may take from a factor: beyond, another solver or processor may leave none,
 neither of the estimate. The condition of a sheet's network is about its number of particles times the contrast."""
 
@@ -314,7 +314,7 @@ def contrast(setup):
     middle = setup.coarse.points[setup.coarse.edges].mean(axis=1)[:, 0]
     soft = (middle / setup.beam.height + 1e-9) // 1 % 2 == 0  # what lies between two parts is the right one's
     ratios = AXES["stiffness_contrast"]
-    sure = LOST / (np.finfo(float).eps * len(setup.coarse.points))
+    sure = MOST_LOST / (np.finfo(float).eps * len(setup.coarse.points))
     result = _statics(len(ratios)) | {"error": np.full(len(ratios), np.nan), "estimate": np.full(len(ratios), np.nan)}
     base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
     for i, ratio in enumerate(ratios):
