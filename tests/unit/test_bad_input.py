@@ -397,7 +397,7 @@ class TestCounts:
             with pytest.raises(MeshError, match=r"plate\.\w+: .*is damaged[^\n]*; write it again$"):
                 read(path)
 
-    @pytest.mark.parametrize("format", ["binary", "appended"])
+    @pytest.mark.parametrize("format", ["binary", pytest.param("appended", marks=pytest.mark.slow)])
     def test_blocks_of_vtu_that_are_zeros_by_the_gigabyte(self, tmp_path, format):
         """A megabyte of zlib for 1.3 GB of coordinates."""
         block = zlib.compress(bytes(2**26))
@@ -635,7 +635,7 @@ class TestDatasets:
                 with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 1\.1\d GB in .* MB\)"):
                     call(path)
 
-    @pytest.mark.parametrize("count", [20_000, 140_000])
+    @pytest.mark.parametrize("count", [pytest.param(20_000, marks=pytest.mark.slow), 140_000])
     def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path, count):
         """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes."""
         import h5py

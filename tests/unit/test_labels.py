@@ -50,9 +50,8 @@ def test_a_dollar_sign_in_a_text_is_one(tree, plot):
     other = xr.DataTree.from_dict({node.path: foreign(node.to_dataset(inherit=False)) for node in tree.subtree})
     chosen = {name: f"{label} {HOSTILE}" if name in RENAMED else label for name, label in EVERY_PLOT[plot][0].items()}
     figure = np.ravel(plot(other, **chosen))[0].figure
-    png_and_pdf(figure)  # no exception
     content = io.StringIO()
-    figure.savefig(content, format="svg")
+    figure.savefig(content, format="svg")  # no exception
     assert "<script>" not in content.getvalue()
 
 
