@@ -24,6 +24,8 @@ from dataclasses import dataclass, field
 from os import _exit as leave
 from pathlib import Path
 
+from springtune.problem.geometry import AssumptionWarning
+
 MOST_SECONDS = 10
 """Of the processor, for one input."""
 
@@ -183,6 +185,7 @@ def _read(target, made):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", AssumptionWarning)  # words for people, not a fault
             return target.read(made), ""
     except Refused as error:
         message = str(error)
