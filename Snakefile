@@ -32,7 +32,7 @@ if not TOLD:
             DONE,
             rules.collect.output,
             OUTPUTS.values(),
-            str(RESULTS / due.PAGE),  # plain: the report is to name the rule that made it
+            str(RESULTS / rerun.PAGE),  # plain: the report is to name the rule that made it
 
     release()
     if "storage" in config or asks_for_storage():

@@ -90,24 +90,24 @@ def megabytes(*paths: Path) -> float:
 
 def plan_and_note(config: str) -> None:
     """Plan a study, write its tasks and note what later steps are called with."""
-    from springtune.campaign import due
-    from springtune.campaign.plan import plan
-    from springtune.jobs.dependencies import CODE_FILE, OURS
-    from springtune.kinds import load_study
+    from springtune.studies.kinds import load_study
+    from springtune.studies.runs import rerun
+    from springtune.studies.runs.dependencies import CODE_FILE, OURS
+    from springtune.studies.runs.plan import plan
 
     loaded = load_study(config)
     made = plan(loaded, Path("results") / loaded.name, 2)
     made.write()
     OURS.remember(Path("results") / CODE_FILE)
-    jobs = due.jobs(loaded, made)
-    found = {"scenes": len(loaded.scenes), "jobs": len(jobs), "digest": jobs[due.COLLECT].digest}
+    jobs = rerun.jobs(loaded, made)
+    found = {"scenes": len(loaded.scenes), "jobs": len(jobs), "digest": jobs[rerun.COLLECT].digest}
     found["stages"] = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}
     Path("plan.json").write_text(json.dumps(found))
 
 
 def do_stages(config: str, invent: str) -> None:
     """Do the jobs of a study's stages; results of scenes are invented where that is said."""
-    from springtune.jobs import records, run_tasks, sealed
+    from springtune.studies.runs import checked_json, records, run_tasks
 
     folder = Path("results") / Path(config).stem
     spent = 0.0
@@ -115,7 +115,7 @@ def do_stages(config: str, invent: str) -> None:
         tasks, done = folder / f"tasks/{name}.json", folder / f"done/{name}.json"
         begin = sum(os.times()[:4])  # of this process and of those that do a job's tasks
         if invent == "invent" and stage == "solve":
-            note = sealed.read(tasks)
+            note = checked_json.read(tasks)
             for family in note["content"]["families"]:
                 write_invented(Path(note["content"]["folder"]) / f"{family['name']}.h5", family["scenes"])
             records.write(done, digest, note["products"])
@@ -129,7 +129,7 @@ def write_invented(path: Path, scenes: list[dict[str, Any]]) -> None:
     """Results of scenes that look like those of a solve, the same each time; numbers differ from scene to scene."""
     import numpy as np
 
-    from springtune.jobs import store
+    from springtune.studies.runs import store
 
     draws = np.random.default_rng(len(scenes)).uniform(0.5, 1.5, (len(scenes), 6))
     store.add(
@@ -180,17 +180,17 @@ def measure(scenes: int, folder: Path) -> dict[str, Numbers]:
     found["store"] = {"files": len(stored), "MB": megabytes(*stored)}
     dataset, done = results / "dataset.nc", str(results / "done/collect.json")
     words = (config, f"results/{results.name}", str(dataset), done, noted["digest"])
-    found["collect"] = python("-m", "springtune.campaign.collect", *words)
+    found["collect"] = python("-m", "springtune.studies.kinds.collect", *words)
     found["dataset"] = {"MB": megabytes(dataset)}
     page, done = results / "index.html", str(results / "done/browse.json")
-    found["page"] = python("-m", "springtune.campaign.browse", str(dataset), str(page), done, "")
+    found["page"] = python("-m", "springtune.studies.output.browse.job", str(dataset), str(page), done, "")
     found["page"]["file"] = megabytes(page)
     done = str(results / "done/present.json")
-    found["tables"] = python("-m", "springtune.campaign.present", str(dataset), str(results), done, "", "tables")
+    found["tables"] = python("-m", "springtune.studies.output.present", str(dataset), str(results), done, "", "tables")
     found["tables"]["file"] = megabytes(*(results / "tables").iterdir())
     done = str(results / "done/figures.json")
     words = (str(dataset), str(results), done, "", "size", "sweep")
-    found["figures"] = python("-m", "springtune.campaign.present", *words)
+    found["figures"] = python("-m", "springtune.studies.output.present", *words)
     found["figures"]["file"] = megabytes(*(results / "figures").iterdir())
     return found
 
@@ -221,7 +221,7 @@ ROWS = (
 
 
 LARGEST_PAGE = "at most 5 MB"
-"""Size of a page to browse, see `springtune.browse.payload`."""
+"""Size of a page to browse, see `springtune.studies.output.browse.payload`."""
 
 
 def extrapolated(known: dict[int, float]) -> tuple[float, Callable[[int], float]]:

@@ -56,13 +56,13 @@ def _check_study(arguments: "Sequence[str]") -> None:
         return
     if not files:
         return
-    from springtune.study.messages import StudyError
-    from springtune.study.yaml_lines import read_study
+    from springtune.studies.config.messages import StudyError
+    from springtune.studies.config.yaml_lines import read_study
 
     try:
         for file in files:
             if not isinstance(read_study(file)[1], dict):
-                from springtune.kinds import load_study
+                from springtune.studies.kinds import load_study
 
                 load_study(file)
     except StudyError as error:
@@ -186,7 +186,7 @@ class LogHandler(LogHandlerBase):
         return record.levelno >= WARNING or not shown
 
     def _remind(self, results: Path) -> None:
-        from springtune.campaign.summary import reminder
+        from springtune.studies.output.summary import reminder
 
         sys.stderr.write(reminder(results))
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from springtune.campaign.workload import Load
+    from springtune.studies.runs.workload import Load
 
 LOOKED_AT = 200
 """So many files that jobs are still to make are looked for at a time."""

@@ -16,21 +16,21 @@ __version__ = "0.1.0"
 
 _NAMES = {
     "handover.net": ("SpringNet",),
-    "kinds": ("load_study",),
-    "kinds.benchmark.figures": (
+    "studies.kinds": ("load_study",),
+    "studies.kinds.benchmark.figures": (
         "plot_benchmark",
         "plot_benchmark_costs",
         "plot_benchmark_curve",
         "plot_benchmark_rates",
     ),
-    "kinds.laying.figures": ("plot_laying",),
-    "kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
-    "kinds.refinement.figures": ("plot_refinement",),
-    "kinds.samples.figures": ("plot_effects", "plot_sobol"),
-    "kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
-    "kinds.scenes.sweeps": ("plot_sweep",),
-    "kinds.shapes.figures": ("plot_shape", "plot_shape_errors", "plot_shapes"),
-    "kinds.stability.figures": (
+    "studies.kinds.laying.figures": ("plot_laying",),
+    "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
+    "studies.kinds.refinement.figures": ("plot_refinement",),
+    "studies.kinds.samples.figures": ("plot_effects", "plot_sobol"),
+    "studies.kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
+    "studies.kinds.scenes.sweeps": ("plot_sweep",),
+    "studies.kinds.shapes.figures": ("plot_shape", "plot_shape_errors", "plot_shapes"),
+    "studies.kinds.stability.figures": (
         "plot_stability_buckling",
         "plot_stability_energy",
         "plot_stability_limits",
@@ -41,8 +41,8 @@ _NAMES = {
     ),
     "mesh": ("MESH_TYPES", "Mesh", "MeshError", "mesh_type"),
     "mesh.groups": ("GroupedMesh",),
-    "output.merging": ("merge",),
-    "output.reading": ("field", "open"),
+    "studies.output.merging": ("merge",),
+    "studies.output.reading": ("field", "open"),
     "prediction": ("Choice", "MeshChoice", "MeshSearch", "SolvedMesh", "find_mesh", "predict"),
     "problem.geometry": ("Beam",),
     "problem.loads": ("LOADS",),
@@ -56,7 +56,7 @@ _NAMES = {
     "scene.shape_meshes": ("mesh_shape", "read_shape"),
     "scene.single": ("Result", "Scene"),
     "springs": ("DEFINITIONS", "Definition", "DefinitionError", "Springs", "definition"),
-    "study.messages": ("StudyError",),
+    "studies.config.messages": ("StudyError",),
     "units": ("UnitError",),
 }
 """Public names by the module that has them; a figure is added by a row of its module."""
@@ -145,9 +145,9 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
+    from .registry import imported
 
-    return getattr(import_module(f".{_PLACES[name]}", __name__), name)
+    return imported(f"{_PLACES[name]}:{name}")
 
 
 def __dir__() -> list[str]:

@@ -4,15 +4,33 @@ The mapping finds what the modules of a package declare by importing them all, w
 one place: its function. Code outside the package adds its own with the same decorator.
 """
 
-import importlib
 import inspect
 import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
+
+HOOKS = {"drawing": "studies.output.drawing", "writing": "handover.written"}
+"""Modules of upper rooms that lower ones call: they are found by name, so that no result depends on them."""
+
+
+def imported(name: str) -> Any:
+    """Import a module, or with ``module:name`` what it has by that name, from the package on.
+
+    All imports by text go through this function: commands, study kinds, stages, outputs, public names and hooks.
+    """
+    module, _, attribute = name.partition(":")
+    found = import_module(f"springtune.{module}")
+    return getattr(found, attribute) if attribute else found
+
+
+def hook(name: str) -> Any:
+    """Module of `HOOKS`."""
+    return imported(HOOKS[name])
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +126,8 @@ class Registry(Mapping[str, Entry]):
 
     def _discover(self) -> None:
         if not self._complete:
-            for module in pkgutil.iter_modules(importlib.import_module(self._package).__path__):
-                importlib.import_module(f"{self._package}.{module.name}")
+            for module in pkgutil.iter_modules(import_module(self._package).__path__):
+                import_module(f"{self._package}.{module.name}")
             self._complete = True
 
     def __getitem__(self, name: str) -> Entry:

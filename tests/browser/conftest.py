@@ -12,9 +12,9 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
 import springtune
-from springtune.browse.page import page
-from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
-from springtune.output.dataset import STATUS
+from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.output.browse.page import page
+from springtune.studies.output.dataset import STATUS
 
 from synthetic import dataset
 

@@ -11,7 +11,7 @@ from selenium.webdriver import Keys
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
-from springtune.browse.server import Server
+from springtune.studies.output.browse.server import Server
 
 CURVE = "springtune.charts.curve.sources.points.data.y.join()"
 HEADING = "document.querySelector('.chosen-cell h2').textContent"

@@ -9,7 +9,6 @@ import shutil
 import sys
 import traceback
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 import h5py
@@ -17,14 +16,14 @@ import netCDF4
 import numpy as np
 import xarray
 
-from springtune.campaign import due
-from springtune.campaign.plan import plan
-from springtune.jobs import sealed, store
-from springtune.jobs.atomic import remove_unfinished
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
-from springtune.kinds.benchmark import stage as benchmark
-from springtune.kinds.laying import stage as laying
+from springtune.registry import imported
+from springtune.safe_io.atomic import remove_unfinished
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.benchmark import stage as benchmark
+from springtune.studies.kinds.laying import stage as laying
+from springtune.studies.runs import checked_json, rerun, store
+from springtune.studies.runs.plan import plan
+from springtune.studies.runs.task_costs import Spent
 
 from campaigns import Campaign
 
@@ -50,7 +49,7 @@ def warm_up(scratch):
     for module, name in ((benchmark, "_case"), (laying, "_lay")):
         setattr(module, name, _remembered(getattr(module, name)))
     for job in plan(load_study(STUDY), scratch, 1).jobs.values():
-        import_module(f"springtune.{job.stage.module}").run(job.content, Spent())
+        imported(job.stage.module).run(job.content, Spent())
 
 
 def _remembered(function):
@@ -82,7 +81,7 @@ class Run(Campaign):
 
         What is made of the dataset is made again only where it failed: elsewhere the dataset says that it is the same.
         """
-        after = [name for name in self.jobs if name not in (*self.plan.jobs, due.COLLECT)]
+        after = [name for name in self.jobs if name not in (*self.plan.jobs, rerun.COLLECT)]
         names = [name for name in self.due() if name == step or name not in after]
         for name in [BEGIN, *names] if names else ():
             self.do(name)
@@ -156,7 +155,7 @@ def content(path):
         with netCDF4.Dataset(path) as file:
             return _group(file)
     if path.suffix == ".json" and path.parent.name != "tables":
-        found = sealed.read(path)
+        found = checked_json.read(path)
         assert found is not None, f"{path} is not whole"
         if path.name == "costs.json":
             return None

@@ -33,38 +33,32 @@ from mutations import WORDS, spoil_bytes, spoil_counts, spoil_tree
 from snakemake.utils import format as rendered
 
 import springtune as st
-from springtune.browse.page import page
-from springtune.campaign import due, reproduction
-from springtune.campaign.contents import METADATA, SUMS
-from springtune.campaign.page import html as tables_page
-from springtune.campaign.page import shown as shown_table
-from springtune.campaign.plan import plan
 from springtune.cli.archived import verified
 from springtune.cli.diff import comparison_text
 from springtune.cli.info import info_text
-from springtune.escapes import UNSEEN, markdown, no_mathematics, rst
 from springtune.handover.formats import ENDINGS
-from springtune.jobs import commands
-from springtune.kinds import kinds, load_study
-from springtune.kinds.scenes.summary import summary
 from springtune.mechanics.moduli import axial_moduli
-from springtune.mesh import (
-    MESH_TYPES,
-    MeshError,
-    corner_angles,
-    read_beam_mesh,
-    signed_areas,
-    write_mesh,
-)
+from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas, write_mesh
 from springtune.mesh.group_files import read_shape
 from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
-from springtune.output import reading
-from springtune.output.canvas import png_and_pdf
-from springtune.output.comparison import compare
-from springtune.output.dataset import write
-from springtune.output.export import export
-from springtune.output.style import styled
+from springtune.safe_io.escapes import UNSEEN, markdown, no_mathematics, rst
+from springtune.studies.archive import reproduction
+from springtune.studies.archive.contents import METADATA, SUMS
+from springtune.studies.config.kind import kinds
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes.summary import summary
+from springtune.studies.output import reading
+from springtune.studies.output.browse.page import page
+from springtune.studies.output.canvas import png_and_pdf
+from springtune.studies.output.comparison import compare
+from springtune.studies.output.dataset import write
+from springtune.studies.output.export import export
+from springtune.studies.output.page import html as tables_page
+from springtune.studies.output.page import shown as shown_table
+from springtune.studies.output.style import styled
+from springtune.studies.runs import commands, rerun
+from springtune.studies.runs.plan import plan
 
 import synthetic
 
@@ -739,7 +733,7 @@ def plan_paths(path):
     why = commands.refusal(Path(path.name), here, here, Path(sys.executable), on_cluster=False)
     if why:
         raise Refused(why)
-    jobs = due.jobs(study, plan(study, Path("results") / study.name, 2))
+    jobs = rerun.jobs(study, plan(study, Path("results") / study.name, 2))
     # A function stands for Python; it says what it is called with.
     script, expected = [r"""python() { printf '%s\0' "$@"; }"""], {}
     for number, block in enumerate(_shell_blocks()):

@@ -40,7 +40,6 @@ from mechanics import (
     spring_forces,
     squares_forces,
 )
-from springtune.kinds.scenes.solve import solve as solve_scene
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.follower import FollowerPressure
 from springtune.mesh import MESH_TYPES
@@ -48,6 +47,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.scene.sheet import Loading, Sheet, solved
 from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.studies.kinds.scenes.solve import solve as solve_scene
 
 PROMISED = 1e-6
 """Largest error of the displacements of a solved scene, relative: `springtune.mechanics.newton.CORRECTION`."""

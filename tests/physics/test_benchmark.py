@@ -11,12 +11,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.kinds.benchmark import measure as benchmark
-from springtune.kinds.benchmark.approaches import APPROACHES
-from springtune.kinds.benchmark.measure import LoadedBeam
-from springtune.kinds.benchmark.names import OTHER_APPROACHES, approach_names
-from springtune.kinds.benchmark.tables import comparison
-from springtune.kinds.benchmark.variables import BENCHMARK
 from springtune.linalg import SOLVERS
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
@@ -30,6 +24,12 @@ from springtune.problem.status import Status
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import half_weight
+from springtune.studies.kinds.benchmark import measure as benchmark
+from springtune.studies.kinds.benchmark.approaches import APPROACHES
+from springtune.studies.kinds.benchmark.measure import LoadedBeam
+from springtune.studies.kinds.benchmark.names import OTHER_APPROACHES, approach_names
+from springtune.studies.kinds.benchmark.tables import comparison
+from springtune.studies.kinds.benchmark.variables import BENCHMARK
 
 BEAM = Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {

@@ -7,8 +7,6 @@ import pytest
 from netgen.geom2d import SplineGeometry
 from netgen.meshing import MeshingParameters
 
-from springtune.kinds.laying.kind import REFERENCE_SIZES
-from springtune.kinds.laying.lay import lay
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle, oriented_outline
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, signed_areas
@@ -16,6 +14,8 @@ from springtune.problem.compare import band
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
+from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
+from springtune.studies.kinds.laying.lay import lay
 
 RUBBER, STEEL = Material(1e6, 0.49, name="rubber"), Material(210e9, 0.3, name="steel")
 STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)

@@ -6,9 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds.moduli import stage as moduli
 from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
@@ -20,6 +17,9 @@ from springtune.springs.base import not_negative
 from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
+from springtune.studies.kinds.moduli import stage as moduli
+from springtune.studies.runs import store
+from springtune.studies.runs.task_costs import Spent
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)

@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from springtune.jobs import store
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.reference.interpolant import (
     JUDGED_WITHIN,
@@ -17,6 +16,7 @@ from springtune.reference.interpolant import (
     lagrange_values,
 )
 from springtune.reference.small_strain import solve_unit
+from springtune.studies.runs import store
 
 BOXES = {
     AXIAL: ((1.0, 12.0), (0.0, 0.5)),

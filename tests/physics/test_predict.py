@@ -8,7 +8,6 @@ import pytest
 
 import springtune as st
 from counting import counted
-from springtune.kinds.scenes.solve import solve
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
@@ -22,6 +21,7 @@ from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.studies.kinds.scenes.solve import solve
 
 # Random beams may be thicker than they are high: thickness is a factor.
 pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")

@@ -13,18 +13,7 @@ from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, Me
 from skfem.models.elasticity import linear_elasticity
 
 from springtune.problem.geometry import Beam
-from springtune.problem.loads import (
-    AXIAL,
-    BENDING,
-    BOTH,
-    FACE,
-    LEFT,
-    LOAD_KINDS,
-    RIGHT,
-    SHEAR,
-    TOP,
-    LoadKind,
-)
+from springtune.problem.loads import AXIAL, BENDING, BOTH, FACE, LEFT, LOAD_KINDS, RIGHT, SHEAR, TOP, LoadKind
 from springtune.problem.materials import Material
 from springtune.reference.field import outline
 from springtune.reference.small_strain import (

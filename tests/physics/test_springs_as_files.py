@@ -14,10 +14,10 @@ import springtune as st
 from springtune.cli import main
 from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
-from springtune.kinds.scenes.solve import solve
-from springtune.kinds.scenes.stored_scene import packed, unpacked
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
+from springtune.studies.kinds.scenes.solve import solve
+from springtune.studies.kinds.scenes.stored_scene import packed, unpacked
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 AS_STIFF = st.Rubber([35e9, -5e9, 1e9], density="7850 kg/m^3")

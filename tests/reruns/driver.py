@@ -5,21 +5,21 @@ import json
 import re
 import shutil
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import meshio
 import netCDF4
 import numpy as np
 
+from springtune.registry import imported
+
 sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
 
-from springtune.campaign import due
-from springtune.jobs import records, run_tasks, sealed
-from springtune.jobs.dependencies import CODE_FILE, OURS
-from springtune.jobs.spent import Spent
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
+from springtune.studies.runs import checked_json, records, rerun, run_tasks
+from springtune.studies.runs.dependencies import CODE_FILE, OURS
+from springtune.studies.runs.task_costs import Spent
 
 from campaigns import Campaign
 
@@ -59,7 +59,7 @@ class Run(Campaign):
             OURS.remember(FOLDER.parent / CODE_FILE)
         for name in names:
             self.do(name)
-            work = sealed.read(self.jobs[name].record).get("work", {})
+            work = checked_json.read(self.jobs[name].record).get("work", {})
             # What definitions cost is told beside the scene that they are part of.
             for kind in work.keys() - set(DEFINITIONS):
                 solved[kind] = solved.get(kind, 0) + work[kind][0]
@@ -74,8 +74,8 @@ class Run(Campaign):
         run_tasks.mended(lambda: self._compute(name), FOLDER)
 
     def _compute(self, name):
-        note, spent = sealed.read(self.plan.tasks(name)), Spent()
-        import_module(f"springtune.{note['module']}").run(note["content"], spent)
+        note, spent = checked_json.read(self.plan.tasks(name)), Spent()
+        imported(note["module"]).run(note["content"], spent)
         assert not spent.broken
         records.write(self.jobs[name].record, note["digest"], note["products"], **spent.summary())
 
@@ -99,7 +99,7 @@ def write_mesh(path, shift=0.0):
 
 def dataset(folder):
     """What the dataset of a study holds, without times."""
-    with netCDF4.Dataset(folder / FOLDER / due.DATASET) as file:
+    with netCDF4.Dataset(folder / FOLDER / rerun.DATASET) as file:
         return _group(file)
 
 

@@ -297,8 +297,8 @@ SOLVING = f"moduli laying stability {CURVES}"
 """Jobs of networks, and what comes after them."""
 
 CODE = {
-    "nothing": ("kinds/scenes/solve.py", ("", ""), "", {}),
-    "docstring of a stage": ("kinds/scenes/solve.py", ('"""Stage `solve`', '"""The stage `solve`'), "", {}),
+    "nothing": ("studies/kinds/scenes/solve.py", ("", ""), "", {}),
+    "docstring of a stage": ("studies/kinds/scenes/solve.py", ('"""Stage `solve`', '"""The stage `solve`'), "", {}),
     "docstring of a function": ("mechanics/newton.py", ("    Parameters\n", "    What it takes\n"), "", {}),
     "comment": ("mechanics/network.py", ("import numpy", "# Arrays.\nimport numpy"), "", {}),
     "annotation for type checkers": (
@@ -307,12 +307,12 @@ CODE = {
         "",
         {},
     ),
-    "stage of scenes": ("kinds/scenes/solve.py", "", f"solve {AFTER}", SCENES),
-    "stage of curves": ("kinds/scenes/sensitivity.py", "", CURVES, {"curve": 16}),
-    "stage of moduli": ("kinds/moduli/stage.py", "", f"moduli {AFTER}", {"moduli": 2}),
-    "stage of laying": ("kinds/laying/lay.py", "", f"laying {AFTER}", {"laying": 4}),
-    "stage of stability": ("kinds/stability/experiments.py", "", f"stability {AFTER}", {"contrast": 1}),
-    "calibration": ("kinds/scenes/calibrate.py", "", f"calibrate solve {AFTER}", {}),
+    "stage of scenes": ("studies/kinds/scenes/solve.py", "", f"solve {AFTER}", SCENES),
+    "stage of curves": ("studies/kinds/scenes/sensitivity.py", "", CURVES, {"curve": 16}),
+    "stage of moduli": ("studies/kinds/moduli/stage.py", "", f"moduli {AFTER}", {"moduli": 2}),
+    "stage of laying": ("studies/kinds/laying/lay.py", "", f"laying {AFTER}", {"laying": 4}),
+    "stage of stability": ("studies/kinds/stability/experiments.py", "", f"stability {AFTER}", {"contrast": 1}),
+    "calibration": ("studies/kinds/scenes/calibrate.py", "", f"calibrate solve {AFTER}", {}),
     "definition of one scene": (
         "springs/delingette.py",
         "",
@@ -327,11 +327,11 @@ CODE = {
     "networks": ("mechanics/network.py", "", SOLVING, NETWORKS),
     "references": ("reference/small_strain.py", "", f"reference {CURVES}", {"reference": 2, "curve": 16} | SCENES),
     "references at finite strain, not asked for": ("reference/finite_strain.py", "", "", {}),
-    "figures": ("kinds/scenes/figures.py", "", "present_scenes", {}),
-    "figures that are not asked for": ("kinds/laying/figures.py", "", "", {}),
-    "style of figures": ("output/style.py", "", "present_scenes", {}),
-    "collect": ("kinds/scenes/collect.py", "", AFTER, {}),
-    "page to browse": ("browse/page.py", "", "browse", {}),
+    "figures": ("studies/kinds/scenes/figures.py", "", "present_scenes", {}),
+    "figures that are not asked for": ("studies/kinds/laying/figures.py", "", "", {}),
+    "style of figures": ("studies/output/style.py", "", "present_scenes", {}),
+    "collect": ("studies/kinds/scenes/collect.py", "", AFTER, {}),
+    "page to browse": ("studies/output/browse/page.py", "", "browse", {}),
     "command line": ("cli/clean.py", "", "", {}),
 }
 """File of the package, what is edited in it (nothing: a statement is added), and as of a `Row`."""

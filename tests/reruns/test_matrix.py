@@ -14,8 +14,8 @@ import pytest
 from rows import CODE, STORED, STUDY, VERSIONS
 
 import springtune
-from springtune.jobs import dependencies, keys
-from springtune.kinds.scenes import plan
+from springtune.studies.kinds.scenes import plan
+from springtune.studies.runs import dependencies, keys
 
 ROWS = STUDY | STORED
 

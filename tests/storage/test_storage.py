@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from conftest import served
-from springtune.jobs import sealed
+from springtune.studies.runs import checked_json
 
 pytestmark = pytest.mark.slow
 
@@ -34,7 +34,7 @@ def computed(machine):
     """Tasks that the last jobs of a machine's stages computed, by kind."""
     found = {}
     for path in machine.folder.glob("results/tiny/done/*_*.json"):
-        for kind, (count, *_) in (sealed.read(path).get("work") or {}).items():
+        for kind, (count, *_) in (checked_json.read(path).get("work") or {}).items():
             found[kind] = found.get(kind, 0) + count
     return found
 

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
-from springtune.campaign import browse, collect, due, present
-from springtune.campaign.plan import plan
-from springtune.jobs import run_tasks
-from springtune.kinds import load_study
-from springtune.kinds.scenes import plan as scenes
+from springtune.studies.kinds import collect, load_study
+from springtune.studies.kinds.scenes import plan as scenes
+from springtune.studies.output import present
+from springtune.studies.output.browse import job as browse
+from springtune.studies.runs import rerun, run_tasks
+from springtune.studies.runs.plan import plan
 
 
 class Campaign:
@@ -19,20 +20,20 @@ class Campaign:
         self.folder = Path("results") / self.study.name
         self.plan = plan(self.study, self.folder, cores)
         self.chosen = chosen
-        self.jobs = due.jobs(self.study, self.plan, chosen)
+        self.jobs = rerun.jobs(self.study, self.plan, chosen)
 
     def due(self):
         """Names of the jobs that are to run, in order."""
         found = []
         for name, job in self.jobs.items():
-            if due.fault(job, self.jobs) or self._before(name) & set(found):
+            if rerun.fault(job, self.jobs) or self._before(name) & set(found):
                 found.append(name)
         return found
 
     def _before(self, name):
         """Jobs that a job comes after."""
         if name not in self.plan.jobs:
-            return {*self.plan.jobs} if name == due.COLLECT else {due.COLLECT}
+            return {*self.plan.jobs} if name == rerun.COLLECT else {rerun.COLLECT}
         stage, label = self.plan.jobs[name].stage, self.plan.jobs[name].label
         others = self.plan.jobs.items()
         same = {other for other, job in others if job.stage.name in stage.same and job.label == label}
@@ -57,16 +58,16 @@ class Campaign:
 
     def do(self, name):
         """A job, by the function that its rule calls."""
-        job, dataset = self.jobs[name], str(self.folder / due.DATASET)
+        job, dataset = self.jobs[name], str(self.folder / rerun.DATASET)
         if name in self.plan.jobs:
             self.do_stage(name)
-        elif name == due.COLLECT:
-            untold = due.untold(self.folder, self.chosen)
+        elif name == rerun.COLLECT:
+            untold = rerun.untold(self.folder, self.chosen)
             collect.main(self.config, str(self.folder), dataset, str(job.record), job.digest, *untold)
-        elif name == due.BROWSE:
-            browse.main(dataset, job.products[0], str(job.record), job.digest, *due.linked(self.study))
+        elif name == rerun.BROWSE:
+            browse.main(dataset, job.products[0], str(job.record), job.digest, *rerun.linked(self.study))
         else:
-            names = [one.name for one in due.output_jobs(self.study)[name]]
+            names = [one.name for one in rerun.output_jobs(self.study)[name]]
             present.main(dataset, str(self.folder), str(job.record), job.digest, *names)
 
     def do_stage(self, name):

@@ -12,7 +12,7 @@ import yaml
 from click.testing import CliRunner
 
 from springtune.cli import main
-from springtune.kinds import load_study
+from springtune.studies.kinds import load_study
 
 REPOSITORY = Path(__file__).parents[2]
 COMMANDS = ("make", "snakemake", "springtune", "python", "cp", ".", "cd", "paraview")

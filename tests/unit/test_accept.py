@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.output import expected
-from springtune.output.comparison import Tolerance, compare
+from springtune.studies.output import expected
+from springtune.studies.output.comparison import Tolerance, compare
 from test_diff import CURVE, SCENE, made, written
 
 FILE = "config/expected/small.yaml"

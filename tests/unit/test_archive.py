@@ -25,12 +25,12 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.campaign import archive, contents, environment, provenance, reproduction
 from springtune.cli import main
-from springtune.jobs import sealed
-from springtune.kinds import load_study
-from springtune.output import reading
-from springtune.output.comparison import Tolerance, compare
+from springtune.studies.archive import archive, contents, environment, reproduction
+from springtune.studies.kinds import load_study
+from springtune.studies.output import reading
+from springtune.studies.output.comparison import Tolerance, compare
+from springtune.studies.runs import checked_json, provenance
 
 from campaigns import Campaign
 
@@ -185,7 +185,7 @@ class TestContents:
             "code/Snakefile", "code/Makefile", "code/tools/setup.sh", "code/requirements/run.txt",
             "code/config/one.yaml", "code/config/forces.csv", "code/config/plate mesh.vtu",
             "code/profiles/default/config.yaml",
-            "code/src/springtune/kinds/scenes/mesh.py", "results/one/dataset.nc", "results/one/index.html",
+            "code/src/springtune/studies/kinds/scenes/mesh.py", "results/one/dataset.nc", "results/one/index.html",
             "results/one/summary.txt", "results/one/done/collect.json", "results/one/benchmarks/collect.tsv",
         } <= packed.keys()  # fmt: skip
         assert not [name for name in packed if "/.git/" in name or "solutions" in name or name.endswith(".pyc")]
@@ -661,7 +661,7 @@ class TestResults:
         folder, command = Path("results/one"), ("verify", "results/one", "--scenes", "0")
         before = run(*command)
         assert before.exit_code == 0 and "faults: 0" in before.stdout, before.output
-        products = {path.stem: sealed.demand(path)["products"] for path in folder.glob("done/*.json")}
+        products = {path.stem: checked_json.demand(path)["products"] for path in folder.glob("done/*.json")}
         everything = [*folder.glob("done/*.json"), *folder.glob("tasks/*.json")]
         everything += [Path(name) for made in products.values() for name in made]
         assert f"{len(everything)} files compared" in before.stdout
@@ -689,9 +689,9 @@ class TestResults:
 
     def test_more_faults_than_a_screen_has_lines_are_named(self, checkout):
         record = Path("results/one/done/collect.json")
-        found = sealed.demand(record)
+        found = checked_json.demand(record)
         found["products"] |= {f"results/one/{number}.csv": [1, 1, "0"] for number in range(60)}
-        sealed.write(record, found)
+        checked_json.write(record, found)
         result = run("verify", "results/one", "--scenes", "0")
         assert result.stdout.count(".csv is missing\n") == 60 and "faults: 60\n" in result.stdout, result.stdout
 

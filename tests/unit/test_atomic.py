@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from springtune.jobs import atomic
 from springtune.mesh import MESH_TYPES, write_mesh
+from springtune.safe_io import atomic
 
 
 def test_two_processes_never_write_one_file(tmp_path):

@@ -13,9 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 import springtune as st
-from springtune.browse.page import page
 from springtune.cli import main
-from springtune.inputs import virtual_memory
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
@@ -29,7 +27,9 @@ from springtune.mesh import (
     write_mesh,
 )
 from springtune.mesh.group_files import read_shape
-from springtune.output import reading
+from springtune.safe_io.inputs import virtual_memory
+from springtune.studies.output import reading
+from springtune.studies.output.browse.page import page
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
 
@@ -512,7 +512,7 @@ class TestOfOtherKinds:
 class TestDatasets:
     @pytest.fixture
     def path(self, tmp_path):
-        from springtune.output.dataset import write
+        from springtune.studies.output.dataset import write
 
         from synthetic import dataset
 
@@ -574,8 +574,8 @@ class TestDatasets:
 
     @pytest.mark.parametrize("name", ["an external link", "stored outside of the file", "a virtual dataset"])
     def test_data_of_other_files_are_refused_wherever_a_dataset_is_opened(self, path, name, monkeypatch):
-        from springtune.publication.datasets import PaperError
-        from springtune.publication.datasets import read as for_paper
+        from springtune.studies.paper.datasets import PaperError
+        from springtune.studies.paper.datasets import read as for_paper
 
         monkeypatch.chdir(path.parent)
         shutil.copy(path, path.with_name("other.nc"))
@@ -660,7 +660,7 @@ class TestDatasets:
         """As it was opened, each text took the room of the longest one: 2 GB for a file of 28 MB."""
         import xarray as xr
 
-        from springtune.output.dataset import write
+        from springtune.studies.output.dataset import write
 
         count = 150_000
         texts = np.full(count, "", dtype=object)

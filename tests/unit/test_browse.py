@@ -18,10 +18,10 @@ import xarray as xr
 from click.testing import CliRunner
 
 import springtune
-from springtune.browse.page import page
-from springtune.browse.payload import packed
-from springtune.browse.server import Server
 from springtune.cli import main
+from springtune.studies.output.browse.page import page
+from springtune.studies.output.browse.payload import packed
+from springtune.studies.output.browse.server import Server
 
 from synthetic import dataset
 
@@ -101,16 +101,16 @@ class TestPage:
 
     def test_views_name_variables_that_studies_have(self):
         """A plot whose variable is misspelt would be left out silently."""
-        from springtune.browse.page import views
-        from springtune.kinds.benchmark.variables import BENCHMARK
-        from springtune.kinds.laying.variables import LAYING
-        from springtune.kinds.moduli.variables import MODULI
-        from springtune.kinds.refinement.variables import REFINEMENT
-        from springtune.kinds.samples.names import PARAMETERS
-        from springtune.kinds.samples.variables import EFFECTS, SAMPLES, SOBOL
-        from springtune.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
-        from springtune.kinds.shapes.variables import SHAPE_FIELDS, SHAPES
-        from springtune.kinds.stability.variables import STABILITY
+        from springtune.studies.kinds.benchmark.variables import BENCHMARK
+        from springtune.studies.kinds.laying.variables import LAYING
+        from springtune.studies.kinds.moduli.variables import MODULI
+        from springtune.studies.kinds.refinement.variables import REFINEMENT
+        from springtune.studies.kinds.samples.names import PARAMETERS
+        from springtune.studies.kinds.samples.variables import EFFECTS, SAMPLES, SOBOL
+        from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
+        from springtune.studies.kinds.shapes.variables import SHAPE_FIELDS, SHAPES
+        from springtune.studies.kinds.stability.variables import STABILITY
+        from springtune.studies.output.browse.page import views
 
         groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK)
         groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT, SHAPES, SHAPE_FIELDS)
@@ -128,7 +128,7 @@ class TestPage:
 
     def test_imports_nothing_heavy(self):
         code = (
-            "import sys, springtune.campaign.browse\n"
+            "import sys, springtune.studies.output.browse.job\n"
             "print(sorted({'xarray', 'matplotlib', 'scipy', 'bokeh', 'pydantic', 'snakemake'} & set(sys.modules)))"
         )
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.campaign.plan import plan, usual_costs
-from springtune.jobs import bundles, commands, records, sealed
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
-from springtune.kinds.stability.names import EXPERIMENTS
 from springtune.springs import DEFINITIONS
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.stability.names import EXPERIMENTS
+from springtune.studies.runs import bundles, checked_json, commands, records
+from springtune.studies.runs.plan import plan, usual_costs
+from springtune.studies.runs.task_costs import Spent
 
 USUAL = usual_costs()
 
@@ -81,7 +81,9 @@ def test_memory_follows_the_largest_job_of_a_stage_and_forgets_slowly(tmp_path):
     def run(**memory):
         done = [tmp_path / f"{job}.json" for job in memory]
         for file, most in zip(done, memory.values()):
-            sealed.write(file, {"start_up": 0.1, "work": {"reference": [1, 0, 1.0]} if most else {}, "memory": most})
+            checked_json.write(
+                file, {"start_up": 0.1, "work": {"reference": [1, 0, 1.0]} if most else {}, "memory": most}
+            )
             os.utime(file, (time.time() + 10,) * 2)
         bundles.remember(path, done, USUAL)
         os.utime(path)
@@ -164,7 +166,7 @@ def test_costs_follow_what_the_machine_measures(tmp_path):
     for _ in range(10):
         spent.add("reference", 0, 3 * USUAL["reference"][0])
         spent.add("a kind of no cost", 0, 1.0)
-    sealed.write(done, spent.summary())
+    checked_json.write(done, spent.summary())
     bundles.remember(path, [done], USUAL)
     assert bundles.Costs(path, USUAL).of("reference") == pytest.approx(3 * USUAL["reference"][0])
     assert bundles.Costs(path, USUAL).start_up == spent.start_up + bundles.SPAWNED

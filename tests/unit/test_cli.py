@@ -22,7 +22,6 @@ from springtune.cli import COMMANDS, main
 from springtune.cli.recommendation import prediction_json, prediction_text
 from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
-from springtune.kinds import kinds, load_study
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
 from springtune.prediction import find_mesh
@@ -31,7 +30,9 @@ from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
-from springtune.study import sections, study_model
+from springtune.studies.config.kind import kinds
+from springtune.studies.config.sections import sections, study_model
+from springtune.studies.kinds import load_study
 
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `springtune schema --write`"

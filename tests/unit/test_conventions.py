@@ -1,36 +1,18 @@
-"""What holds for the whole source: arrows between rooms, words, and what tests may touch."""
+"""What holds for the whole source: imports, words, and what tests may touch."""
 
 import ast
+import subprocess
 from collections import defaultdict
-from graphlib import CycleError, TopologicalSorter
-from importlib import import_module
-from importlib.util import resolve_name
 from pathlib import Path
 
 import pytest
 
-from springtune.kinds import kinds
+from springtune.registry import imported
+from springtune.studies.config.kind import kinds
 
 REPOSITORY = Path(__file__).parents[2]
 SOURCE = REPOSITORY / "src/springtune"
 PARSED = {path: ast.parse(path.read_bytes()) for path in sorted(SOURCE.rglob("*.py"))}
-
-LAYERS = (
-    ("escapes", "inputs", "registry", "units"),
-    ("linalg", "mesh", "problem"),
-    ("mechanics",),
-    ("springs", "reference"),
-    ("scene",),
-    ("prediction", "study", "jobs", "output", "handover"),
-    ("kinds",),
-    ("browse", "publication"),
-    ("campaign",),
-    ("cli",),
-    ("__init__", "__main__"),
-)
-"""Rooms and modules of the package, the lowest first: imports point down, or across without a circle."""
-
-LAYER = {room: number for number, rooms in enumerate(LAYERS) for room in rooms}
 
 VAGUE = {"asked", "whole", "race", "laid", "tasks", "work", "code", "files", "source", "problems", "unit"}
 """Names of modules that say nothing to a reader who does not know the house."""
@@ -47,76 +29,21 @@ def place(path):
     return parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts
 
 
-def imported(path):
-    """Parts of the names of the package's modules that a module imports, wherever in it, and the lines."""
-    package = ".".join(path.relative_to(SOURCE.parent).parts[:-1])
-    for node in ast.walk(PARSED[path]):
-        names = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = resolve_name("." * node.level + (node.module or ""), package) if node.level else node.module
-            names = [f"{base}.{alias.name}" for alias in node.names]
-        for name in names:
-            first, *parts = name.split(".")
-            if first == "springtune":
-                # What a module defines is no module: its own name is that of the import.
-                while parts and not (
-                    SOURCE.joinpath(*parts).is_dir() or SOURCE.joinpath(*parts).with_suffix(".py").is_file()
-                ):
-                    parts.pop()
-                if parts:
-                    yield tuple(parts), node.lineno
+def test_imports_keep_the_contracts_of_pyproject():
+    """Rooms, their layers, what the library does not import, and no circles."""
+    done = subprocess.run(["lint-imports", "--no-cache"], cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
 
 
-def arrows():
-    """Imports between rooms: from, to, and where it stands."""
-    for path in PARSED:
-        for target, line in imported(path):
-            if place(path)[0] != target[0]:
-                yield place(path)[0], target[0], f"{path.relative_to(REPOSITORY)}:{line}"
-
-
-def test_every_room_has_its_place():
-    new = {place(path)[0] for path in PARSED} - set(LAYER)
-    assert not new, f"say in LAYERS what {', '.join(sorted(new))} may import"
-
-
-def test_no_import_points_upwards():
-    up = [f"{where}: {room} imports {other}" for room, other, where in arrows() if LAYER[other] > LAYER[room]]
-    assert not up, "\n".join(up)
-
-
-def test_no_rooms_import_each_other_in_a_circle():
-    graph = defaultdict(set)
-    for room, other, _ in arrows():
-        graph[room].add(other)
-    try:
-        TopologicalSorter(graph).prepare()
-    except CycleError as error:
-        pytest.fail(" -> ".join(error.args[1]))
-
-
-def test_no_modules_import_each_other_in_a_circle():
-    """Types count, too: what two modules need to know of each other stands in one of them, or as a protocol."""
-    modules = {place(path) for path in PARSED if path.name != "__init__.py"}
-    graph = {place(path): {target for target, _ in imported(path)} & modules - {place(path)} for path in PARSED}
-    try:
-        TopologicalSorter({one: found for one, found in graph.items() if one in modules}).prepare()
-    except CycleError as error:
-        pytest.fail(" -> ".join(".".join(one) for one in error.args[1]))
-
-
-def test_a_kind_imports_no_other_kind_but_scenes():
+def test_modules_are_imported_by_text_in_one_place():
+    """import-linter cannot read such imports: all of them go through `springtune.registry`."""
     found = [
-        f"{path.relative_to(REPOSITORY)}:{line}: {'.'.join(target)}"
-        for path in PARSED
-        for target, line in imported(path)
-        if place(path)[0] == target[0] == "kinds" and min(len(place(path)), len(target)) > 1
-        if (SOURCE / "kinds" / place(path)[1]).is_dir() and (SOURCE / "kinds" / target[1]).is_dir()
-        if target[1] not in (place(path)[1], "scenes")
+        str(path.relative_to(SOURCE))
+        for path, tree in PARSED.items()
+        for node in ast.walk(tree)
+        if {"import_module", "__import__", "exec", "eval"} & {getattr(node, "id", ""), getattr(node, "attr", "")}
     ]
-    assert not found, "\n".join(found)
+    assert set(found) == {"registry.py"}
 
 
 def test_modules_have_names_that_say_something():
@@ -209,7 +136,7 @@ def test_tests_use_what_everybody_may_use(path):
 @pytest.mark.parametrize("stage", [one for kind in kinds() for one in kind.stages], ids=lambda one: one.name)
 def test_stages_say_what_is_lost_to_limits(stage):
     """Those that attempt tasks; what has no tasks loses none."""
-    module = import_module(f"springtune.{stage.module}")
+    module = imported(stage.module)
     assert callable(module.run)
     text = Path(module.__file__).read_text()
     attempts = "spent.attempt" in text or "stored_interpolant.make" in text

@@ -19,14 +19,15 @@ import xarray as xr
 
 import springtune as st
 from cf import complaints
-from springtune.campaign import provenance
-from springtune.jobs import atomic
-from springtune.kinds import KINDS, load_study
-from springtune.kinds.scenes.tables import tables
-from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
-from springtune.output import dataset
-from springtune.output.dataset import CHUNK, Group
-from springtune.output.reading import lazily
+from springtune.safe_io import atomic
+from springtune.studies.config.kind import KINDS
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes.tables import tables
+from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.output import dataset
+from springtune.studies.output.dataset import CHUNK, Group
+from springtune.studies.output.reading import lazily
+from springtune.studies.runs import provenance
 
 AXES = {
     "beam": ("a", "b"),
@@ -42,7 +43,7 @@ AXES = {
 GROUPS = {
     f"{kind}{group.name}": group
     for kind in KINDS
-    for group in vars(import_module(f"springtune.kinds.{kind}.variables")).values()
+    for group in vars(import_module(f"springtune.studies.kinds.{kind}.variables")).values()
     if isinstance(group, Group)
 }
 

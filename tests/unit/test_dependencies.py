@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.campaign.plan import stages
-from springtune.jobs import dependencies, keys, sealed
-from springtune.jobs.syntax import read
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
+from springtune.studies.runs import checked_json, dependencies, keys
+from springtune.studies.runs.plan import stages
+from springtune.studies.runs.syntax import read
 
 MODULE = '''\
 """What it is for."""
@@ -245,12 +245,12 @@ def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
     time = note.stat().st_mtime_ns
     assert closure() == fresh and note.stat().st_mtime_ns == time
     # Another digest in the note shows that it is taken, and only for the content that it was made of.
-    content = sealed.read(note)
+    content = checked_json.read(note)
     for source in content["sources"].values():
         source[0] = "taken"
-    sealed.write(note, content)
+    checked_json.write(note, content)
     assert closure().digest != fresh.digest
-    sealed.write(note, content | {"reader": "another one"})
+    checked_json.write(note, content | {"reader": "another one"})
     assert closure() == fresh
     note.write_text("{")
     assert closure() == fresh
@@ -273,13 +273,13 @@ def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
 @pytest.mark.parametrize(
     ("module", "packages"),
     [
-        ("kinds.scenes.mesh", {"numpy", "scipy"}),
-        ("kinds.scenes.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("kinds.scenes.sensitivity", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("kinds.scenes.reference", {"numpy", "scipy", "cvxopt", "skfem"}),
-        ("kinds.moduli.stage", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("kinds.stability.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba"}),
-        ("kinds.benchmark.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba", "skfem"}),
+        ("studies.kinds.scenes.mesh", {"numpy", "scipy"}),
+        ("studies.kinds.scenes.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("studies.kinds.scenes.sensitivity", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("studies.kinds.scenes.reference", {"numpy", "scipy", "cvxopt", "skfem"}),
+        ("studies.kinds.moduli.stage", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("studies.kinds.stability.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba"}),
+        ("studies.kinds.benchmark.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba", "skfem"}),
     ],
 )
 def test_packages_are_those_that_are_imported(module, packages):
@@ -297,7 +297,13 @@ def test_meshers_count_with_their_meshes():
     assert "meshio" in dependencies.mesh_file_closure().packages
 
 
-LOOKED_UP = ("campaign.collect", "campaign.present", "campaign.browse", "campaign.page", "publication.build")
+LOOKED_UP = (
+    "studies.kinds.collect",
+    "studies.output.present",
+    "studies.output.browse.job",
+    "studies.output.page",
+    "studies.paper.build",
+)
 
 
 def test_distributions_of_packages_are_those_that_are_installed():
@@ -323,17 +329,24 @@ def _keys():
     forget()
     found = {stage.module: keys.stage_key(stage.module) for stage in stages()}
     found["unit"] = keys.stage_key(
-        "kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant")
+        "studies.kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant")
     )
     found |= {name: keys.definition_key(name) for name in ("lattice", "patch", "annealed")}
     return found | {name: keys.mesh_type_key(name) for name in ("structured", "free", "from a file")}
 
 
-SOLVING = {f"kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
-SOLVING |= {f"kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")}
+SOLVING = {f"studies.kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
+SOLVING |= {
+    f"studies.kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")
+}
 SOLVING |= {"patch", "annealed"}
-SOLVING |= {"kinds.shapes.solve"}
-REFERENCE = {"kinds.scenes.reference", "kinds.samples.interpolate", "kinds.shapes.reference", "unit"}
+SOLVING |= {"studies.kinds.shapes.solve"}
+REFERENCE = {
+    "studies.kinds.scenes.reference",
+    "studies.kinds.samples.interpolate",
+    "studies.kinds.shapes.reference",
+    "unit",
+}
 
 VERSIONS = {
     "matplotlib": set(),
@@ -342,13 +355,18 @@ VERSIONS = {
     "pint": set(),
     "pydantic": set(),
     "snakemake": set(),
-    "netgen-mesher": {"free", "kinds.shapes.mesh", "kinds.shapes.reference", "kinds.shapes.solve"},
+    "netgen-mesher": {
+        "free",
+        "studies.kinds.shapes.mesh",
+        "studies.kinds.shapes.reference",
+        "studies.kinds.shapes.solve",
+    },
     "meshio": {"from a file"},
-    "numba": {"kinds.stability.stage", "kinds.benchmark.stage", "kinds.shapes.solve"},
-    "scikit-fem": {"kinds.scenes.reference", "kinds.benchmark.stage", "kinds.shapes.solve"},
+    "numba": {"studies.kinds.stability.stage", "studies.kinds.benchmark.stage", "studies.kinds.shapes.solve"},
+    "scikit-fem": {"studies.kinds.scenes.reference", "studies.kinds.benchmark.stage", "studies.kinds.shapes.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"kinds.scenes.mesh", "kinds.shapes.mesh", "from a file"},
+    "scipy": SOLVING | REFERENCE | {"studies.kinds.scenes.mesh", "studies.kinds.shapes.mesh", "from a file"},
 }
 
 
@@ -397,7 +415,7 @@ def test_of_pythons_version_what_is_before_the_patch_level_counts(monkeypatch):
     def key(*version):
         forget()
         monkeypatch.setattr(sys, "version_info", version)
-        return keys.stage_key("kinds.scenes.mesh")
+        return keys.stage_key("studies.kinds.scenes.mesh")
 
     here = key(major, minor, patch)
     assert key(major, minor, patch + 1) == here

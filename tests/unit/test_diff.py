@@ -9,10 +9,10 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.kinds.benchmark.variables import BENCHMARK
-from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
-from springtune.output import dataset
-from springtune.output.comparison import Tolerance, compare
+from springtune.studies.kinds.benchmark.variables import BENCHMARK
+from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.output import dataset
+from springtune.studies.output.comparison import Tolerance, compare
 
 import synthetic
 

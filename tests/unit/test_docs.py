@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 import springtune as st
-from springtune.kinds import load_study, outputs
 from springtune.mesh import write_mesh
+from springtune.studies.config.kind import outputs
+from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from pages import blocks as blocks_of

@@ -16,21 +16,23 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from springtune.campaign import present
-from springtune.jobs.dependencies import modules
-from springtune.kinds import outputs
-from springtune.kinds.base import FORMATS, Output
-from springtune.kinds.benchmark.figures import (
+from springtune.studies.config.kind import FORMATS, Output, outputs
+from springtune.studies.kinds.benchmark.figures import (
     plot_benchmark,
     plot_benchmark_costs,
     plot_benchmark_curve,
     plot_benchmark_rates,
 )
-from springtune.kinds.laying.figures import plot_laying
-from springtune.kinds.moduli.figures import definitions, plot_definitions_loads, plot_definitions_size, plot_moduli
-from springtune.kinds.refinement.figures import plot_refinement
-from springtune.kinds.scenes import figures
-from springtune.kinds.scenes.figures import (
+from springtune.studies.kinds.laying.figures import plot_laying
+from springtune.studies.kinds.moduli.figures import (
+    definitions,
+    plot_definitions_loads,
+    plot_definitions_size,
+    plot_moduli,
+)
+from springtune.studies.kinds.refinement.figures import plot_refinement
+from springtune.studies.kinds.scenes import figures
+from springtune.studies.kinds.scenes.figures import (
     NETWORK_LINE,
     draw_curve,
     plot_block,
@@ -38,8 +40,8 @@ from springtune.kinds.scenes.figures import (
     plot_sensitivity,
     plot_size,
 )
-from springtune.kinds.shapes.figures import plot_shape, plot_shape_errors, plot_shapes
-from springtune.kinds.stability.figures import (
+from springtune.studies.kinds.shapes.figures import plot_shape, plot_shape_errors, plot_shapes
+from springtune.studies.kinds.stability.figures import (
     PLOTS,
     plot_stability_buckling,
     plot_stability_energy,
@@ -49,8 +51,9 @@ from springtune.kinds.stability.figures import (
     plot_stability_rest,
     plot_stability_strains,
 )
-from springtune.output import style
-from springtune.output.canvas import png_and_pdf
+from springtune.studies.output import present, style
+from springtune.studies.output.canvas import png_and_pdf
+from springtune.studies.runs.dependencies import modules
 
 from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
 
@@ -407,7 +410,7 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
-        files = {*modules("campaign.present"), *modules(output.module)}
+        files = {*modules("studies.output.present"), *modules(output.module)}
         return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "sweeps.py")}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}

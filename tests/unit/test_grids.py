@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import springtune
-from springtune.kinds import load_study
-from springtune.output.selection import at, last_swept
 from springtune.problem.parameters import MOST_SCENES_VARIABLE, SWEPT
-from springtune.study import StudyError
-from springtune.study.fields import spaced
+from springtune.studies.config.fields import spaced
+from springtune.studies.config.messages import StudyError
+from springtune.studies.kinds import load_study
+from springtune.studies.output.selection import at, last_swept
 
 from campaigns import Campaign
 
@@ -424,7 +424,7 @@ def test_what_is_shown_is_of_each_beam_material_and_load(swept):
 
 
 def test_tables_have_a_row_of_each_value(swept):
-    from springtune.kinds.scenes.tables import tables
+    from springtune.studies.kinds.scenes.tables import tables
 
     tree, _, _ = swept
     (table,) = tables(tree)
@@ -500,7 +500,7 @@ def test_who_needs_a_field_has_it_whoever_asks_first(here):
 
 def test_what_is_interpolated_is_no_part_of_what_a_network_depends_on(here):
     """Another range of Poisson's ratio is another interpolant, and the same networks."""
-    from springtune.kinds.scenes.plan import scene_key
+    from springtune.studies.kinds.scenes.plan import scene_key
 
     keys = []
     for last, points in (("0.4", "61"), ("0.45", "71")):
@@ -539,8 +539,8 @@ def test_what_is_zipped_with_the_mesh_size_is_shown_on_its_own_meshes(here):
 
 
 def test_a_reference_that_is_lost_is_lost_in_its_own_file(tmp_path):
-    from springtune.jobs import store
-    from springtune.kinds.scenes import reference
+    from springtune.studies.kinds.scenes import reference
+    from springtune.studies.runs import store
 
     tasks = {"folder": str(tmp_path), "references": [{"key": "a"}], "finite": []}
     tasks["interpolants"] = [{"key": "i", "problems": {"a": (3.0, 0.3), "b": (3.0, 0.2)}}]

@@ -1,20 +1,21 @@
 """Which references of a study come from interpolants, and what is made of them."""
 
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from springtune.campaign.plan import plan
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds import kinds, load_study
-from springtune.kinds.scenes import any_reference
-from springtune.kinds.scenes.interpolated import box_of, expected_solves, interpolants
-from springtune.kinds.scenes.plan import reference_of, solved_reference
-from springtune.kinds.scenes.summary import summary
 from springtune.reference.interpolant import TOLERANCE
+from springtune.registry import imported
+from springtune.studies.config.kind import kinds
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes import any_reference
+from springtune.studies.kinds.scenes.interpolated import box_of, expected_solves, interpolants
+from springtune.studies.kinds.scenes.plan import reference_of, solved_reference
+from springtune.studies.kinds.scenes.summary import summary
+from springtune.studies.runs import store
+from springtune.studies.runs.plan import plan
+from springtune.studies.runs.task_costs import Spent
 
 MANY, FEW = 32, 20
 
@@ -58,7 +59,7 @@ def run(study, folder, *stages):
     for job in plan(study, folder, 1).jobs.values():
         if job.stage.name in stages:
             spent = Spent()
-            import_module(f"springtune.{job.stage.module}").run(job.content, spent)
+            imported(job.stage.module).run(job.content, spent)
             assert not spent.broken
             for path in job.products:
                 assert Path(path).exists()
@@ -150,5 +151,5 @@ def test_one_that_is_beyond_its_limits_is_a_hole(load, tmp_path):
     study = load(lengths(MANY))
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
     (task,) = job.content["interpolants"]
-    import_module(f"springtune.{job.stage.module}").lose(job.content, task["key"], "too slow", "at most 1 s")
+    imported(job.stage.module).lose(job.content, task["key"], "too slow", "at most 1 s")
     assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"

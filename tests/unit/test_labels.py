@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from pypdf import PdfReader
 
-from springtune.output import labels, style
-from springtune.output.canvas import CHARACTERS, png_and_pdf
+from springtune.studies.output import labels, style
+from springtune.studies.output.canvas import CHARACTERS, png_and_pdf
 from test_figures import EVERY_PLOT, closed, each  # noqa: F401  # a fixture of that file
 
 from synthetic import dataset

@@ -2,13 +2,6 @@
 
 import pytest
 
-from springtune.campaign import plan
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
-from springtune.kinds.scenes import mesh as mesh_stage
-from springtune.kinds.scenes import reference as reference_stage
-from springtune.kinds.scenes import solve as solve_stage
 from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import (
@@ -30,6 +23,12 @@ from springtune.problem.materials import Material
 from springtune.reference.finite_strain import solve_neo_hooke
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes import mesh as mesh_stage
+from springtune.studies.kinds.scenes import reference as reference_stage
+from springtune.studies.kinds.scenes import solve as solve_stage
+from springtune.studies.runs import plan, store
+from springtune.studies.runs.task_costs import Spent
 
 LIFT = LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
 BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)

@@ -9,10 +9,9 @@ import psutil
 import pytest
 from click.testing import CliRunner
 
-from springtune.campaign import locks
 from springtune.cli import main
-from springtune.jobs import sealed
-from springtune.jobs.processes import this_host
+from springtune.safe_io.processes import this_host
+from springtune.studies.runs import checked_json, locks
 
 STUDY = Path("results/mine")
 
@@ -41,7 +40,7 @@ def note(**changed):
     process = psutil.Process()
     known = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
              "folders": [str(STUDY)]}  # fmt: skip
-    sealed.write(locks.RUNS / "of_a_test.json", known | changed)
+    checked_json.write(locks.RUNS / "of_a_test.json", known | changed)
 
 
 def test_without_locks_and_runs_nothing_is_held_or_removed(lock):

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune import StudyError, load_study
-from springtune.jobs.hashing import hash_of
-from springtune.jobs.keys import beam_key, material_key
-from springtune.kinds import kinds
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, engineering_constants, material_of
-from springtune.study import study_model
-from springtune.study.expand import declared
+from springtune.studies.config.expand import declared
+from springtune.studies.config.kind import kinds
+from springtune.studies.config.sections import study_model
+from springtune.studies.runs.hashing import hash_of
+from springtune.studies.runs.keys import beam_key, material_key
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import springtune as st
-from springtune.output.comparison import compare
+from springtune.studies.output.comparison import compare
 from test_diff import AXES, SCENE, made
 
 import synthetic
@@ -168,7 +168,7 @@ class TestMerge:
 
 def _solved(name, thickness, force):
     """Dataset of one scene of a beam, solved by the library."""
-    from springtune.kinds.scenes.variables import ROOT
+    from springtune.studies.kinds.scenes.variables import ROOT
 
     beam, steel = st.Beam("60 mm", "12 mm", thickness=thickness), st.Material("210 GPa", 0.3)
     scene = st.Scene(

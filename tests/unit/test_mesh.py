@@ -14,8 +14,6 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from springtune.cli import main
-from springtune.inputs import virtual_memory
-from springtune.kinds.scenes.mesh import make
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
@@ -33,6 +31,8 @@ from springtune.mesh import (
     structured,
     write_mesh,
 )
+from springtune.safe_io.inputs import virtual_memory
+from springtune.studies.kinds.scenes.mesh import make
 
 boxes = {
     "length": st.floats(0.02, 0.3),

@@ -14,9 +14,9 @@ import springtune as st
 from springtune.cli import main
 from springtune.cli.new import LOADS_BY_FORCE
 from springtune.cli.run import SLURM
-from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
+from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 

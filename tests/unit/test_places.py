@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import springtune
-from springtune.jobs import dependencies
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, mesh_type
@@ -21,6 +20,7 @@ from springtune.problem.boundary import held, weights
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, Springs, definition
+from springtune.studies.runs import dependencies
 
 STEEL = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
 
@@ -163,7 +163,7 @@ class TestOutsideThePackage:
 
 REPORT = """
 import json, sys
-from springtune.jobs import dependencies
+from springtune.studies.runs import dependencies
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 import springtune
@@ -173,7 +173,7 @@ found = {
     "MESH_TYPES": {name: dependencies.mesh_type_closure(name).digest for name in MESH_TYPES},
     "light": not {"scipy", "h5py", "meshio", "netgen", "xarray", "pydantic"} & set(sys.modules),
 }
-from springtune.campaign import plan
+from springtune.studies.runs import plan
 stages = [one.module for one in plan.stages()]
 found["stages"] = {stage: dependencies.stage_closure(stage).digest for stage in stages}
 found["modules"] = {stage: dependencies.modules(stage) for stage in stages}
@@ -182,7 +182,7 @@ print(json.dumps(found))
 
 SCENES = """
 import operator, sys
-from springtune.kinds import load_study
+from springtune.studies.kinds import load_study
 print(*map(operator.attrgetter(sys.argv[2]), load_study(sys.argv[1]).scenes))
 """
 

@@ -12,12 +12,12 @@ import pytest
 import xarray as xr
 import yaml
 
-from springtune.publication import PaperError
-from springtune.publication.build import run
-from springtune.publication.datasets import read
-from springtune.publication.figures import draw
-from springtune.publication.numbers import numbers, table
-from springtune.publication.typed import typed_numbers
+from springtune.studies.paper import PaperError
+from springtune.studies.paper.build import run
+from springtune.studies.paper.datasets import read
+from springtune.studies.paper.figures import draw
+from springtune.studies.paper.numbers import numbers, table
+from springtune.studies.paper.typed import typed_numbers
 
 import synthetic
 
@@ -333,7 +333,14 @@ def test_the_same_dataset_gives_the_same_bytes_and_another_one_others(tmp_path, 
     run(source, tmp_path / "build", output, path)
     content = output.read_bytes()
     # Another process, another folder.
-    command = [sys.executable, "-m", "springtune.publication.build", source, tmp_path / "other", tmp_path / "again.pdf"]
+    command = [
+        sys.executable,
+        "-m",
+        "springtune.studies.paper.build",
+        source,
+        tmp_path / "other",
+        tmp_path / "again.pdf",
+    ]
     command += [tmp_path / "again.json", "digest"]
     done = subprocess.run([*command, path], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.jobs import records, run_tasks, sealed, store
-from springtune.jobs.damage import ASIDE, DamagedError
-from springtune.jobs.guard import Watch
-from springtune.jobs.spent import Spent
+from springtune.studies.runs import checked_json, records, run_tasks, store
+from springtune.studies.runs.damage import ASIDE, DamagedError
+from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_limits import Watch
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | st.text(),
@@ -37,28 +37,28 @@ def folder(tmp_path_factory):
 class TestSealed:
     @given(content=st.dictionaries(st.text(), JSON, max_size=4))
     def test_what_goes_in_comes_out(self, folder, content):
-        sealed.write(folder / "note.json", content)
-        assert sealed.read(folder / "note.json") == content == sealed.demand(folder / "note.json")
+        checked_json.write(folder / "note.json", content)
+        assert checked_json.read(folder / "note.json") == content == checked_json.demand(folder / "note.json")
         assert json.loads((folder / "note.json").read_text())["content"] == content
 
     @given(place=st.integers(0, 10**6), bit=st.integers(0, 7))
     def test_no_flipped_bit_is_read(self, folder, place, bit):
         path = folder / "flipped.json"
-        sealed.write(path, {"seconds": 0.25, "names": ["a", "b"]})
+        checked_json.write(path, {"seconds": 0.25, "names": ["a", "b"]})
         path.write_bytes(flipped(path.read_bytes(), place, bit))
-        assert sealed.read(path) is None
+        assert checked_json.read(path) is None
         with pytest.raises(DamagedError, match="checksum"):
-            sealed.demand(path)
+            checked_json.demand(path)
 
     @pytest.mark.parametrize("content", [b"", b"{}", b"null", b"\xff\xfe", b'{"seal": "'], ids=repr)
     def test_other_files_are_none(self, tmp_path, content):
         (tmp_path / "note.json").write_bytes(content)
-        assert sealed.read(tmp_path / "note.json") is None
+        assert checked_json.read(tmp_path / "note.json") is None
 
     def test_a_missing_one_is_none(self, tmp_path):
-        assert sealed.read(tmp_path / "note.json") is None
+        assert checked_json.read(tmp_path / "note.json") is None
         with pytest.raises(DamagedError, match="missing"):
-            sealed.demand(tmp_path / "note.json")
+            checked_json.demand(tmp_path / "note.json")
 
 
 class TestStore:
@@ -188,15 +188,15 @@ class TestRunTasks:
         folder = tmp_path / "results/mine"
         content = {"folder": str(folder / "references"), "finite": []}
         content["references"] = [{"key": "one", "problem": [5.0, 0.3, "axial"]}]
-        note = {"digest": "digest", "module": "kinds.scenes.reference", "limits": {"seconds": 60, "memory": 4e9},
-                "products": [str(folder / "references/one.h5")], "content": content}  # fmt: skip
-        sealed.write(folder / "tasks/reference_0.json", note)
+        note = {"digest": "digest", "module": "studies.kinds.scenes.reference", "content": content}
+        note |= {"limits": {"seconds": 60, "memory": 4e9}, "products": [str(folder / "references/one.h5")]}
+        checked_json.write(folder / "tasks/reference_0.json", note)
         run_tasks.main(str(folder / "tasks/reference_0.json"), str(folder / "done/reference_0.json"), "digest")
         return folder
 
     def test_a_job_stores_its_results_and_leaves_its_record(self, study):
         assert store.read_one(study / "references", "one")["displacement"] > 0
-        record = sealed.read(study / "done/reference_0.json")
+        record = checked_json.read(study / "done/reference_0.json")
         assert record["digest"] == "digest" and record["work"]["reference"][0] == 1
         assert list(record["products"]) == [str(study / "references/one.h5")]
 
@@ -227,15 +227,15 @@ class TestRunTasks:
     def test_who_makes_it_again_keeps_limits_and_what_was_lost_to_them(self, study):
         """One that is lost to the same limits stays lost, however its neighbours are mended."""
         tasks, done = study / "tasks/reference_0.json", study / "done/reference_0.json"
-        note = sealed.read(tasks)
+        note = checked_json.read(tasks)
         note["content"]["references"].append({"key": "lost", "problem": [5.0, 0.3, "axial"]})
         note["products"].append(str(study / "references/lost.h5"))
-        sealed.write(tasks, note)
+        checked_json.write(tasks, note)
         store.lose(study / "references", "lost", {"message": "not done", "seconds": 0.0}, Watch(note["limits"]).words)
         (study / "references/one.h5").unlink()
         run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
         assert store.read_one(study / "references", "lost")["message"] == "not done"
-        assert sealed.read(done)["work"]["reference"][0] == 1
+        assert checked_json.read(done)["work"]["reference"][0] == 1
 
     def test_an_edit_of_the_program_during_a_run_ends_its_jobs(self, study, monkeypatch):
         """Results would be stored under keys of the code of before."""

@@ -2,7 +2,6 @@
 
 import math
 import shutil
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,15 +9,16 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.campaign.plan import plan
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
-from springtune.kinds.refinement.batches import Rule, crossings, refine
-from springtune.kinds.refinement.collect import groups
-from springtune.kinds.refinement.tables import write
-from springtune.output.comparison import compare
-from springtune.study import StudyError
+from springtune.registry import imported
+from springtune.studies.config.messages import StudyError
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.refinement.batches import Rule, crossings, refine
+from springtune.studies.kinds.refinement.collect import groups
+from springtune.studies.kinds.refinement.tables import write
+from springtune.studies.output.comparison import compare
+from springtune.studies.runs import store
+from springtune.studies.runs.plan import plan
+from springtune.studies.runs.task_costs import Spent
 
 STUDY = """\
 title: Where errors matter
@@ -70,7 +70,7 @@ def run(study, folder):
     for job in plan(study, folder, 1).jobs.values():
         if job.stage.name == "refinement":
             spent = Spent()
-            import_module(f"springtune.{job.stage.module}").run(job.content, spent)
+            imported(job.stage.module).run(job.content, spent)
             assert not spent.broken
     return sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5")) - before
 
@@ -210,7 +210,7 @@ def test_raising_most_is_new_cells_and_no_changed_ones(load, tmp_path):
 def test_a_value_beyond_its_limits_is_a_hole_and_the_others_are_not(load, tmp_path):
     study = load()
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "refinement"]
-    stage = import_module(f"springtune.{job.stage.module}")
+    stage = imported(job.stage.module)
     for task in job.content["refinements"]:
         stage.lose(job.content, f"{task['key']}/0.875", "too slow", "")  # as there are none here
     run(study, tmp_path)

@@ -17,14 +17,13 @@ import xarray as xr
 from click.testing import CliRunner
 
 import springtune as st
-from springtune.campaign import locks, present
-from springtune.campaign.orphans import orphans
 from springtune.cli import main
-from springtune.jobs import sealed
-from springtune.kinds import load_study
-from springtune.kinds.scenes import paraview
-from springtune.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
-from springtune.output import dataset
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes import paraview
+from springtune.studies.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
+from springtune.studies.output import dataset, present
+from springtune.studies.runs import checked_json, locks
+from springtune.studies.runs.orphans import orphans
 
 AXES = {
     "beam": ("200x40", "100x20"),
@@ -517,7 +516,7 @@ class TestClean:
         gone = subprocess.Popen([sys.executable, "-c", "pass"])
         gone.wait()
         note = {"host": platform.node(), "pid": gone.pid, "start": 1.0, "command": "", "folders": ["results/two"]}
-        sealed.write(locks.RUNS / "gone.json", note)
+        checked_json.write(locks.RUNS / "gone.json", note)
         locks.begin([Path("results/two")])
         assert len(list(locks.RUNS.iterdir())) == 1 and not (locks.RUNS / "gone.json").exists()
         locks.end()

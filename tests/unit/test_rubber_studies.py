@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.campaign.provenance import inputs
-from springtune.jobs.keys import material_key
-from springtune.kinds import load_study
-from springtune.kinds.moduli.tables import decision
-from springtune.kinds.scenes import plan
-from springtune.kinds.scenes.figures import like_with_like
 from springtune.problem.materials import material_of
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.moduli.tables import decision
+from springtune.studies.kinds.scenes import plan
+from springtune.studies.kinds.scenes.figures import like_with_like
+from springtune.studies.runs.keys import material_key
+from springtune.studies.runs.provenance import inputs
 
 from campaigns import Campaign
 

@@ -11,14 +11,6 @@ import pytest
 import xarray as xr
 from scipy import stats
 
-from springtune.campaign.orphans import orphans
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds import kinds, load_study
-from springtune.kinds.samples import designs, interpolate, stage
-from springtune.kinds.samples.figures import plot_effects, plot_sobol
-from springtune.kinds.samples.indices import main_effect, sobol_indices
-from springtune.kinds.samples.names import DESIGNS, MOST_SOLVED, blocks
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
@@ -27,7 +19,16 @@ from springtune.reference.similarity import unit_scales
 from springtune.reference.small_strain import solve_unit
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
-from springtune.study.messages import StudyError
+from springtune.studies.config.kind import kinds
+from springtune.studies.config.messages import StudyError
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.samples import designs, interpolate, stage
+from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
+from springtune.studies.kinds.samples.indices import main_effect, sobol_indices
+from springtune.studies.kinds.samples.names import DESIGNS, MOST_SOLVED, blocks
+from springtune.studies.runs import store
+from springtune.studies.runs.orphans import orphans
+from springtune.studies.runs.task_costs import Spent
 
 from campaigns import Campaign
 

@@ -11,12 +11,12 @@ import pytest
 import xarray as xr
 
 from counting import counted
-from springtune.campaign import collect, due, page
-from springtune.campaign.plan import plan
-from springtune.jobs import store
-from springtune.kinds import load_study
-from springtune.kinds.scenes import plan as scenes
-from springtune.output.dataset import Filler
+from springtune.studies.kinds import collect, load_study
+from springtune.studies.kinds.scenes import plan as scenes
+from springtune.studies.output import page
+from springtune.studies.output.dataset import Filler
+from springtune.studies.runs import rerun, store
+from springtune.studies.runs.plan import plan
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -44,7 +44,7 @@ def study_of(tool, tmp_path, monkeypatch):
 def planned(config):
     study = load_study(config)
     made = plan(study, Path("results") / study.name, 1)
-    return study, made, due.jobs(study, made)
+    return study, made, rerun.jobs(study, made)
 
 
 def calls(function):

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.kinds.scenes.solve import solve
 from springtune.problem.loads import LOADS
 from springtune.reference.similarity import unit_problem, unit_scales
 from springtune.scene.sheet import Sheet
+from springtune.studies.kinds.scenes.solve import solve
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 
@@ -253,7 +253,7 @@ class TestNames:
             st.scenes  # noqa: B018
 
     def test_a_status_reads_as_in_a_dataset(self):
-        from springtune.output.dataset import STATUS
+        from springtune.studies.output.dataset import STATUS
 
         assert [str(flag) for flag in st.Status] == list(STATUS) and f"{st.Status.SOLVED}" == "solved"
         assert [int(flag) for flag in st.Status] == list(range(len(STATUS)))

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -12,20 +11,23 @@ import xarray as xr
 import yaml
 
 import springtune as st
-from springtune.campaign import collect, page, verify
-from springtune.campaign.plan import plan, table_files
-from springtune.campaign.workload import results_of
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study, outputs
-from springtune.kinds.shapes import stored
-from springtune.kinds.shapes.checks import READ_AT_ONCE
-from springtune.kinds.shapes.described import ONE_LOAD, geometry, load, named, shape_of
-from springtune.kinds.shapes.plan import mesh_key, reference_task, scene_task
-from springtune.kinds.shapes.reference import rounds_of
 from springtune.mesh import write_mesh
-from springtune.output.dataset import STATUS
-from springtune.output.export import export
+from springtune.registry import imported
+from springtune.studies.archive import verify
+from springtune.studies.config.kind import outputs
+from springtune.studies.kinds import collect, load_study
+from springtune.studies.kinds.shapes import stored
+from springtune.studies.kinds.shapes.checks import READ_AT_ONCE
+from springtune.studies.kinds.shapes.plan import mesh_key, reference_task, scene_task
+from springtune.studies.kinds.shapes.reference import rounds_of
+from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, load, named, shape_of
+from springtune.studies.output import page
+from springtune.studies.output.dataset import STATUS
+from springtune.studies.output.export import export
+from springtune.studies.runs import store
+from springtune.studies.runs.plan import plan, table_files
+from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.workload import results_of
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -77,7 +79,7 @@ def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     for job in plan(study, folder, 1).jobs.values():
         spent = Spent()
-        import_module(f"springtune.{job.stage.module}").run(job.content, spent)
+        imported(job.stage.module).run(job.content, spent)
         assert not spent.broken, spent.broken
     made, told = collect.run(study.path, folder, folder / "dataset.nc")
     with xr.open_datatree(made, engine="netcdf4") as tree:
@@ -400,13 +402,14 @@ def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path):
 
 def test_studies_of_beams_pay_nothing_for_shapes():
     program = (
-        "import sys; from springtune.kinds import load_study; load_study('config/paper.yaml');"
-        "print(*(name for name in sys.modules if name.startswith(('springtune.kinds.shapes', 'springtune.problem'))))"
+        "import sys; from springtune.studies.kinds import load_study; load_study('config/paper.yaml');"
+        "heavy = 'springtune.studies.kinds.shapes', 'springtune.problem';"
+        "print(*(name for name in sys.modules if name.startswith(heavy)))"
     )
     run = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
     found = set(run.stdout.split())
-    assert "springtune.kinds.shapes.kind" in found
-    heavy = {f"springtune.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
+    assert "springtune.studies.kinds.shapes.kind" in found
+    heavy = {f"springtune.studies.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
     assert not (heavy | {"springtune.problem.shapes", "springtune.problem.outlines"}) & found
 
 
@@ -469,7 +472,7 @@ def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(lo
 
     study = loaded(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
-    mesh, solve = (import_module(f"springtune.{jobs[name].stage.module}") for name in ("shape_mesh", "shape_solve"))
+    mesh, solve = (imported(jobs[name].stage.module) for name in ("shape_mesh", "shape_solve"))
     mesh.lose(jobs["shape_mesh"].content, "cook_free_16mm", "not done", "1 s")
     solve.run(jobs["shape_solve"].content, Limited())
     (path,) = (tmp_path / "results/study/shape_solutions").iterdir()

@@ -3,11 +3,11 @@
 import time
 from dataclasses import asdict
 
-from springtune.kinds.scenes.solve import solve
 from springtune.mesh import MESH_TYPES
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
+from springtune.studies.kinds.scenes.solve import solve
 
 STEEL = asdict(Material(210e9, 0.3, name="steel"))
 

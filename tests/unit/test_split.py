@@ -15,14 +15,15 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from springtune.campaign import sites
-from springtune.campaign.plan import plan
 from springtune.cli import main
-from springtune.jobs import atomic, records, sealed, store
-from springtune.kinds import load_study
-from springtune.kinds.division import dealt, part_of
-from springtune.study import StudyError
-from springtune.study.model import Part
+from springtune.safe_io import atomic
+from springtune.studies.archive import merge_parts
+from springtune.studies.config.messages import StudyError
+from springtune.studies.config.model import Part
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.division import dealt, part_of
+from springtune.studies.runs import checked_json, records, store
+from springtune.studies.runs.plan import plan
 
 from campaigns import Campaign
 
@@ -77,11 +78,11 @@ def check_division(study, count, by):
     assert sum(shares) == pytest.approx(1)
     # All that the study stores, and nothing else, under the same keys.
     asked = [
-        {key for job in plan(one, Path("nowhere"), 1).jobs.values() for key in sites.keys_of(job.content)}
+        {key for job in plan(one, Path("nowhere"), 1).jobs.values() for key in merge_parts.keys_of(job.content)}
         for one in (study, *parts)
     ]
     of_lists = {key for job in plan(study, Path("nowhere"), 1).jobs.values() if job.stage.name == "calibrate"
-                for key in sites.keys_of(job.content)}  # fmt: skip
+                for key in merge_parts.keys_of(job.content)}  # fmt: skip
     assert asked[0] - of_lists <= set().union(*asked[1:]) <= asked[0]
     return parts
 
@@ -301,14 +302,14 @@ def test_nothing_runs_before_the_dataset_where_the_study_has_run_before(there):
     for job in jobs:  # as a run leaves them
         atomic.write_text(folder / f"benchmarks/{job.stem}.tsv", "s\n1.0\n")
     here = [job for job in jobs if job.stem.startswith(("sensitivity", "reference"))]
-    known = {job: sealed.read(job) | {"work": {"of this machine": [1, 1.0, 1.0]}} for job in here}
+    known = {job: checked_json.read(job) | {"work": {"of this machine": [1, 1.0, 1.0]}} for job in here}
     for job in jobs:
         if job in known:
-            sealed.write(job, known[job])
+            checked_json.write(job, known[job])
         else:  # what it did here was something else
-            sealed.write(job, sealed.read(job) | {"digest": "another"})
+            checked_json.write(job, checked_json.read(job) | {"digest": "another"})
     assert run("merge", "config/many.yaml", *PARTS).exit_code == 0
-    assert {job: sealed.read(job) for job in here} == known
+    assert {job: checked_json.read(job) for job in here} == known
     assert {path.stem for path in folder.glob("benchmarks/*")} == {job.stem for job in here}
     command = [sys.executable, "-m", "snakemake", "-n", "--cores", "2", "--configfile", "config/many.yaml"]
     command += ["--snakefile", CONFIG.parent / "Snakefile", "--workflow-profile", "none"]
@@ -374,12 +375,12 @@ def test_damage_is_named_and_left_out(there):
 
 def test_other_software_is_named(there):
     for path in Path(PARTS[0]).glob("tasks/solve_*.json"):  # as another version would have asked for it
-        text = sealed.read(path)
+        text = checked_json.read(path)
         text["content"]["families"] = [
             family | {"scenes": [scene | {"key": scene["key"][::-1]} for scene in family["scenes"]]}
             for family in text["content"]["families"]
         ]
-        sealed.write(path, text)
+        checked_json.write(path, text)
     assert "to its end, where it was computed" in run("merge", "config/many.yaml", *PARTS).output
     with h5py.File(f"{PARTS[0]}/dataset.nc", "r+") as file:
         software = file.attrs["software"]
@@ -418,44 +419,44 @@ def test_a_scene_of_two_answers_is_refused(there):
 
 
 def test_packs_are_compared(there):
-    from springtune.campaign import packs
+    from springtune.studies.archive import object_storage
 
     folder = Path(PARTS[1])
     done = sorted(folder.glob("done/solve_*.json"))
-    packs.pack(folder, done, Path("one.tar"))
-    packs.pack(folder, done, Path("other.tar"))
+    object_storage.pack(folder, done, Path("one.tar"))
+    object_storage.pack(folder, done, Path("other.tar"))
     assert Path("one.tar").read_bytes() == Path("other.tar").read_bytes()
-    names = packs.unpack(Path("one.tar"), Path("out"))
+    names = object_storage.unpack(Path("one.tar"), Path("out"))
     assert names and all((Path("out") / name).read_bytes() == (folder / name).read_bytes() for name in names)
     whole = Path("one.tar").read_bytes()
     for size in (0, 100, len(whole) // 2):
         Path("half.tar").write_bytes(whole[:size])
-        with pytest.raises(packs.PackError, match="half.tar: is not whole.*publish it again"):
-            packs.unpack(Path("half.tar"), Path("out"))
+        with pytest.raises(object_storage.PackError, match="half.tar: is not whole.*publish it again"):
+            object_storage.unpack(Path("half.tar"), Path("out"))
     place = whole.index(store.MAGIC) + 1000
     Path("half.tar").write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-    with pytest.raises(packs.PackError, match="is not what was packed"):
-        packs.unpack(Path("half.tar"), Path("out"))
+    with pytest.raises(object_storage.PackError, match="is not what was packed"):
+        object_storage.unpack(Path("half.tar"), Path("out"))
     spoiled(stored_file())
-    with pytest.raises(packs.PackError, match="is not what its job made"):
-        packs.pack(folder, done, Path("third.tar"))
+    with pytest.raises(object_storage.PackError, match="is not what its job made"):
+        object_storage.pack(folder, done, Path("third.tar"))
     assert not Path("third.tar").exists() and records.checksum("one.tar") == records.checksum("other.tar")
 
 
 def test_fetched_results_are_adopted(there):
-    from springtune.campaign import packs
+    from springtune.studies.archive import object_storage
 
     assert run("merge", "config/many.yaml", *PARTS).exit_code == 0
     campaign, made = Campaign("config/many.yaml"), []
     for stage in dict.fromkeys(job.stage.name for job in campaign.plan.jobs.values()):
         made.append(Path(f"{stage}.tar"))
-        packs.pack(campaign.folder, sorted(campaign.folder.glob(f"done/{stage}_*.json")), made[-1])
-    assert len(sealed.read(campaign.folder / sites.ELSEWHERE)["files"]) == len([*campaign.folder.glob("*/*.h5")]) + len(
-        [*campaign.folder.glob("meshes/*")]
-    )
+        object_storage.pack(campaign.folder, sorted(campaign.folder.glob(f"done/{stage}_*.json")), made[-1])
+    assert len(checked_json.read(campaign.folder / merge_parts.ELSEWHERE)["files"]) == len(
+        [*campaign.folder.glob("*/*.h5")]
+    ) + len([*campaign.folder.glob("meshes/*")])
     campaign.folder.rename("results/before")
-    told = packs.fetch("config/many.yaml", made[:2])
+    told = object_storage.fetch("config/many.yaml", made[:2])
     assert "jobs are left for `springtune run config/many.yaml`" in told
-    assert "all that it asks for is here" in packs.fetch("config/many.yaml", made)
+    assert "all that it asks for is here" in object_storage.fetch("config/many.yaml", made)
     assert not set(Campaign("config/many.yaml").due()) & set(campaign.plan.jobs)
-    assert not Path("results/many", packs.UNPACKED).exists()
+    assert not Path("results/many", object_storage.UNPACKED).exists()

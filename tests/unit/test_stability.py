@@ -5,19 +5,19 @@ import re
 import numpy as np
 import pytest
 
-from springtune.jobs import dependencies as code
-from springtune.jobs import store
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
-from springtune.kinds.stability import experiments as stability
-from springtune.kinds.stability.names import AXES, EXPERIMENTS, ONCE
-from springtune.kinds.stability.stage import run
-from springtune.kinds.stability.variables import STABILITY
 from springtune.mechanics.integrators import BEHAVIOURS
-from springtune.output.dataset import DIMENSIONS
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
-from springtune.study import StudyError
+from springtune.studies.config.messages import StudyError
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.stability import experiments as stability
+from springtune.studies.kinds.stability.names import AXES, EXPERIMENTS, ONCE
+from springtune.studies.kinds.stability.stage import run
+from springtune.studies.kinds.stability.variables import STABILITY
+from springtune.studies.output.dataset import DIMENSIONS
+from springtune.studies.runs import dependencies as code
+from springtune.studies.runs import store
+from springtune.studies.runs.task_costs import Spent
 
 STUDY = """
 title: One experiment
@@ -105,6 +105,11 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
 
 def test_static_stages_know_no_dynamics():
     """A static scene assembles no masses: its stage does not even import them, and density is in none of its keys."""
-    for stage in ("kinds.scenes.solve", "kinds.scenes.sensitivity", "kinds.moduli.stage", "kinds.laying.stage"):
+    for stage in (
+        "studies.kinds.scenes.solve",
+        "studies.kinds.scenes.sensitivity",
+        "studies.kinds.moduli.stage",
+        "studies.kinds.laying.stage",
+    ):
         assert not any(file.endswith(("dynamics.py", "kernels.py")) for file in code.modules(stage))
-    assert any(file.endswith("dynamics.py") for file in code.modules("kinds.stability.stage"))
+    assert any(file.endswith("dynamics.py") for file in code.modules("studies.kinds.stability.stage"))

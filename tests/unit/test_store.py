@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from springtune.jobs import dependencies as code
-from springtune.jobs import store
-from springtune.jobs.hashing import hash_of
+from springtune.studies.runs import dependencies as code
+from springtune.studies.runs import store
+from springtune.studies.runs.hashing import hash_of
 
 
 def test_results_come_back_as_they_went(tmp_path):
@@ -69,18 +69,23 @@ def test_keys_are_those_that_results_were_stored_under():
 
 def test_stages_depend_on_what_they_import_and_on_nothing_else():
     solve, mesh = (
-        {path.rpartition("springtune/")[2] for path in code.modules(f"kinds.scenes.{stage}")}
+        {path.rpartition("springtune/")[2] for path in code.modules(f"studies.kinds.scenes.{stage}")}
         for stage in ("solve", "mesh")
     )
     assert {"mechanics/network.py", "mechanics/statics.py", "springs/lattice.py", "mesh/cells.py"} <= solve
     assert not {"mesh/free.py", "mesh/rows.py"} & solve  # these count with the meshes that they make
-    assert "jobs/store.py" in solve
-    for outside in ("output/style.py", "output/dataset.py", "study/__init__.py", "reference/small_strain.py"):
+    assert "studies/runs/store.py" in solve
+    for outside in (
+        "studies/output/style.py",
+        "studies/output/dataset.py",
+        "studies/config/load.py",
+        "reference/small_strain.py",
+    ):
         assert outside not in solve
     assert "problem/compare.py" not in solve
     assert "mechanics/statics.py" not in mesh
     # References know the mesh of a network by its type alone, so an edit of a mesh does not solve them again.
-    assert not any("springtune/mesh/" in path for path in code.modules("kinds.scenes.reference"))
+    assert not any("springtune/mesh/" in path for path in code.modules("studies.kinds.scenes.reference"))
     assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again
 
 
@@ -88,12 +93,12 @@ def test_definitions_belong_to_their_own_keys_and_to_no_stage():
     # An edit of one definition is to solve that definition's scenes again and no others.
     digests = {name: code.definition_closure(name).digest for name in ("angular", "delingette", "patch", "lattice")}
     assert len(set(digests.values())) == len(digests)
-    assert str(code.PACKAGE / "springs/angular.py") not in code.modules("kinds.scenes.solve")
+    assert str(code.PACKAGE / "springs/angular.py") not in code.modules("studies.kinds.scenes.solve")
 
 
 def test_physics_imports_no_workflow_dataset_or_plots():
     """A job of these pays for numpy, scipy.sparse, h5py and its own libraries only."""
-    stages = [f"springtune.kinds.scenes.{stage}" for stage in ("mesh", "sensitivity", "solve", "reference")]
+    stages = [f"springtune.studies.kinds.scenes.{stage}" for stage in ("mesh", "sensitivity", "solve", "reference")]
     program = f"import sys, {', '.join(stages)}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert not {"snakemake", "xarray", "matplotlib", "pandas", "pydantic", "pint"} & set(loaded)

@@ -11,12 +11,14 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from springtune.kinds import load_study, outputs
-from springtune.kinds.moduli.kind import Measurement
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.study import CurveSpec, MeshSpec, Reference, SceneSpec, StudyError
+from springtune.studies.config.kind import outputs
+from springtune.studies.config.messages import StudyError
+from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.moduli.kind import Measurement
 
 CONFIG = Path(__file__).parents[2] / "config"
 LATTICE = math.sqrt(3) / 2

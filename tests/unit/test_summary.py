@@ -17,14 +17,14 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 
 from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
-from springtune.campaign import due, plan, summary, workload
-from springtune.jobs import bundles, records, sealed
-from springtune.jobs.dependencies import CODE_FILE, Code
-from springtune.kinds import load_study
-from springtune.kinds.scenes.plan import by_mesh
-from springtune.kinds.scenes.variables import ROOT, SENSITIVITY
-from springtune.output.dataset import Filler
 from springtune.problem.status import Status
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes.plan import by_mesh
+from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
+from springtune.studies.output import summary
+from springtune.studies.output.dataset import Filler
+from springtune.studies.runs import bundles, checked_json, plan, records, rerun, workload
+from springtune.studies.runs.dependencies import CODE_FILE, Code
 
 AXES = {
     "beam": ("100x20", "80x10"),
@@ -148,21 +148,21 @@ def test_notes_that_are_another_ones_are_as_good_as_none(planned):
     folder = made.folder
     made.write()
     for path in (folder / plan.BUNDLES_FILE, folder.parent / plan.COSTS_FILE, folder.parent / CODE_FILE):
-        sealed.write(path, {"seconds": 0.25})
+        checked_json.write(path, {"seconds": 0.25})
     Code().recall(folder.parent / CODE_FILE)
     bundles.remember(folder.parent / plan.COSTS_FILE, [], {})
     again = plan.plan(study, folder, 2)
     assert again.jobs == made.jobs
-    found = due.jobs(study, again)
+    found = rerun.jobs(study, again)
     for name in names:  # what a job is to do has its digest, too
         found[name].record.parent.mkdir(exist_ok=True)
         found[name].record.write_bytes(made.tasks(name).read_bytes())
-        assert due.fault(found[name], found).endswith("is damaged")
-    sealed.write(found[due.COLLECT].record, {"seconds": 0.25})
-    assert due.fault(found[due.COLLECT], found).endswith("is damaged")
-    page = found[due.BROWSE]
+        assert rerun.fault(found[name], found).endswith("is damaged")
+    checked_json.write(found[rerun.COLLECT].record, {"seconds": 0.25})
+    assert rerun.fault(found[rerun.COLLECT], found).endswith("is damaged")
+    page = found[rerun.BROWSE]
     records.write(page.record, page.digest, page.products, read="")
-    assert not due.fault(page, found)
+    assert not rerun.fault(page, found)
 
 
 def test_planning_adds_no_mesh_to_those_that_have_curves(tmp_path):
@@ -182,14 +182,14 @@ def test_outputs_without_files_have_no_job(planned, tmp_path):
     (tmp_path / "none.yaml").write_text(STUDY.replace("[lattice, patch]}", "lattice, sensitivity: false}"))
     study = load_study(tmp_path / "none.yaml")
     assert "sensitivity" in study.outputs
-    found = due.jobs(study, plan.plan(study, tmp_path / "results/none", 1))
-    assert all(job.products for name, job in found.items() if name.startswith(due.PRESENT))
-    assert not any("sensitivity" in name for name in found if name.startswith(due.PRESENT))
+    found = rerun.jobs(study, plan.plan(study, tmp_path / "results/none", 1))
+    assert all(job.products for name, job in found.items() if name.startswith(rerun.PRESENT))
+    assert not any("sensitivity" in name for name in found if name.startswith(rerun.PRESENT))
 
 
 def test_what_a_run_made_again_is_not_nothing(planned):
     study, made, names = planned
-    found = due.jobs(study, made)
+    found = rerun.jobs(study, made)
 
     def do(name):
         job, work = found[name], {"linear": [0, 0.0, 0.0]}  # all of its tasks were stored before
@@ -204,8 +204,8 @@ def test_what_a_run_made_again_is_not_nothing(planned):
     time.sleep(0.05)  # clocks of files tick slowly
     since = time.time() - 0.02
     assert "new      nothing: all results were stored before\n" in summary.ending(study, made, since)
-    do(due.COLLECT)
-    do(due.BROWSE)
+    do(rerun.COLLECT)
+    do(rerun.BROWSE)
     line = "5 files made again by collect, browse; all that is computed was stored before\n"
     assert f"new      {line}" in summary.ending(study, made, since)
     assert summary.beside(study, made, since).startswith(f"new in two: {line}")

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import springtune as st
-from springtune.output.comparison import compare
+from springtune.studies.output.comparison import compare
 from test_diff import made, written
 
 FORCES = [1e3, 2e3]

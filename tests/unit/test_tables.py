@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.campaign import page as tables_page
-from springtune.kinds.benchmark import tables as benchmark
-from springtune.kinds.benchmark.variables import BENCHMARK
-from springtune.kinds.moduli import tables as definitions
-from springtune.kinds.moduli.variables import MODULI
-from springtune.kinds.scenes.variables import ROOT
-from springtune.kinds.stability import tables as stability
-from springtune.kinds.stability.variables import STABILITY
-from springtune.output.tables import decimals, number
 from springtune.problem.compare import assured
+from springtune.studies.kinds.benchmark import tables as benchmark
+from springtune.studies.kinds.benchmark.variables import BENCHMARK
+from springtune.studies.kinds.moduli import tables as definitions
+from springtune.studies.kinds.moduli.variables import MODULI
+from springtune.studies.kinds.scenes.variables import ROOT
+from springtune.studies.kinds.stability import tables as stability
+from springtune.studies.kinds.stability.variables import STABILITY
+from springtune.studies.output import page as tables_page
+from springtune.studies.output.tables import decimals, number
 
 
 def cells(line):

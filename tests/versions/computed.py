@@ -7,19 +7,19 @@ An output that ends in ``.nc`` is the study's dataset.
 import pickle
 import sys
 import tempfile
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import h5py
 
-from springtune.campaign.plan import plan
-from springtune.jobs import sealed, store
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
-from springtune.kinds.scenes import stored_mesh
-from springtune.kinds.scenes.solve import stored_key
-from springtune.kinds.scenes.stored_scene import fields_key, unpacked
+from springtune.registry import imported
+from springtune.studies.kinds import load_study
+from springtune.studies.kinds.scenes import stored_mesh
+from springtune.studies.kinds.scenes.solve import stored_key
+from springtune.studies.kinds.scenes.stored_scene import fields_key, unpacked
+from springtune.studies.runs import checked_json, store
+from springtune.studies.runs.plan import plan
+from springtune.studies.runs.task_costs import Spent
 
 PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "netgen-mesher", "pyamg", "scikit-fem", "h5py", "meshio")
 
@@ -46,12 +46,12 @@ def computed(study, folder):
     """Results by stage, place and name: numbers, texts and arrays; and the meshes' points."""
     found = {}
     for job in plan(study, folder, 1).jobs.values():
-        import_module(f"springtune.{job.stage.module}").run(job.content, Spent())
+        imported(job.stage.module).run(job.content, Spent())
         if job.stage.name == "mesh":
             for one in job.content["meshes"]:
                 found["mesh", one["name"], "points"] = stored_mesh.read(job.content["folder"], one["name"]).points
             continue
-        calibration = sealed.read(folder / "calibration.json")
+        calibration = checked_json.read(folder / "calibration.json")
         results = {key: one for path in job.products if path.endswith(".h5") for key, one in stored(path).items()}
         for place, key in enumerate(keys(job.content, calibration)):
             one = results[key] | unpacked(results.get(fields_key(key), {}))
@@ -69,12 +69,12 @@ def installed(name):
 
 def collected(study, output):
     """Write the dataset of a study, all stages in this process."""
-    from springtune.campaign import collect  # here: the oldest packages have no xarray
+    from springtune.studies.kinds import collect  # here: the oldest packages have no xarray
 
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder, 1).jobs.values():
-            import_module(f"springtune.{job.stage.module}").run(job.content, Spent())
+            imported(job.stage.module).run(job.content, Spent())
         collect.run(study, folder, output)
 
 

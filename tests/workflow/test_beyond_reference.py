@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.campaign import collect, page
-from springtune.jobs import store
+from springtune.studies.kinds import collect
+from springtune.studies.output import page
+from springtune.studies.runs import store
 
 from campaigns import Campaign
 

@@ -2,16 +2,16 @@
 
 import copy
 import random
-from importlib import import_module
 
 import h5py
 import pytest
 import xarray as xr
 
-from springtune.campaign.plan import plan
-from springtune.jobs import sealed, store
-from springtune.jobs.spent import Spent
-from springtune.kinds import load_study
+from springtune.registry import imported
+from springtune.studies.kinds import load_study
+from springtune.studies.runs import checked_json, store
+from springtune.studies.runs.plan import plan
+from springtune.studies.runs.task_costs import Spent
 
 STUDY = """
 title: Many scenes of few meshes
@@ -74,7 +74,7 @@ def stages(study, folder, cores=1):
 
 def compute(module, content):
     """Do a job."""
-    import_module(f"springtune.{module}").run(content, Spent())
+    imported(module).run(content, Spent())
 
 
 def keys(content):
@@ -119,7 +119,7 @@ def results(folder):
             for key in set(file) - {store.SCALARS}:
                 of_key = found[path.parent.name, path.stem, key]
                 of_key |= {name: (array.shape, array[()].tobytes()) for name, array in file[key].items()}
-    found["calibration"] = sealed.demand(folder / "calibration.json")
+    found["calibration"] = checked_json.demand(folder / "calibration.json")
     return found
 
 
@@ -182,7 +182,7 @@ def test_company_does_not_matter(study, usual, tmp_path):
 @pytest.mark.parametrize("cores", [8, pytest.param(2, marks=pytest.mark.slow)])
 def test_bundles_do_not_matter(study, usual, tmp_path, cores):
     folder = tmp_path / "results/many"
-    sealed.write(tmp_path / "results/costs.json", {"kinds": {"nonlinear": [1.0, 100.0]}, "start_up": 0.1})
+    checked_json.write(tmp_path / "results/costs.json", {"kinds": {"nonlinear": [1.0, 100.0]}, "start_up": 0.1})
     jobs = stages(study, folder, cores)
     assert len(jobs) > len(stages(study, tmp_path / "elsewhere", 1))
     for module, content in jobs:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from springtune.campaign import locks
-from springtune.jobs import commands
+from springtune.studies.runs import commands, locks
 
 STUDY = """
 title: Elsewhere

@@ -12,8 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 import springtune as st
-from springtune.browse.page import page
 from springtune.cli import main
+from springtune.studies.output.browse.page import page
 
 HOSTILE = (
     "`click <javascript:alert(1)>`__ <script>alert(1)</script> $x_{$ #panic('x') .. raw:: html *a* |b| \\ {{ 7*7 }} {x}"

@@ -18,10 +18,10 @@ from click.testing import CliRunner
 
 import springtune as st
 from cf import complaints
-from springtune.campaign.orphans import orphans
 from springtune.cli import main
-from springtune.kinds import load_study
-from springtune.output import dataset
+from springtune.studies.kinds import load_study
+from springtune.studies.output import dataset
+from springtune.studies.runs.orphans import orphans
 
 from campaigns import Campaign
 

@@ -45,14 +45,14 @@ def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_a_row_and_a_study
     """What CONTRIBUTING.md writes down, run by Snakemake: both have their group, their figures and their keys."""
     package, written = repository / "src/springtune", 0
     for place, recipe in RECIPES.items():
-        if place.startswith("kinds/"):
+        if place.startswith("studies/kinds/"):
             (package / place).parent.mkdir(exist_ok=True)
             (package / place).write_text(recipe)
             written += 1
     assert written == 7  # one module of a group, six of a kind
-    row = RECIPES["row of kinds/scenes/outputs.py"].partition("\n")[2]
-    add_row(package / "kinds/scenes/outputs.py", row, "OUTPUTS")
-    add_row(package / "kinds/__init__.py", ', "columns"', "KINDS")
+    row = RECIPES["row of studies/kinds/scenes/outputs.py"].partition("\n")[2]
+    add_row(package / "studies/kinds/scenes/outputs.py", row, "OUTPUTS")
+    add_row(package / "studies/config/kind.py", ', "columns"', "KINDS")
     study = re.search(r"^```yaml\n# config/columns.yaml\n(.*?)^```", CONTRIBUTING, re.DOTALL | re.MULTILINE)[1]
     (repository / "config/columns.yaml").write_text(study)
     command = ["-m", "snakemake", "--snakefile", "Snakefile", "--cores", "2", "--configfile", "config/columns.yaml"]

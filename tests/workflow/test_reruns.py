@@ -9,10 +9,10 @@ import xarray as xr
 from click.testing import CliRunner
 
 from springtune.cli import main
-from springtune.jobs import sealed
-from springtune.kinds import load_study
 from springtune.mesh import MESH_TYPES, Mesh
-from springtune.study import StudyError
+from springtune.studies.config.messages import StudyError
+from springtune.studies.kinds import load_study
+from springtune.studies.runs import checked_json
 
 from campaigns import Campaign
 
@@ -223,10 +223,12 @@ def test_more_cores_make_more_bundles_and_solve_nothing_again(run):
     costs = {"kinds": {"nonlinear": [1.0, 30.0]}, "start_up": 0.25}
 
     def solved_on(cores):
-        sealed.write(run.folder / "results/costs.json", costs)
+        checked_json.write(run.folder / "results/costs.json", costs)
         code, output = run.snakemake("spread.yaml", "--cores", cores, "--until", "solve")
         assert code == 0, output
-        assert sealed.read(run.folder / "results/costs.json") == costs  # `collect` alone writes what jobs measured
+        assert (
+            checked_json.read(run.folder / "results/costs.json") == costs
+        )  # `collect` alone writes what jobs measured
 
     solved_on("1")
     one, solved = run.times("results/spread/tasks/solve_*.json"), run.times("results/spread/solutions/*.h5")

@@ -15,8 +15,8 @@ import pytest
 import xarray as xr
 
 import springtune
-from springtune.jobs import sealed, store
-from springtune.jobs.processes import this_host
+from springtune.safe_io.processes import this_host
+from springtune.studies.runs import checked_json, store
 
 from campaigns import Campaign
 
@@ -87,7 +87,7 @@ def test_a_study_that_another_process_computes_is_left_to_it(finished):
     note = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
             "folders": ["results/survival"]}  # fmt: skip
     path = finished.folder / ".snakemake/springtune/of_a_test.json"
-    sealed.write(path, note)
+    checked_json.write(path, note)
     code, output = finished.snakemake("survival.yaml")
     path.unlink()
     assert code == 1 and "Traceback" not in output
@@ -170,7 +170,7 @@ def test_a_study_that_is_edited_during_its_run_makes_no_dataset_of_another_one(r
     told = [
         sys.executable,
         "-m",
-        "springtune.campaign.collect",
+        "springtune.studies.kinds.collect",
         "edited.yaml",
         "results/edited",
         "dataset.nc",

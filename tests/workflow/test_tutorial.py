@@ -7,7 +7,7 @@ import pytest
 from matplotlib import pyplot
 
 import springtune as st
-from springtune.kinds import load_study
+from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from pages import blocks, follow, patch, write_study

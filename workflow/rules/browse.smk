@@ -6,23 +6,23 @@ rule browse:
         "Writing the page to browse: index.html"
     input:
         dataset=rules.collect.output.dataset,
-        again=looked_at(JOBS, due.BROWSE),
+        again=looked_at(JOBS, rerun.BROWSE),
     output:
         page=report(
-            RESULTS / due.PAGE, caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}
+            RESULTS / rerun.PAGE, caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}
         ),
         done=JOBS["browse"].record,
     params:
         digest=JOBS["browse"].digest,
         # What the page links to; other jobs make it meanwhile.
-        files=due.linked(STUDY),
+        files=rerun.linked(STUDY),
     resources:
-        runtime=minutes(due.BROWSE),
-        mem_mb=megabytes(due.BROWSE),
+        runtime=minutes(rerun.BROWSE),
+        mem_mb=megabytes(rerun.BROWSE),
     log:
         RESULTS / "logs/browse.log",
     benchmark:
         RESULTS / "benchmarks/browse.tsv"
     shell:
-        "python -m springtune.campaign.browse {input.dataset:q} {output.page:q} {output.done:q}"
+        "python -m springtune.studies.output.browse.job {input.dataset:q} {output.page:q} {output.done:q}"
         " {params.digest:q} {params.files:q} > {log:q} 2>&1"

@@ -6,11 +6,11 @@ rule collect:
         "Comparing, and collecting the dataset"
     input:
         done=DONE,
-        again=looked_at(JOBS, due.COLLECT),
+        again=looked_at(JOBS, rerun.COLLECT),
     output:
-        dataset=RESULTS / due.DATASET,
+        dataset=RESULTS / rerun.DATASET,
         summary=report(
-            RESULTS / due.SUMMARY, caption="../report/summary.rst", category="summary", labels={"name": "summary"}
+            RESULTS / rerun.SUMMARY, caption="../report/summary.rst", category="summary", labels={"name": "summary"}
         ),
         done=JOBS["collect"].record,
     params:
@@ -18,14 +18,14 @@ rule collect:
         config=lambda wildcards: str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
-        untold=due.untold(RESULTS, UNTOLD),
+        untold=rerun.untold(RESULTS, UNTOLD),
     resources:
-        runtime=minutes(due.COLLECT),
-        mem_mb=megabytes(due.COLLECT),
+        runtime=minutes(rerun.COLLECT),
+        mem_mb=megabytes(rerun.COLLECT),
     log:
         RESULTS / "logs/collect.log",
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
     shell:
-        "python -m springtune.campaign.collect {params.config:q} {params.folder:q} {output.dataset:q}"
+        "python -m springtune.studies.kinds.collect {params.config:q} {params.folder:q} {output.dataset:q}"
         " {output.done:q} {params.digest:q} {params.untold:q} > {log:q} 2>&1"

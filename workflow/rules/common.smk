@@ -11,16 +11,16 @@ from snakemake.logging import logger
 from snakemake.settings.enums import Quietness
 from snakemake_logger_plugin_springtune import LogHandler
 
-from springtune.campaign import due, locks, workload
-from springtune.campaign.plan import plan, stages
-from springtune.escapes import rst
-from springtune.jobs import commands
-from springtune.jobs.atomic import remove_unfinished
-from springtune.jobs.dependencies import CODE_FILE, OURS
-from springtune.kinds import load_study
-from springtune.kinds.base import FORMATS
+from springtune.studies.runs import locks, rerun, workload
+from springtune.studies.runs.plan import plan, stages
+from springtune.safe_io.escapes import rst
+from springtune.studies.runs import commands
+from springtune.safe_io.atomic import remove_unfinished
+from springtune.studies.runs.dependencies import CODE_FILE, OURS
+from springtune.studies.kinds import load_study
+from springtune.studies.config.kind import FORMATS
 from springtune.problem.geometry import AssumptionWarning
-from springtune.study import StudyError
+from springtune.studies.config.messages import StudyError
 
 
 def loaded_study():
@@ -51,7 +51,7 @@ def lasting():
 def chosen_untold():
     """What the dataset is to leave empty or not, by ``--config no_host=true``; for studies that the paper reads, too."""
     chosen = {}
-    for option in due.BLANKED:
+    for option in rerun.BLANKED:
         variable = f"SPRINGTUNE_{option.upper()}"  # of `springtune run`: a --config would replace that of a profile
         value = str(config.get(option, os.environ.get(variable, ""))).lower()
         if value not in ("", "true", "false"):
@@ -71,7 +71,7 @@ ON_CLUSTER = workflow.resource_settings.nodes is not None
 # A cluster has room for all jobs: only how long one lasts says how many there are. A child plans as the run did.
 CORES = 1 if ON_CLUSTER or not workflow.is_main_process else workflow.resource_settings.cores or 1
 PLAN = plan(STUDY, RESULTS, CORES, lasting())
-JOBS = due.jobs(STUDY, PLAN, UNTOLD)
+JOBS = rerun.jobs(STUDY, PLAN, UNTOLD)
 # The one that is run; for the paper, those that it reads besides.
 READ = workflow.__dict__.setdefault("studies_read", [])
 READ.append((STUDY, PLAN))
@@ -91,7 +91,7 @@ def done(stage):
 def files(one):
     """Figures and tables of an output."""
     of_figures = one.figures(STUDY)
-    paths = [RESULTS / file for file in due.output_files(one, STUDY)]
+    paths = [RESULTS / file for file in rerun.output_files(one, STUDY)]
     chosen = [of_figures.get(path.stem, {}) if path.parent.name == "figures" else {} for path in paths]
     return [
         shown(one, path, selection) if path.parent.name == "tables" or path.suffix == f".{SHOWN}" else path
@@ -140,10 +140,10 @@ def looked_at(found, name):
     def look(wildcards):
         job = found[name.format(**dict(wildcards))]
         if workflow.is_main_process and str(job.record) not in workflow.dag.forcefiles:
-            why = due.fault(job, found)
+            why = rerun.fault(job, found)
             if why:
                 workflow.dag.forcefiles.add(str(job.record))
-            if due.is_damage(why):
+            if rerun.is_damage(why):
                 logger.warning(f"{why}; it is made again")
         return []
 
@@ -242,8 +242,8 @@ def tell_start():
 
 
 def tell_end(how):
-    """Say what became of the study, see `springtune.campaign.summary`; `--quiet all` alone keeps it back."""
-    from springtune.campaign import summary  # here: only a run needs it
+    """Say what became of the study, see `springtune.studies.output.summary`; `--quiet all` alone keeps it back."""
+    from springtune.studies.output import summary  # here: only a run needs it
 
     locks.end()
     text = getattr(summary, how)(*READ[0], BEGUN)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from springtune.jobs import commands
-from springtune.jobs.run_tasks import STATE, source_state
+from springtune.studies.runs import commands
+from springtune.studies.runs.run_tasks import STATE, source_state
 
 BEGUN = time.time()
 """When this run began [s since the epoch]: what is newer was made by it."""

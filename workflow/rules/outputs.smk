@@ -1,6 +1,6 @@
 """Figures and tables from the dataset, one rule a job of outputs: those that share it share what it reads."""
 
-MADE = due.output_jobs(STUDY)
+MADE = rerun.output_jobs(STUDY)
 REPORTED = {job: [path for one in made for path in files(one)] for job, made in MADE.items()}
 OUTPUTS = {job: list(JOBS[job].products) for job in MADE}  # plain: the report is to name the job's rule
 
@@ -29,5 +29,5 @@ for job, made in MADE.items():
         benchmark:
             RESULTS / f"benchmarks/{job}.tsv"
         shell:
-            "python -m springtune.campaign.present {input.dataset:q} {params.folder:q} {output.done:q} {params.digest:q}"
+            "python -m springtune.studies.output.present {input.dataset:q} {params.folder:q} {output.done:q} {params.digest:q}"
             " {params.outputs:q} > {log:q} 2>&1"

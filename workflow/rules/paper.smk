@@ -1,10 +1,10 @@
 """The paper: `snakemake paper` runs the studies that it reads, where they are missing or out of date, and sets it."""
 
-from springtune.publication import PaperError
-from springtune.publication.build import check_typst
+from springtune.studies.paper import PaperError
+from springtune.studies.paper.build import check_typst
 
 PAPER_SOURCE = Path(workflow.basedir, "workflow/paper")
-PAPER_DATASETS = [Path("results") / name / due.DATASET for name in due.PAPER_STUDIES]
+PAPER_DATASETS = [Path("results") / name / rerun.DATASET for name in rerun.PAPER_STUDIES]
 
 
 # Snakemake tells the targets after the Snakefile was read. Who wants neither the paper nor a job of a study that it reads
@@ -13,15 +13,15 @@ WORDS = sys.argv[1:]
 PAPER_WANTED = any(word == "paper" or Path(word).name == "paper.pdf" for word in WORDS)
 
 if PAPER_WANTED:
-    PAPER = due.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
+    PAPER = rerun.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
     try:  # now, and not when the studies are done
         check_typst()
     except PaperError as error:
         print(error, file=sys.stderr)
         sys.exit(1)
 
-if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in due.PAPER_STUDIES)) for word in WORDS):
-    for name in due.PAPER_STUDIES:
+if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_STUDIES)) for word in WORDS):
+    for name in rerun.PAPER_STUDIES:
         if name != STUDY.name:
             prefix = f"{name}_"
             beside = CONFIG.with_name(f"{name}.yaml")
@@ -41,7 +41,7 @@ rule paper:
         "Setting the paper from the datasets of its studies"
     input:
         datasets=PAPER_DATASETS,
-        again=looked_at({due.PAPER: PAPER}, due.PAPER) if PAPER_WANTED else [],
+        again=looked_at({rerun.PAPER: PAPER}, rerun.PAPER) if PAPER_WANTED else [],
     output:
         paper=report(
             "results/paper/paper.pdf", caption="../report/paper.rst", category="paper", labels={"name": "paper"}
@@ -53,12 +53,12 @@ rule paper:
         folder=lambda wildcards, output: str(Path(output.paper).with_suffix("")),
         digest=PAPER.digest if PAPER_WANTED else "none",
     resources:
-        runtime=minutes(due.PAPER),
-        mem_mb=megabytes(due.PAPER),
+        runtime=minutes(rerun.PAPER),
+        mem_mb=megabytes(rerun.PAPER),
     log:
         "results/paper/logs/paper.log",
     benchmark:
         "results/paper/benchmarks/paper.tsv"
     shell:
-        "python -m springtune.publication.build {params.source:q} {params.folder:q} {output.paper:q}"
+        "python -m springtune.studies.paper.build {params.source:q} {params.folder:q} {output.paper:q}"
         " {output.done:q} {params.digest:q} {input.datasets:q} > {log:q} 2>&1"

@@ -31,7 +31,7 @@ for stage in stages():
         benchmark:
             RESULTS / "benchmarks" / f"{stage.name}_{{bundle}}.tsv"
         shell:
-            "python -m springtune.jobs.run_tasks {params.tasks:q} {output:q} {params.digest:q} > {log:q} 2>&1"
+            "python -m springtune.studies.runs.run_tasks {params.tasks:q} {output:q} {params.digest:q} > {log:q} 2>&1"
 
 
 DONE = [path for stage in stages() for path in done(stage.name)]

@@ -5,7 +5,7 @@ What stages store is no output that Snakemake knows of, so a stage is one pack; 
 
 from importlib.util import find_spec
 
-from springtune.campaign.packs import ENDING
+from springtune.studies.archive.object_storage import ENDING
 
 PLUGIN = "snakemake_storage_plugin_s3"
 STORAGE = str(config.get("storage", "")).rstrip("/")
@@ -31,7 +31,7 @@ def stored(name):
 
 
 PACKED = [stage.name for stage in stages() if done(stage.name)]
-SHOWN_FILES = [file for job in JOBS.values() if job.reads or job.name == due.COLLECT for file in job.products]
+SHOWN_FILES = [file for job in JOBS.values() if job.reads or job.name == rerun.COLLECT for file in job.products]
 
 
 if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets are not known yet
@@ -59,7 +59,7 @@ if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets
         benchmark:
             RESULTS / "benchmarks/fetch.tsv"
         shell:
-            "python -m springtune.campaign.packs fetch {params.config:q} {input:q}"
+            "python -m springtune.studies.archive.object_storage fetch {params.config:q} {input:q}"
 
 else:
 
@@ -89,7 +89,7 @@ else:
             benchmark:
                 RESULTS / f"benchmarks/pack_{stage}.tsv"
             shell:
-                "python -m springtune.campaign.packs pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
+                "python -m springtune.studies.archive.object_storage pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
 
     rule upload:
         message:
@@ -103,4 +103,4 @@ else:
         benchmark:
             RESULTS / "benchmarks/upload.tsv"
         shell:
-            "python -m springtune.campaign.packs copy {output:q} {input:q} > {log:q} 2>&1"
+            "python -m springtune.studies.archive.object_storage copy {output:q} {input:q} > {log:q} 2>&1"

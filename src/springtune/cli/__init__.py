@@ -5,14 +5,14 @@ import os
 import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
-from importlib import import_module
 from itertools import groupby
 from typing import Any, NamedTuple, TextIO
 
 import click
 
 from .. import __version__
-from ..escapes import UNSEEN, shown
+from ..registry import imported
+from ..safe_io.escapes import UNSEEN, shown
 from .examples import examples
 
 
@@ -120,7 +120,7 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         row = COMMANDS[cmd_name]
-        found: click.Command = getattr(import_module(f"{__name__}.{row.module}"), row.function)
+        found: click.Command = imported(f"cli.{row.module}:{row.function}")
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..escapes import shown
+from ..safe_io.escapes import shown
 from .diff import DIFFERENT, Trouble, comparison_text, opened, tolerance
 from .examples import examples
 from .folders import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
@@ -79,7 +79,7 @@ def accept(
 def _accept(
     path: Path, target: Path | None, names: list[str], relative: float | None, absolute: float | None, unsolved: bool
 ) -> None:
-    from ..output import comparison, expected, reading
+    from ..studies.output import comparison, expected, reading
 
     with opened(path) as tree, reading.guarded(path):
         if expected.ACCEPTED in tree.attrs:
@@ -118,7 +118,7 @@ def _usual_target(study: str) -> Path:
 
 def _names(tree: "xr.DataTree") -> list[str]:
     """Names of the variables of expected values."""
-    from ..output.comparison import OF_CELLS, variable_name
+    from ..studies.output.comparison import OF_CELLS, variable_name
 
     nodes = [(node.path, str(name)) for node in tree.subtree for name in node.data_vars]
     return [variable_name(path, name) for path, name in nodes if name != OF_CELLS]
@@ -126,7 +126,7 @@ def _names(tree: "xr.DataTree") -> list[str]:
 
 def _count(tree: "xr.DataTree") -> str:
     """How many scenes and other cells."""
-    from ..output.expected import cells
+    from ..studies.output.expected import cells
 
     counts = cells(tree).items()
     return ", ".join(f"{count} scenes" if path == "/" else f"{count} of {path}" for path, count in counts)
@@ -144,7 +144,7 @@ def _tell_unsolved(holes: list[tuple[str, str, str, str]]) -> None:
 
 def _check(results: str | None, target: Path | None, every: bool) -> None:
     """Compare, and exit as diff does."""
-    from ..output import comparison, expected, reading
+    from ..studies.output import comparison, expected, reading
 
     try:
         if results is None:

@@ -9,7 +9,7 @@ from .examples import examples
 from .folders import studies
 
 if TYPE_CHECKING:
-    from ..campaign.contents import Contents
+    from ..studies.archive.contents import Contents
 
 
 @click.command(
@@ -40,7 +40,7 @@ def archive(
     same study makes the same file, bit by bit. A study that is not finished, or whose files are not as they were made,
     is refused.
     """
-    from ..study import StudyError
+    from ..studies.config.messages import StudyError
 
     try:
         [(found, folder)] = studies(study)
@@ -52,9 +52,9 @@ def archive(
         raise click.ClickException(
             "the library rocrate is missing; install the extra: pip install 'springtune[archive]'"
         ) from None
-    from ..campaign.archive import write
-    from ..campaign.contents import ArchiveError, stored_size
-    from ..campaign.crate import CitationError
+    from ..studies.archive.archive import write
+    from ..studies.archive.contents import ArchiveError, stored_size
+    from ..studies.archive.crate import CitationError
 
     target = out or folder.with_name(f"{folder.name}.crate.zip")
     if target.is_dir() or target.suffix != ".zip":
@@ -78,7 +78,7 @@ def archive(
 
 def _tell(found: "Contents") -> None:
     """Say what is packed, and what somebody should know who computes it again."""
-    from ..campaign.contents import DIFF, FOLDERS
+    from ..studies.archive.contents import DIFF, FOLDERS
 
     click.echo(f"{found.folder}: packing {len(found.files)} files, {_size(found.size)}")
     code = found.code

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..escapes import shown
-from ..output.text import aligned
+from ..safe_io.escapes import shown
+from ..studies.output.text import aligned
 
 if TYPE_CHECKING:
-    from ..campaign.reproduction import Checked, Reproduced
+    from ..studies.archive.reproduction import Checked, Reproduced
 
 TOLD = 20
 """Most files that are told with a fault."""
@@ -32,7 +32,7 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
     bool
         Whether it is as it was packed, and came out the same.
     """
-    from ..campaign.reproduction import ReproductionError, check, reproduce
+    from ..studies.archive.reproduction import ReproductionError, check, reproduce
 
     try:
         found = check(path)
@@ -73,7 +73,7 @@ def _compared(made: "Reproduced") -> bool:
     """Tell of two datasets; whether they are the same, as far as they can be."""
     for name, (before, after) in made.others.items():
         click.echo(shown(f"  {name}: {before} in the archive, {after} here"))
-    from ..output.comparison import RELATIVE
+    from ..studies.output.comparison import RELATIVE
 
     if made.ended_otherwise:
         click.echo(

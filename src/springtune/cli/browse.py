@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from ..escapes import shown
+from ..safe_io.escapes import shown
 from .examples import examples
 
 
@@ -22,8 +22,8 @@ def browse(dataset: Path, port: int, no_open: bool) -> None:
 
     DATASET is results/<study>/dataset.nc, or its folder. The address holds a token, anew each time.
     """
-    from ..browse.server import Server  # here, so that --help does not wait for it
-    from ..output.reading import check_opens
+    from ..studies.output.browse.server import Server  # here, so that --help does not wait for it
+    from ..studies.output.reading import check_opens
 
     try:
         check_opens(dataset)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from ..output.text import bytes_text
+from ..studies.output.text import bytes_text
 from .examples import examples
 from .folders import idle, studies
 
@@ -23,8 +23,8 @@ def clean(study: Path | None, remove: bool) -> None:
     were taken out, their meshes and stored results, files of jobs that are no more, and what a run that was stopped
     left unfinished. Results that an edit of the code made stale are among them.
     """
-    from ..campaign.orphans import orphans
-    from ..study import StudyError
+    from ..studies.config.messages import StudyError
+    from ..studies.runs.orphans import orphans
 
     try:
         chosen = list(studies(study))

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..escapes import shown
-from ..output.text import aligned, cell_text, paragraphs
+from ..safe_io.escapes import shown
+from ..studies.output.text import aligned, cell_text, paragraphs
 from .examples import examples
 from .folders import dataset_path
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..output.comparison import Change, Comparison, GroupChanges
+    from ..studies.output.comparison import Change, Comparison, GroupChanges
 
 ROWS = 20
 """Rows of a table that are shown."""
@@ -97,7 +97,7 @@ def diff(
 
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
-    from ..output import comparison, expected, reading
+    from ..studies.output import comparison, expected, reading
 
     try:
         paths = [dataset_path(before), dataset_path(after)]
@@ -143,7 +143,7 @@ def opened(path: Path) -> "Iterator[xr.DataTree]":
     ValueError
         If it is neither.
     """
-    from ..output import expected, reading
+    from ..studies.output import expected, reading
 
     if path.suffix == ".yaml":
         yield expected.read(path)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ..escapes import shown
+from ..safe_io.escapes import shown
 from .examples import examples
 from .options import WrongCall
 
@@ -38,9 +38,9 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
 
     PATH is results/<study>, or its dataset.nc.
     """
-    from ..output import reading
-    from ..output.export import RequestError, selected
-    from ..output.export import export as write
+    from ..studies.output import reading
+    from ..studies.output.export import RequestError, selected
+    from ..studies.output.export import export as write
 
     names = [name.strip() for name in variables.split(",") if name.strip()]
     try:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from ..study import Study
+    from ..studies.config.model import Study
 
 RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
 
@@ -32,8 +32,8 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
     click.ClickException
         If there is no such folder, or no study of its name.
     """
-    from ..campaign.locks import LockedError, check_claim, claimed
-    from ..kinds import load_study
+    from ..studies.kinds import load_study
+    from ..studies.runs.locks import LockedError, check_claim, claimed
 
     if given is not None and not given.is_dir():
         study = load_study(given)
@@ -72,7 +72,7 @@ def idle(folder: Path) -> None:
     click.ClickException
         If a process computes it.
     """
-    from ..campaign.locks import LockedError, is_held
+    from ..studies.runs.locks import LockedError, is_held
 
     try:
         is_held(folder)
@@ -98,11 +98,11 @@ def dataset_path(given: str) -> Path:
     ValueError
         If there is none, or it is of another study of that name.
     """
-    from ..campaign.locks import check_claim
+    from ..studies.runs.locks import check_claim
 
     path = Path(given)
     if path.suffix in (".yaml", ".yml"):
-        from ..output.expected import is_expected
+        from ..studies.output.expected import is_expected
 
         if is_expected(path):
             return path

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from ..escapes import shown
-from ..output.text import aligned, bytes_text, label_text, paragraphs, without_numbers
 from ..problem.status import Status
+from ..safe_io.escapes import shown
+from ..studies.output.text import aligned, bytes_text, label_text, paragraphs, without_numbers
 from .examples import examples
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def info(path: Path) -> None:
 
     PATH is results/<study>, or its dataset.nc.
     """
-    from ..output import reading
+    from ..studies.output import reading
 
     try:
         reading.check_opens(path)

@@ -25,10 +25,10 @@ def merge(config: Path, results: tuple[Path, ...], incomplete: bool) -> None:
     code, packages and Python; nothing is written before all fits. `st.merge` in Python joins datasets of different
     studies.
     """
-    from ..campaign.locks import LockedError
-    from ..campaign.sites import MergeError, merge_sites, told  # here, so that --help does not wait for it
-    from ..kinds import load_study
-    from ..study import StudyError
+    from ..studies.archive.merge_parts import MergeError, merge_sites, told  # here, so that --help does not wait for it
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study
+    from ..studies.runs.locks import LockedError
 
     try:
         merged = merge_sites(load_study(config), results, incomplete)

@@ -86,7 +86,7 @@ def new(study: str, shape: bool) -> None:
     STUDY is its name, or the path of its file. A name alone becomes config/<name>.yaml in a checkout, and <name>.yaml
     elsewhere. What is there already is never overwritten.
     """
-    from ..jobs.atomic import write_text
+    from ..safe_io.atomic import write_text
 
     path = _path(study)
     if not NAME.fullmatch(path.stem):

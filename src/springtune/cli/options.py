@@ -69,12 +69,9 @@ MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 
 def asked_quantity(option: str, text: str, kind: str) -> float:
     """Quantity above zero of an option, in SI units; ValueError names the option."""
-    from ..units import UnitError, parse
+    from ..problem.quantities import quantity
 
-    try:
-        number = parse(text, kind)
-    except UnitError as error:
-        raise ValueError(f"{option}: {error}") from None
+    number = quantity(text, kind, option)
     if not number > 0:
         raise ValueError(f"{option}: '{text}' is not above zero; give a size above zero")
     return number

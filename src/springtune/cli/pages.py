@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..jobs.atomic import write_text
+from ..safe_io.atomic import write_text
 from .examples import examples
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.option("--page", default="docs/which-definition.md", show_default=True, type=click.Path(path_type=Path))
 def which(dataset: Path, write: bool, page: Path) -> None:
     """Compare definitions from a dataset: which one to use, what each attains."""
-    from ..kinds.moduli.tables import decision
+    from ..studies.kinds.moduli.tables import decision
 
     _tables("which", decision, "moduli", dataset, page if write else None)
 
@@ -40,7 +40,7 @@ def which(dataset: Path, write: bool, page: Path) -> None:
 @click.option("--page", default="docs/stability.md", show_default=True, type=click.Path(path_type=Path))
 def stability(dataset: Path, write: bool, page: Path) -> None:
     """Show the experiments on stability of a dataset: steps, damping, and what is not to be trusted."""
-    from ..kinds.stability.tables import page as tables
+    from ..studies.kinds.stability.tables import page as tables
 
     _tables("stability", tables, "stability", dataset, page if write else None)
 
@@ -60,8 +60,8 @@ def bench(dataset: Path, compare: Path | None, write: bool, page: Path) -> None:
 
     Compared, it exits with 1 where something is slower than the scatter of its seconds explains.
     """
-    from ..kinds.benchmark.tables import comparison
-    from ..kinds.benchmark.tables import page as tables
+    from ..studies.kinds.benchmark.tables import comparison
+    from ..studies.kinds.benchmark.tables import page as tables
 
     if compare is None:
         _tables("bench", tables, "benchmark", dataset, page if write else None)
@@ -74,7 +74,7 @@ def bench(dataset: Path, compare: Path | None, write: bool, page: Path) -> None:
 
 def _loaded(path: Path, group: str) -> "xr.DataTree":
     """Dataset that has a group, in memory; what is wrong with it is told with the study to run."""
-    from ..output import reading
+    from ..studies.output import reading
 
     study = {"moduli": "definitions"}.get(group, group)
     remedy = f"run config/{study}.yaml"

@@ -44,7 +44,7 @@ def prediction_text(
     -------
     str
     """
-    from ..output.text import aligned
+    from ..studies.output.text import aligned
 
     loads = list(known)
     rows = [["definition", "springs inside", "on the outline", *loads, "E", "nu", "besides springs"]]
@@ -104,7 +104,7 @@ def shape_text(
     -------
     str
     """
-    from ..output.text import aligned
+    from ..studies.output.text import aligned
 
     quantities, load = list(known), statement.load
     rows = [["definition", "springs inside", "on the outline", *quantities, "besides springs"]]
@@ -190,7 +190,7 @@ def _made_of(statement: "ShapeStatement") -> str:
 
 
 def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", springs_alone: bool, steps: bool) -> str:
-    from ..output.text import aligned
+    from ..studies.output.text import aligned
 
     wanted = f"{100 * search.error:.6g} %"
     answers = [("with springs alone", search.best_springs)]

@@ -58,9 +58,9 @@ def run(
     below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
     the study is wrong or a job failed, and with 2 when it was called in a wrong way.
     """
-    from ..kinds import load_study  # here, so that --help does not wait for it
     from ..problem.geometry import AssumptionWarning
-    from ..study import StudyError
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study  # here, so that --help does not wait for it
 
     allow(most)
     named = bool(arguments) and not arguments[0].startswith("-")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..jobs.atomic import write_text
+from ..safe_io.atomic import write_text
 from .examples import examples
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def schema(write: bool, folder: Path) -> None:
 
 def schema_text() -> str:
     """JSON schema of studies, as the file holds it."""
-    from ..kinds import kinds
-    from ..study import json_schema, study_model
+    from ..studies.config.kind import kinds
+    from ..studies.config.sections import json_schema, study_model
 
     return json.dumps(json_schema(study_model(kinds())), indent=2) + "\n"
 
@@ -78,8 +78,8 @@ def manual_text(frame: str) -> str:
 
 
 def _key_tables() -> str:
-    from ..kinds import kinds
-    from ..study import sections, study_model
+    from ..studies.config.kind import kinds
+    from ..studies.config.sections import sections, study_model
 
     parts: list[str] = []
     for place, model in sections(study_model(kinds())).items():
@@ -92,7 +92,7 @@ def _key_tables() -> str:
 
 
 def _key_row(key: str, field: "FieldInfo") -> str:
-    from ..study import expected_value
+    from ..studies.config.sections import expected_value
 
     default = "required" if field.is_required() else f"`{field.default}`" if isinstance(field.default, str) else "none"
     if field.default_factory is not None:

@@ -12,11 +12,11 @@ from click.core import ParameterSource
 from .options import asked_quantity
 
 if TYPE_CHECKING:
-    from ..kinds.shapes.expand import Shapes
     from ..mesh.groups import GroupedMesh
     from ..problem.materials import AnyMaterial
     from ..problem.shapes import Shape
-    from ..study import Study
+    from ..studies.config.model import Study
+    from ..studies.kinds.shapes.expand import Shapes
 
 NAMED_SHAPE = "config/shapes.yaml:cook"
 """How a shape is named, for messages."""
@@ -178,8 +178,8 @@ def asked_shape(
 
 def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
     """Study, what it has of shapes, and the shape."""
-    from ..kinds import load_study
     from ..problem.quantities import nearest
+    from ..studies.kinds import load_study
 
     path, colon, name = (text, "", "") if Path(text).is_file() else text.rpartition(":")
     if not Path(path).is_file():

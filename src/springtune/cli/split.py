@@ -4,16 +4,16 @@ from pathlib import Path
 
 import click
 
-from ..output.text import aligned
+from ..studies.output.text import aligned
 from .completion import studies_here
 from .examples import examples
 from .many import allow, max_scenes
 
 BY = ("mesh", "grid")
-"""What may stay together: as `springtune.study.config.DEALT_BY`, which help does not wait for."""
+"""What may stay together: as `springtune.studies.config.sections.DEALT_BY`, which help does not wait for."""
 
 MOST_PARTS = 1000
-"""As `springtune.study.config.MOST_PARTS`."""
+"""As `springtune.studies.config.sections.MOST_PARTS`."""
 
 
 @click.command(
@@ -41,9 +41,9 @@ def split(config: Path, count: int, by: str, out: Path | None, most: int | None)
     are about equal in what they are expected to cost; a section such as `laying` is in one of them.
     """
     allow(most)
-    from ..campaign.parts import told, write_parts  # here, so that --help does not wait for it
-    from ..kinds import load_study
-    from ..study import StudyError
+    from ..studies.archive.parts import told, write_parts  # here, so that --help does not wait for it
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study
 
     try:
         study = load_study(config)

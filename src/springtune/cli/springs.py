@@ -36,7 +36,7 @@ OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco
 
 def known_definitions(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
     """Definitions whose names begin so, for a shell to complete."""
-    from ..springs import DEFINITIONS
+    from .. import DEFINITIONS
 
     return [name for name in DEFINITIONS if name.startswith(begun)]
 
@@ -146,7 +146,7 @@ def _net(
     force: str | None,
 ) -> "SpringNet":
     from ..handover.net import SpringNet
-    from ..linalg.factors import SingularError
+    from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
     if (load is None) != (force is None):
@@ -184,7 +184,7 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
         If the load moves a support, or an argument is wrong; the message names the option.
     """
     from ..handover.net import SpringNet
-    from ..linalg.factors import SingularError
+    from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
     if any(one.x or one.y for one in asked.shape.loads[asked.load].supports):

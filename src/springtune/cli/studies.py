@@ -24,9 +24,10 @@ def scenes(config: Path, most: int | None) -> None:
     of each.
     """
     allow(most)
-    from ..kinds import kinds, load_study  # here, so that --help does not wait for it
-    from ..kinds.scenes.summary import summary
-    from ..study import StudyError
+    from ..studies.config.kind import kinds
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study  # here, so that --help does not wait for it
+    from ..studies.kinds.scenes.summary import summary
 
     try:
         study = load_study(config)
@@ -44,7 +45,7 @@ def scenes(config: Path, most: int | None) -> None:
 )
 def definitions() -> None:
     """List the definitions of spring stiffness."""
-    from ..output.text import aligned
-    from ..springs import DEFINITIONS
+    from .. import DEFINITIONS
+    from ..studies.output.text import aligned
 
     click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))

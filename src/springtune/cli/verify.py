@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from ..escapes import shown
-from ..output.text import aligned
+from ..safe_io.escapes import shown
+from ..studies.output.text import aligned
 from .examples import examples
 from .folders import idle, studies
 
 if TYPE_CHECKING:
-    from ..study import Study
+    from ..studies.config.model import Study
 
 
 @click.command(
@@ -50,7 +50,7 @@ def verify(
     that has the packages of its lock file and in a new one otherwise; the datasets are compared bit by bit, apart from
     times. That runs what somebody packed: do it with archives whose origin you trust.
     """
-    from ..study import StudyError
+    from ..studies.config.messages import StudyError
 
     if study is not None and study.suffix == ".zip":
         from .archived import verified
@@ -82,8 +82,8 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
     place = folder.parent.parent
     if place.resolve() != Path.cwd():
         raise click.ClickException(f"{folder}: files are named from where the study was run; call it there: cd {place}")
-    from ..campaign import verify
-    from ..study import StudyError
+    from ..studies.archive import verify
+    from ..studies.config.messages import StudyError
 
     found = verify.files(study, folder)
     click.echo(f"{folder}: {found.compared} files compared with their checksums, faults: {len(found.faults)}")

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..inputs import DataElsewhere, check_alone
-from ..jobs.atomic import check_folder, replacing, write_text
 from ..mesh.formats import LONGEST_SAID
+from ..safe_io.atomic import check_folder, replacing, write_text
+from ..safe_io.inputs import DataElsewhere, check_alone
 from .mujoco import mjcf
 from .paraview import comment_of, write_vtu
 from .simulation import Net

@@ -555,8 +555,8 @@ def _steady(load: str) -> str:
 def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
     """Error of each quantity of a load case, linear kinematics against the reference of small strain; or why none."""
     # Here, since finite elements take half a second to import.
+    from ..prediction import ReferenceNotConvergedError
     from ..prediction.choices import SOLVED, shape_references
-    from ..reference.small_strain import ReferenceNotConvergedError
 
     names, count = [one.name for one in scene.case.quantities], len(scene.mesh.points)
     if count > SOLVED:

@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr, unescape
 
 import numpy as np
 
-from ..jobs.atomic import UNFINISHED, replacing
+from ..safe_io.atomic import UNFINISHED, replacing
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
 """meshio's names of cells by their corners."""

@@ -9,11 +9,10 @@ import numpy as np
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..linalg.factors import SingularError
 from ..mechanics.dynamics import Motion
 from ..mechanics.energies import BiquadraticEnergy
 from ..mechanics.network import Network
-from ..mechanics.statics import StaticProblem
+from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..problem.status import Status
 from .terms import Terms

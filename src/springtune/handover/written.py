@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..jobs.atomic import check_folder
 from ..mechanics.dynamics import Motion, Run
 from ..mechanics.integrators import BackwardEuler
-from ..reference.small_strain import ReferenceNotConvergedError
+from ..prediction import ReferenceNotConvergedError
+from ..safe_io.atomic import check_folder
 from ..scene.single import Result, Scene
 from ..springs import Springs
 from .formats import check_target, write_vtu_with

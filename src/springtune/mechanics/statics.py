@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..linalg.factors import Factor, SingularError
+from ..linalg.factors import Factor
+from ..linalg.factors import SingularError as SingularError
 from ..problem.status import Status
 from .continuation import continued
 from .expansion import Expansion

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
+from ..safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
 from .box import box_fault, on_sides
 from .cells import Mesh, MeshError, no_cells, signed_areas
 from .groups import GroupedMesh

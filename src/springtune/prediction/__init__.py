@@ -4,6 +4,7 @@
 finds the coarsest mesh that keeps an error.
 """
 
+from ..reference.small_strain import ReferenceNotConvergedError
 from .bands import extrapolate
 from .choices import (
     CASES,
@@ -32,6 +33,7 @@ __all__ = [
     "MeshSearch",
     "Number",
     "QuantityReference",
+    "ReferenceNotConvergedError",
     "References",
     "ShapeReferences",
     "SolvedMesh",

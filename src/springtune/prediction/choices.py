@@ -11,9 +11,9 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from ..linalg.factors import SingularError
 from ..mechanics.energies import AreaEnergy
 from ..mechanics.moduli import PatchTest
+from ..mechanics.statics import SingularError
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import quantity_errors

@@ -26,14 +26,13 @@ from ..mesh.outlines import mesh_shape
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import nearest
+from ..problem.quantities import nearest, quantity
 from ..problem.shapes import Shape
 from ..scene.meshes import A_MATERIAL, A_SHAPE, check_filled, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet
 from ..scene.statements import ShapeStatement
 from ..springs import Springs
-from ..units import parse
 from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
@@ -496,7 +495,9 @@ class _Search(ABC):
         exact *= 1e3
         digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
         # By its text, as the option of a command has it; what is a hair above a digit is that digit.
-        return min(side, parse(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm", "length"))
+        return min(
+            side, quantity(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm", "length", "size")
+        )
 
     def solved(self) -> list[SolvedMesh]:
         """All that was tried, from coarse to fine."""

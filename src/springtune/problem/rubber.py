@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..inputs import LARGEST_CSV, read
+from ..safe_io.inputs import LARGEST_CSV, read
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
 from .quantities import positive
 

@@ -152,7 +152,7 @@ def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
     Parameters
     ----------
     result : dict
-        A stored reference of small strain, for 1 N, see `springtune.kinds.scenes.any_reference.read`.
+        A stored reference of small strain, for 1 N, see `springtune.studies.kinds.scenes.any_reference.read`.
     force : float
         Force on the network [N].
     kinematics : str

@@ -11,6 +11,7 @@ from ..mesh import Mesh
 from ..problem.compare import Best, best_stiffness, deformation_error
 from ..problem.loads import LoadKind
 from ..problem.status import Status
+from ..registry import hook
 from ..springs import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .sheet import Sheet
@@ -166,9 +167,7 @@ class Curve:
         >>> axes.get_title(loc="left"), axes.get_ylabel()
         ('200x30 mm, traction of 300000 N', 'Deformation error [%]')
         """
-        from .drawing import drawer
-
-        return drawer().draw_curve(ax, self)
+        return hook("drawing").draw_curve(ax, self)
 
 
 def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Curve:

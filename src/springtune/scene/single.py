@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..linalg.factors import SingularError
 from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
-from ..mechanics.statics import StaticProblem
+from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import quantity_errors
@@ -23,6 +22,7 @@ from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from ..problem.status import Status
+from ..registry import hook
 from ..springs import Springs
 from .meshes import is_a
 from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
@@ -515,9 +515,7 @@ class Scene:
         >>> run.status, len(list(Path("swing").iterdir()))
         ('moving', 21)
         """
-        from .writing import writer
-
-        found: Run = writer().write_motion(path, self, motion, integrator, step, steps, frames, **options)
+        found: Run = hook("writing").write_motion(path, self, motion, integrator, step, steps, frames, **options)
         return found
 
     def buckling_load(self) -> float:
@@ -601,9 +599,7 @@ class SceneSprings(Springs):
         ValueError
             If the name has another ending, or its folder is not there.
         """
-        from .writing import writer
-
-        written: list[Path] = writer().write_springs(path, self.scene, self, **options)
+        written: list[Path] = hook("writing").write_springs(path, self.scene, self, **options)
         return written
 
 
@@ -760,9 +756,7 @@ class Result:
         >>> result.write("traction.vtu")[0].name, len(result.write("traction.pvd", steps=4))
         ('traction.vtu', 6)
         """
-        from .writing import writer
-
-        written: list[Path] = writer().write_result(path, self, steps)
+        written: list[Path] = hook("writing").write_result(path, self, steps)
         return written
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
@@ -791,10 +785,8 @@ class Result:
         >>> axes.get_title(loc="left")
         'traction of 400000 N: 9.508 mm'
         """
-        from .drawing import drawer
-
         if not np.isfinite(self.displacement):
             raise ValueError(f"there is no equilibrium to draw: {self.message}")
         moved = self.scene.displacement_of(self.displacements)
         title = self.scene.title if np.isnan(moved) else f"{self.scene.title}: {1e3 * moved:.4g} mm"
-        return drawer().draw_springs(ax, self.scene.mesh, self.displacements, self.spring_forces, title)
+        return hook("drawing").draw_springs(ax, self.scene.mesh, self.displacements, self.spring_forces, title)

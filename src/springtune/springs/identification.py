@@ -141,8 +141,8 @@ class Misfit:
 
     def evaluate(self, logarithms: np.ndarray, gradient: bool = True) -> tuple[float, np.ndarray]:
         """Misfit and its gradient, shape (n_edges,), by one solve more for each case (adjoint method)."""
-        from ..linalg.factors import SingularError
         from ..mechanics.network import Network
+        from ..mechanics.statics import SingularError
 
         self.evaluations += 1
         relative = self.start * np.exp(logarithms)

@@ -1,1 +1,0 @@
-"""A campaign: the plan of a study's jobs, its dataset, its figures and tables."""

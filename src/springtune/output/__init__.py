@@ -1,1 +1,0 @@
-"""What results are written as: the dataset, figures and tables."""

@@ -1,0 +1,570 @@
+"""What an archive of a study consists of: checked, found, and named; `springtune.studies.archive.archive` writes it."""
+
+import hashlib
+import json
+import os
+import platform
+import shutil
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from filecmp import cmp
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from springtune.safe_io.atomic import write_text
+from springtune.safe_io.escapes import markdown
+
+from ..output.browse import page as browse
+from ..output.reading import check_links
+from ..runs import provenance, records, rerun
+from ..runs.commands import COMMANDS_FILE
+from ..runs.dependencies import OURS, PACKAGE
+from ..runs.plan import plan
+from . import environment
+from .merge_parts import ELSEWHERE
+from .verify import files as verified
+
+if TYPE_CHECKING:
+    from ..config.model import Study
+    from ..runs.plan import Plan
+    from ..runs.rerun import Job
+
+METADATA, SUMS, README, DIFF = "ro-crate-metadata.json", "SHA256SUMS", "README.md", "code.diff"
+"""Files at the top of an archive."""
+
+CODE, INPUTS = "code", "inputs"
+"""Folders of an archive besides that of the results: of the checkout, and of files from outside of it."""
+
+CITATION = "CITATION.cff"
+OF_RESULTS = "results"
+
+CHECKOUT_FILES = (
+    "Snakefile",
+    "Makefile",
+    "README.md",
+    "pyproject.toml",
+    "hatch_build.py",
+    "LICENSE",
+    CITATION,
+    "tools/setup.sh",
+    *environment.LOCK_FILES,
+)
+"""Files of a checkout without which nobody could run an archive."""
+
+FOLDERS = {
+    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed"),
+    "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
+    "requirements": (".in", ".txt"),
+}
+"""Folders of a checkout that are packed, package, rules and lock files, and endings of files where there is no git."""
+
+OF_PROFILES, LINK = "workflow/profiles", "profiles"
+"""Folder that is packed as committed, for a user's own edits never say what a study computes; and the link to it."""
+
+NOT_PACKED = ("__pycache__", ".egg-info", ".pyc", ".DS_Store")
+"""Endings of names of files and folders that are made of others."""
+
+MOST_FILES, MOST_TEXT = 100_000, 2**24
+"""Files of an archive, and bytes of its metadata or checksums; parsed these take thirty times as much memory."""
+
+MOST_TOLD = 5
+"""Most jobs that are told in a refusal."""
+
+
+class ArchiveError(ValueError):
+    """A study that cannot be archived as it is: what is missing, and what to do about it."""
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A file of an archive.
+
+    Attributes
+    ----------
+    name : str
+        In the archive.
+    source : Path or bytes
+        Where it is, or what it is.
+    sha256 : str
+    size : int
+        [B]
+    original : str
+        SHA-256 of the file that it was made from, where it is another one.
+    """
+
+    name: str
+    source: Path | bytes
+    sha256: str
+    size: int
+    original: str = ""
+
+    @property
+    def runs(self) -> bool:
+        """Whether it is to be executable."""
+        return isinstance(self.source, Path) and os.access(self.source, os.X_OK)
+
+
+@dataclass(frozen=True)
+class Code:
+    """The program of a checkout.
+
+    Attributes
+    ----------
+    files : dict of str to Path
+        By their names from the checkout on.
+    commit : str
+        Empty where there is no git.
+    diff : str
+        What of the package, the rules and the study differs from it.
+    new : tuple of str
+        Files that are packed and that git does not know.
+    left : tuple of str
+        Files of the same folders that are not packed.
+    texts : dict of str to str
+        Files that are packed as committed.
+    """
+
+    files: dict[str, Path]
+    commit: str
+    diff: str
+    new: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
+    texts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is not that of its commit."""
+        return bool(self.diff or self.new)
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What an archive of a study consists of, its metadata apart.
+
+    Attributes
+    ----------
+    study : Study
+    plan : Plan
+    jobs : dict of str to Job
+    files : dict of str to Packed
+        By name.
+    config : str
+        Name of the study's file.
+    inputs : tuple of str
+        Names of the files that it is made from besides.
+    code : Code
+    attributes : dict of str to str
+        Of the dataset, without the machine's name.
+    machine : dict of str to str
+        On which all of it was computed; empty where that is not this one.
+    departures : dict of str to tuple of str
+        Versions that are locked, and others that the dataset was made with.
+    untold : list of str
+        Attributes of the dataset that are left out on request.
+    """
+
+    study: "Study"
+    plan: "Plan"
+    jobs: "dict[str, Job]"
+    files: dict[str, Packed]
+    config: str
+    inputs: tuple[str, ...]
+    code: Code
+    attributes: dict[str, str]
+    machine: dict[str, str]
+    departures: dict[str, tuple[str, str]]
+    untold: list[str]
+
+    @property
+    def folder(self) -> str:
+        """Folder of its results."""
+        return f"{OF_RESULTS}/{self.study.name}"
+
+    @property
+    def dataset(self) -> str:
+        """Name of the dataset."""
+        return f"{self.folder}/{rerun.DATASET}"
+
+    @property
+    def software(self) -> dict[str, str]:
+        """Versions that the dataset was made with."""
+        return dict(json.loads(self.attributes["software"]))
+
+    @property
+    def size(self) -> int:
+        """Of all files, uncompressed [B]."""
+        return sum(one.size for one in self.files.values())
+
+
+def gather(
+    study: "Study",
+    folder: Path,
+    scratch: Path,
+    store: bool = False,
+    untracked: bool = False,
+    chosen: Mapping[str, bool] | None = None,
+) -> Contents:
+    """What an archive of a study is to consist of.
+
+    Parameters
+    ----------
+    study, folder, store, untracked, chosen
+        As of `springtune.studies.archive.archive.write`.
+    scratch : Path
+        Folder for files that are made to be packed.
+
+    Returns
+    -------
+    Contents
+
+    Raises
+    ------
+    ArchiveError
+        As there.
+    """
+    checkout = _checkout(folder)
+    checked = verified(study, folder)
+    if checked.faults or checked.stale:
+        raise ArchiveError(_unfinished(study, folder, checked.faults, checked.stale))
+    made = plan(study, folder, 1)
+    jobs, untold = rerun.jobs(study, made), rerun.untold(folder, chosen)
+    given = provenance.input_files(study)
+    code = _code(study, checkout, {file.resolve() for file in given}, untracked)
+    names = archived_names(study, given, checkout)
+    paths = {name: path for path, name in names.items()}
+    paths |= {f"{CODE}/{name}": path for name, path in code.files.items()}
+    paths |= {f"{OF_RESULTS}/{study.name}/{name}": path for name, path in _made(folder, jobs, made, store)}
+    packed = {name: _of_file(name, path) for name, path in paths.items()}
+    packed |= {f"{CODE}/{name}": of_text(f"{CODE}/{name}", text) for name, text in code.texts.items()}
+    dataset, page = (f"{OF_RESULTS}/{study.name}/{name}" for name in (rerun.DATASET, rerun.PAGE))
+    packed[dataset], attributes, host = _without(packed[dataset], {"host", *untold}, scratch)
+    if packed[dataset].sha256 != packed[dataset].original:  # the page has the attributes of the dataset
+        write_text(scratch / rerun.PAGE, browse.page(scratch / rerun.DATASET, rerun.linked(study)))
+        packed[page] = _of_file(page, scratch / rerun.PAGE)
+    if code.diff and "git_diff" not in untold:
+        packed[DIFF] = of_text(DIFF, code.diff)
+    own = names[study.path.resolve()]
+    tell_machine = host == platform.node() and "host" not in untold and not _elsewhere(folder)
+    found = Contents(
+        study=study,
+        plan=made,
+        jobs=jobs,
+        files=packed,
+        config=own,
+        inputs=tuple(sorted(set(names.values()) - {own})),
+        code=code,
+        attributes=attributes,
+        machine=environment.machine() if tell_machine else {},
+        departures=_departures(checkout, attributes),
+        untold=untold,
+    )
+    packed[README] = of_text(README, _readme(found))
+    return found
+
+
+# -- the checkout ------------------------------------------------------------------------------------------------------
+
+
+def _checkout(folder: Path) -> Path:
+    """Folder of the checkout, which is this one; refused where it could not be run elsewhere."""
+    checkout = Path.cwd()
+    if folder.resolve().parent.parent != checkout:
+        place = folder.parent.parent
+        raise ArchiveError(f"{folder}: an archive holds the checkout that it was run in; call it there: cd {place}")
+    missing = [name for name in CHECKOUT_FILES if not Path(name).is_file()]
+    if missing:
+        raise ArchiveError(
+            f"{', '.join(missing)}: missing in this folder, and nobody could run the archive without; go to a checkout "
+            "of springtune, or unpack its source distribution, and run the study there"
+        )
+    other = _other_library(checkout / "src/springtune")
+    if other:
+        raise ArchiveError(
+            f"src/springtune/{other} of this folder is not that of the library that runs and that made the results; "
+            "set up the environment of this folder: make study"
+        )
+    return checkout
+
+
+def _other_library(packed: Path) -> str:
+    """Name of a file that is another one in a folder than in the library that runs; empty where there is none."""
+    if packed.resolve() == PACKAGE.resolve():
+        return ""
+    names = {
+        path.relative_to(folder).as_posix()
+        for folder in (packed, PACKAGE)
+        for path in folder.rglob("*")
+        if path.is_file() and not _is_made(path.relative_to(folder).as_posix())
+    }
+    pairs = {name: [folder / name for folder in (packed, PACKAGE)] for name in sorted(names)}
+    others = (
+        name
+        for name, pair in pairs.items()
+        if not (all(one.is_file() for one in pair) and cmp(pair[0], pair[1], False))
+    )
+    return next(others, "")
+
+
+def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> str:
+    said = [f"{name}: {why}" for name, why in faults]
+    said += [f"{name}: the study or the program changed since" for name in stale]
+    shown = said[:MOST_TOLD] + ([f"and {len(said) - MOST_TOLD} more"] if len(said) > MOST_TOLD else [])
+    remedy = f"springtune run {study.path}"
+    if any(why.endswith(records.DAMAGED) for _, why in faults):
+        remedy = f"springtune verify {study.path} --set-aside, then {remedy}"
+    lines = [f"{folder}: is not what the study asks for now, and is not archived", *shown, f"make it: {remedy}"]
+    return "\n  ".join(lines)
+
+
+def _code(study: "Study", checkout: Path, given: set[Path], untracked: bool) -> Code:
+    """The program: what git knows of it, or what files of a checkout are called where there is no git.
+
+    `given` are the files that the study is made from, which are packed anyway; `untracked` asks for all files of the
+    folders.
+    """
+    commit, texts = provenance.git_commit(checkout), {}
+    known = _git(checkout, "ls-files", "-z", "--cached", "--", *FOLDERS, LINK) if commit else []
+    if known:
+        others = _git(checkout, "ls-files", "-z", "--others", "--", *FOLDERS, "tools")
+        changed = _git(checkout, "diff", "--name-only", "-z", "--relative", "HEAD", "--", OF_PROFILES)
+        texts = {name: provenance.git(checkout, "show", f"HEAD:./{name}") for name in changed}
+    else:  # a source distribution, or a checkout inside of another one's ignored folder
+        commit = ""
+        paths = [path for top in FOLDERS for path in (checkout / top).rglob("*") if path.is_file()]
+        found = [path.relative_to(checkout).as_posix() for path in paths]
+        known = [LINK, *filter(_is_usual, found)]
+        others = [name for name in found if not _is_usual(name)]
+    others += [name for name, text in texts.items() if not text]  # not committed yet
+    others = [name for name in others if not _is_made(name) and (checkout / name).resolve() not in given]
+    asked = {*known, *CHECKOUT_FILES, *others} if untracked else {*known, *CHECKOUT_FILES} - {*others}
+    files = dict(_followed(checkout, asked))
+    left = {name for name, path in files.items() if not path.resolve().is_relative_to(checkout.resolve())}
+    left |= set() if untracked else {*others}
+    needed = {path.relative_to(PACKAGE.parent).as_posix() for path in OURS.files if path.is_relative_to(PACKAGE)}
+    for name in sorted(left):
+        if name.removeprefix("src/") in needed:
+            raise ArchiveError(
+                f"{name}: the study is computed by it, and git does not know it; add it to git, or pack it and all "
+                "others by --untracked"
+            )
+    texts |= {f"{LINK}{name.removeprefix(OF_PROFILES)}": text for name, text in texts.items()}
+    return Code(
+        {name: path for name, path in files.items() if name not in left},
+        commit.removesuffix(provenance.CHANGED),
+        provenance.difference(study, checkout, "--binary", "--relative") if commit else "",
+        tuple(sorted(files.keys() & {*others})),
+        tuple(sorted(left)),
+        {name: text for name, text in texts.items() if text and name in files},
+    )
+
+
+def _git(checkout: Path, *arguments: str) -> list[str]:
+    """Names that git lists."""
+    return [name for name in provenance.git(checkout, *arguments).split("\0") if name]
+
+
+def _followed(checkout: Path, names: Iterable[str]) -> Iterator[tuple[str, Path]]:
+    """Files by name; what a link to a folder of the checkout leads to under the link's name, as zip has no links."""
+    names = sorted(set(names))
+    for name in names:
+        path = checkout / name
+        if path.is_file():
+            yield name, path
+        elif path.is_dir() and path.resolve().is_relative_to(checkout):
+            below = path.resolve().relative_to(checkout).as_posix() + "/"
+            for other in names:
+                if other.startswith(below) and (checkout / other).is_file():
+                    yield f"{name}/{other.removeprefix(below)}", checkout / other
+
+
+def _is_usual(name: str) -> bool:
+    """Whether a file is packed where there is no git to ask: by its ending, and not hidden."""
+    parts = PurePosixPath(name).parts
+    return name.endswith(FOLDERS[parts[0]]) and not any(part.startswith(".") for part in parts)
+
+
+def _is_made(name: str) -> bool:
+    return any(part.endswith(NOT_PACKED) for part in PurePosixPath(name).parts)
+
+
+# -- the study's files -------------------------------------------------------------------------------------------------
+
+
+def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Path, str]:
+    """Names in the archive of the files that a study is made from, which see each other as before.
+
+    Parameters
+    ----------
+    study : Study
+    given : set of Path
+        Its own file among them.
+    checkout : Path
+
+    Returns
+    -------
+    dict of Path to str
+        By the whole path.
+
+    Raises
+    ------
+    ArchiveError
+        If the study names a file by a path of this machine, or one that is too far away.
+    """
+    config, files = study.path.resolve(), {file.resolve() for file in given}
+    for path in files - {config}:
+        if str(path) in study.text:
+            raise ArchiveError(
+                f"{study.path}: names {path}, which is this machine's own; name the file as seen from the study's "
+                f"folder, such as {path.name} beside it, and run the study again"
+            )
+    outside = [path.parent for path in files if not path.is_relative_to(checkout)]
+    base = Path(os.path.commonpath(outside)) if config.parent in outside else None
+    names = {}
+    for path in sorted(files):
+        if path.is_relative_to(checkout):
+            names[path] = f"{CODE}/{path.relative_to(checkout).as_posix()}"
+        else:
+            names[path] = f"{INPUTS}/{path.relative_to(base).as_posix()}" if base else _beside(path, checkout)
+    folder = PurePosixPath(names[config]).parent
+    for path, name in names.items():
+        if not name or os.path.relpath(name, folder) != os.path.relpath(path, config.parent):
+            raise ArchiveError(
+                f"{study.path}: reads {path.name}, which an archive could not hold where the study finds it; "
+                "put the study and its files into one folder, in the checkout or outside, and run it"
+            )
+    return names
+
+
+def _beside(path: Path, checkout: Path) -> str:
+    """Name of a file in a folder beside the checkout; empty for any other."""
+    parts = Path(os.path.relpath(path, checkout)).parts
+    kept = (
+        parts[:1] == ("..",) and parts[1:2] != ("..",) and len(parts) > 2 and parts[1] not in (CODE, OF_RESULTS, INPUTS)
+    )
+    return "/".join(parts[1:]) if kept else ""
+
+
+# -- results -----------------------------------------------------------------------------------------------------------
+
+
+def _made(folder: Path, jobs: "dict[str, Job]", made: "Plan", store: bool) -> Iterator[tuple[str, Path]]:
+    """Files of a study's results by their names from its folder on."""
+    from ..runs import checked_json
+
+    for name, job in jobs.items():
+        paths = [job.record, folder / f"benchmarks/{name}.tsv"]
+        if name not in made.jobs:
+            paths += map(Path, job.products)
+        elif store:
+            paths += map(Path, checked_json.demand(job.record)["products"])
+            paths.append(made.tasks(name))
+        for path in paths:
+            if path.is_file():
+                yield path.relative_to(folder).as_posix(), path
+
+
+def stored_size(study: "Study", folder: Path) -> int:
+    """Bytes of what the stages of a study stored [B]."""
+    made = plan(study, folder, 1)
+    every = dict(_made(folder, rerun.jobs(study, made), made, True))
+    few = dict(_made(folder, rerun.jobs(study, made), made, False))
+    return sum(every[name].stat().st_size for name in every.keys() - few.keys())
+
+
+def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Packed, dict[str, str], str]:
+    """The dataset without what some attributes say, its other attributes, and the name of the machine.
+
+    The text of an attribute is overwritten in its place: all else stays as it was, to the byte.
+    """
+    import h5py
+    import numpy as np
+
+    assert isinstance(dataset.source, Path)
+    try:
+        check_links(dataset.source)
+    except ValueError as error:
+        raise ArchiveError(str(error)) from None
+    copy = scratch / rerun.DATASET
+    shutil.copyfile(dataset.source, copy)
+    with h5py.File(copy, "a") as file:
+        attributes = {
+            str(name): value.decode() if isinstance(value, bytes) else str(value) for name, value in file.attrs.items()
+        }
+        host = attributes.get("host", "")
+        for name in names:
+            text = attributes.pop(name, "")
+            if text and file.attrs.get_id(name).dtype.kind != "S":
+                option = next(option for option, other in rerun.BLANKED.items() if other == name).replace("_", "-")
+                raise ArchiveError(
+                    f"{dataset.source}: its attribute '{name}' has letters besides ASCII, and cannot be blanked in its "
+                    f"place; run the study again with --{option}"
+                )
+            if text:
+                file.attrs.modify(name, np.bytes_(b"-" * len(text)))
+    packed = _of_file(dataset.name, copy)
+    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), attributes, host
+
+
+def _elsewhere(folder: Path) -> bool:
+    """Whether other machines computed some of a study: nodes of a cluster, or sites whose results were added."""
+    return any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))
+
+
+def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
+    """Versions that the dataset was made with and that are not the locked ones."""
+    locked: dict[str, str] = {}
+    for lock in environment.LOCK_FILES:
+        locked |= environment.locked(checkout / lock)
+    used = json.loads(attributes.get("software", "{}"))
+    return {
+        name: (locked[name], version) for name, version in sorted(used.items()) if locked.get(name, version) != version
+    }
+
+
+# -- the archive -------------------------------------------------------------------------------------------------------
+
+
+def _readme(found: Contents) -> str:
+    """What somebody reads who has unpacked the archive and knows nothing of it."""
+    study = f"../{found.config}" if not found.config.startswith(f"{CODE}/") else found.config.removeprefix(f"{CODE}/")
+    commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
+    version = found.attributes["springtune_version"]
+    changed = ", changed" if found.code.changed else ""
+    changed += (
+        f"; what of package, rules and study differs from the commit is in `{DIFF}`" if DIFF in found.files else ""
+    )
+    return f"""# {markdown(found.study.title)}
+
+The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is
+described in `{METADATA}`: this is an RO-Crate.
+
+| | |
+|---|---|
+| `{found.config}` | the study |
+| `{found.dataset}` | its dataset: NetCDF-4, for xarray or any HDF5 viewer |
+| `{found.folder}/{rerun.PAGE}` | a page to browse it |
+| `{CODE}/` | the program, with the versions of all packages in `{CODE}/{environment.LOCK_FILES[0]}` |
+
+To check that all is as it was packed:
+
+    sha256sum -c {SUMS}
+
+To compute it again, with Python {environment.minor(found.software["python"])} and make, and to compare:
+
+    cd {CODE}
+    make study STUDY={study}
+    . .venv/bin/activate
+    springtune diff ../{found.folder} {found.folder} --relative 0 --absolute 0
+
+`springtune verify ARCHIVE --reproduce` does all of this with the archive as it was packed.
+"""
+
+
+def _of_file(name: str, path: Path) -> Packed:
+    return Packed(name, path, records.checksum(path), path.stat().st_size)
+
+
+def of_text(name: str, text: str) -> Packed:
+    """A file of an archive that is a text."""
+    content = text.encode(errors="surrogateescape")
+    return Packed(name, content, hashlib.sha256(content).hexdigest(), len(content))

@@ -1,0 +1,426 @@
+"""The metadata of an archive: an RO-Crate 1.1 of the profile Provenance Run Crate, which is a Workflow RO-Crate, too.
+
+Its main entity is the Snakefile. Each rule is a step of it, carried out by the module that its jobs run; each job is an
+action with what it took. What is not known is left out: nobody is named who is not in CITATION.cff.
+"""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from ..runs import checked_json, rerun
+from ..runs.plan import stages
+from . import environment
+from .contents import CODE, DIFF, INPUTS, METADATA, README
+
+if TYPE_CHECKING:
+    from rocrate.model import Entity
+    from rocrate.rocrate import ROCrate
+
+    from .contents import Contents
+
+TERMS = "https://w3id.org/ro/terms/workflow-run#"
+"""Where the terms are defined that RO-Crate 1.1 has not."""
+
+PROFILES = {
+    "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
+    "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
+    "https://w3id.org/ro/wfrun/provenance/0.5": ("Provenance Run Crate", "0.5"),
+    "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
+}
+"""Profiles that an archive conforms to, with their names and versions."""
+
+WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
+PARAMETER_PROFILE = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
+"""Profiles of the workflow, and of what it is given and makes."""
+
+DONE = "http://schema.org/CompletedActionStatus"
+
+MEDIA = {
+    ".cff": "application/yaml",
+    ".csv": "text/csv",
+    ".css": "text/css",
+    ".h5": "application/x-hdf5",
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".json": "application/json",
+    ".md": "text/markdown",
+    ".nc": "application/x-netcdf",
+    ".pdf": "application/pdf",
+    ".png": "image/png",
+    ".py": "text/x-python",
+    ".svg": "image/svg+xml",
+    ".toml": "application/toml",
+    ".tsv": "text/tab-separated-values",
+    ".vtu": "application/xml",
+    ".pvd": "application/xml",
+    ".yaml": "application/yaml",
+}
+"""Types of files by their endings."""
+
+TEXT, BYTES = "text/plain", "application/octet-stream"
+"""Types of other files: of the program, and of what a study names."""
+
+USED = {"s": ("wall time", "SEC"), "cpu_time": ("time of processors", "SEC"), "max_rss": ("most memory", "E63")}
+"""What is told of a job, of the columns of Snakemake's benchmarks: its name, and its unit's UN/CEFACT code."""
+
+PAGES = {
+    "cvxopt": "https://cvxopt.org", "h5netcdf": "https://h5netcdf.org", "h5py": "https://www.h5py.org",
+    "meshio": "https://github.com/nschloe/meshio", "netcdf4": "https://unidata.github.io/netcdf4-python",
+    "netgen-mesher": "https://ngsolve.org", "numba": "https://numba.pydata.org", "numpy": "https://numpy.org",
+    "pyamg": "https://github.com/pyamg/pyamg", "python": "https://www.python.org",
+    "scikit-fem": "https://scikit-fem.readthedocs.io", "scipy": "https://scipy.org",
+    "snakemake": "https://snakemake.readthedocs.io", "xarray": "https://xarray.dev",
+}  # fmt: skip
+"""Where software is described."""
+
+
+class CitationError(ValueError):
+    """CITATION.cff does not say what an archive states."""
+
+
+def citation(path: Path) -> dict[str, Any]:
+    """What a citation file says of authors, licence and keywords.
+
+    Parameters
+    ----------
+    path : Path
+        ``CITATION.cff``.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    CitationError
+        If it cannot be read, or names neither authors nor a licence.
+    """
+    import yaml
+
+    try:
+        found = yaml.safe_load(path.read_text())
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise CitationError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
+    for key, example in (("authors", "[{family-names: ..., given-names: ...}]"), ("license", "MIT")):
+        if not isinstance(found, dict) or not found.get(key):
+            raise CitationError(f"{path}: has no '{key}', which an archive states; add it: {key}: {example}")
+    nameless = [one for one in found["authors"] if not (isinstance(one, dict) and _name(one))]
+    if nameless:
+        raise CitationError(f"{path}: authors: {nameless[0]} has no name; give family-names and given-names, or name")
+    return dict(found)
+
+
+def _name(one: dict[str, Any]) -> str:
+    """Name of an author: a person's, or that of whoever else has a single one."""
+    parts = [one.get(key) for key in ("given-names", "name-particle", "family-names", "name-suffix")]
+    return str(one.get("name") or " ".join(str(part) for part in parts if part))
+
+
+def metadata(found: "Contents", cited: dict[str, Any]) -> str:
+    """Text of ``ro-crate-metadata.json``.
+
+    Parameters
+    ----------
+    found : Contents
+    cited : dict
+        As of `citation`.
+
+    Returns
+    -------
+    str
+        The same for the same contents.
+    """
+    made = _Crate(found, cited).crate.metadata.generate()
+    first = {METADATA: 0, "./": 1}
+    made["@graph"].sort(key=lambda one: (first.get(one["@id"], 2), one["@id"]))
+    made["@graph"] = [{key: _single(value) for key, value in one.items()} for one in made["@graph"]]
+    return json.dumps(made, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _single(value: Any) -> Any:
+    """A value in the place of a list of one, as compact JSON-LD has it."""
+    return value[0] if isinstance(value, list) and len(value) == 1 else value
+
+
+class _Crate:
+    """The entities of an archive."""
+
+    crate: "ROCrate"
+
+    def __init__(self, found: "Contents", cited: dict[str, Any]) -> None:
+        from rocrate.rocrate import ROCrate
+
+        self.found, self.cited, self.version = found, cited, found.attributes["springtune_version"]
+        self.crate = ROCrate(version="1.1")
+        self.crate.metadata.extra_terms = {name: TERMS + name for name in ("sha256", "resourceUsage", "environment")}
+        self.rules = dict(self._rules())
+        self.modules = {
+            module: f"{CODE}/src/springtune/{module.replace('.', '/')}.py" for _, module, _ in self.rules.values()
+        }
+        self.files = {name: self._file(name) for name in found.files}
+        self._about()
+        self._workflow()
+        self._run()
+
+    def _add(self, name: str, kind: str, /, **properties: Any) -> "Entity":
+        """An entity that is no file; properties that are None are left out."""
+        from rocrate.model import ContextEntity
+
+        given = {key: value for key, value in properties.items() if value is not None}
+        return self.crate.add(ContextEntity(self.crate, name, properties={"@type": kind} | given))
+
+    # -- files ---------------------------------------------------------------------------------------------------------
+
+    def _file(self, name: str) -> "Entity":
+        one, path = self.found.files[name], PurePosixPath(name)
+        other = BYTES if name in self.found.inputs else TEXT
+        properties: dict[str, Any] = {"name": path.name, "sha256": one.sha256, "contentSize": str(one.size)}
+        properties["encodingFormat"] = MEDIA.get(path.suffix, other)
+        if name == f"{CODE}/Snakefile":
+            properties |= {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
+            properties |= {"name": "springtune: parameter studies of mass-spring models", "version": self.version}
+            properties |= self._page()
+            version = self.found.software.get("snakemake")
+            return self.crate.add_workflow(
+                dest_path=name, main=True, lang="snakemake", lang_version=version, properties=properties
+            )
+        modules = [module for module, file in self.modules.items() if file == name]
+        if modules:
+            properties |= {"@type": ["File", "SoftwareSourceCode"], "version": self.version} | self._page()
+            properties |= {"name": f"springtune.{modules[0]}", "description": "what jobs of a rule run"}
+        return self.crate.add_file(dest_path=name, properties=properties)
+
+    def _page(self) -> dict[str, Any]:
+        """Where the program is, if CITATION.cff says so."""
+        place = self.cited.get("repository-code") or self.cited.get("url")
+        return {"url": str(place)} if place else {}
+
+    def _described(self) -> dict[str, str]:
+        """What files are whose names do not say it."""
+        found = self.found
+        told = {
+            README: "what is in this archive, how to check it and to compute it again",
+            **dict.fromkeys(found.inputs, "a file that the study names"),
+            found.config: "the study",
+            found.dataset: "the dataset: NetCDF-4, every parameter a dimension",
+            f"{found.folder}/{rerun.PAGE}": "a page to browse the dataset, which needs no network",
+            f"{found.folder}/{rerun.SUMMARY}": "what is solved, what is not and why",
+            f"{CODE}/{environment.LOCK_FILES[0]}": "versions and hashes of all packages",
+            f"{CODE}/{environment.LOCK_FILES[1]}": "version and hashes of the package that factorizes by CHOLMOD",
+        }
+        original = found.files[found.dataset].original
+        if original != found.files[found.dataset].sha256:
+            blank = " and ".join(repr(name) for name in sorted({"host", *found.untold}))
+            told[found.dataset] += f"; {blank} of its attributes are blanked, before which its SHA-256 was {original}"
+        if DIFF in found.files:
+            told[DIFF] = f"what of package, rules and study differs in {CODE}/ from commit {found.code.commit}"
+        return told
+
+    def _about(self) -> None:
+        """The whole: title, authors, licence, and what is in which folder."""
+        root, found = self.crate.root_dataset, self.found
+        commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
+        commit += ", changed" if found.code.changed else ""
+        root["name"], root["version"] = found.study.title, self.version
+        root["description"] = (
+            f"The study '{found.study.name}' as computed by springtune {self.version} ({commit}): its file, the "
+            "program with the versions of all packages, the dataset with figures and tables, and what each job took. "
+            f"The dataset can be computed again from it: {README} says how."
+        )
+        if found.code.new:
+            root["description"] += f" Files that git does not know: {', '.join(found.code.new)}."
+        root["datePublished"] = found.attributes["created"]
+        if self.cited.get("keywords"):
+            root["keywords"] = [str(word) for word in self.cited["keywords"]]
+        root["author"] = [self._author(number, one) for number, one in enumerate(self.cited["authors"], 1)]
+        root["license"] = [self._licence(name) for name in _several(self.cited["license"])]
+        root["conformsTo"] = [
+            self._add(name, "CreativeWork", name=title, version=number) for name, (title, number) in PROFILES.items()
+        ]
+        for name, text in self._described().items():
+            self.files[name]["description"] = text
+        self.files[README]["about"] = root
+        self._sort_into_folders()
+
+    def _sort_into_folders(self) -> None:
+        results = f"{self.found.folder}/"
+        told = {
+            f"{CODE}/": "the program: package, rules and lock files of springtune, and the study",
+            f"{INPUTS}/": "the study and the files that it names",
+            results: "dataset, page, figures, tables; done/ has what each job made, benchmarks/ what it took",
+        }
+        held: dict[str, list[Entity]] = {}
+        for name, file in self.files.items():
+            top = results if name.startswith(results) else name[: name.find("/") + 1]
+            held.setdefault(top, []).append(file)
+        parts = held.pop("", [])
+        for top, files in sorted(held.items()):
+            about = {"name": top, "description": told.get(top, "files that the study names")}
+            folder = self.crate.add_dataset(dest_path=top, properties=about)
+            folder["hasPart"] = files
+            parts.append(folder)
+        self.crate.root_dataset["hasPart"] = [*parts, self.files[f"{CODE}/Snakefile"]]
+
+    def _author(self, number: int, one: dict[str, Any]) -> "Entity":
+        place = one.get("orcid") or one.get("website") or f"#author-{number}"
+        if "name" in one:
+            return self._add(place, "Organization", name=_name(one), url=one.get("website"))
+        home = one.get("affiliation")
+        return self._add(
+            place,
+            "Person",
+            name=_name(one),
+            givenName=one.get("given-names"),
+            familyName=one.get("family-names"),
+            affiliation=self._add(f"#affiliation-{number}", "Organization", name=home) if home else None,
+        )
+
+    def _licence(self, name: str) -> "Entity":
+        told = f"licence of the program and of what it made, see {CODE}/LICENSE"
+        place = f"https://spdx.org/licenses/{name}"
+        return self._add(place, "CreativeWork", name=name, identifier=place, description=told)
+
+    # -- the workflow and its run --------------------------------------------------------------------------------------
+
+    def _rules(self) -> "list[tuple[str, tuple[str, str, list[str]]]]":
+        """What each rule does, the module that its jobs run, and its jobs, in the order of a run."""
+        found, made = self.found, []
+        for stage in stages():
+            own = [name for name, job in found.plan.jobs.items() if job.stage.name == stage.name]
+            if own:
+                made.append((stage.name, (stage.message, stage.module, own)))
+        drawn = ("Drawing figures and writing tables", "studies.output.present")
+        after = {
+            rerun.COLLECT: ("Comparing with the references, and collecting the dataset", "studies.kinds.collect"),
+            rerun.BROWSE: ("Writing the page to browse", "studies.output.browse.job"),
+        }
+        for name in found.jobs:
+            if name not in found.plan.jobs:
+                made.append((name, (*after.get(name, drawn), [name])))
+        return made
+
+    def _workflow(self) -> None:
+        """The Snakefile: what it is given, and what it makes."""
+        workflow, found = self.files[f"{CODE}/Snakefile"], self.found
+        root = self.crate.root_dataset
+        workflow["conformsTo"] = {"@id": WORKFLOW_PROFILE}
+        workflow["license"], workflow["creator"] = root["license"], root["author"]
+        for key, name, file, told in (
+            ("input", "study", found.config, "the study's file, --configfile of Snakemake"),
+            ("output", "dataset", found.dataset, "the dataset of the study"),
+        ):
+            parameter = self._add(
+                f"#{name}",
+                "FormalParameter",
+                name=name,
+                additionalType="File",
+                encodingFormat=self.files[file]["encodingFormat"],
+                description=told,
+                workExample=self.files[file],
+                conformsTo={"@id": PARAMETER_PROFILE},
+            )
+            workflow[key] = self.files[file]["exampleOfWork"] = parameter
+
+    def _run(self) -> None:
+        """The run: the software, the machine, an action for each job."""
+        found, files, workflow = self.found, self.files, self.files[f"{CODE}/Snakefile"]
+        software = {
+            name: self._software(name, version) for name, version in sorted(found.software.items()) if version != "none"
+        }
+        workflow["softwareRequirements"] = list(software.values())
+        workflow["hasPart"] = [files[name] for name in self.modules.values()]
+        steps, controls, jobs = [], [], []
+        for position, (rule, (message, module, names)) in enumerate(self.rules.items(), 1):
+            tool = files[self.modules[module]]
+            tool["programmingLanguage"] = software["python"]
+            about = {"name": rule, "description": message}
+            steps.append(self._add(f"#step-{rule}", "HowToStep", **about, position=str(position), workExample=tool))
+            actions = [self._job(name, tool, message) for name in names]
+            jobs += actions
+            about = {"name": f"Jobs of the rule {rule}", "description": message}
+            controls.append(
+                self._add(f"#control-{rule}", "ControlAction", **about, instrument=steps[-1], object=actions)
+            )
+        workflow["step"] = steps
+        notes = tuple(f"{found.folder}/{name}/" for name in ("done", "benchmarks", "tasks"))
+        machine = [
+            self._add(f"#machine-{name}", "PropertyValue", name=name, value=value)
+            for name, value in found.machine.items()
+        ]
+        run = self._add(
+            "#run",
+            "CreateAction",
+            name=f"Run of the study '{found.study.name}'",
+            description="all jobs that were to do, whose results were stored and reused where nothing had changed",
+            instrument=workflow,
+            object=[files[name] for name in (found.config, *found.inputs)],
+            result=[files[name] for name in files if name.startswith(found.folder) and not name.startswith(notes)],
+            endTime=max((job["endTime"] for job in jobs if "endTime" in job), default=found.attributes["created"]),
+            actionStatus=DONE,
+            environment=machine or None,
+        )
+        engine = self._add(
+            "#engine",
+            "OrganizeAction",
+            name="Snakemake's run of its rules",
+            description="which jobs ran, by which rule",
+            instrument=software.get("snakemake", workflow),
+            object=controls,
+            result=run,
+            endTime=run["endTime"],
+            actionStatus=DONE,
+        )
+        self.crate.root_dataset["mentions"] = [run, engine, *controls, *jobs]
+
+    def _software(self, name: str, version: str) -> "Entity":
+        page = PAGES.get(name)
+        place = f"pkg:generic/python@{version}" if name == "python" else f"pkg:pypi/{name}@{version}"
+        about = {"name": name, "softwareVersion": version, "url": {"@id": page} if page else None}
+        return self._add(place, "SoftwareApplication", **about)
+
+    def _job(self, name: str, tool: "Entity", message: str) -> "Entity":
+        """A job: when it was done, what it took, what it made."""
+        found, folder = self.found, self.found.plan.folder
+        products = checked_json.demand(found.jobs[name].record)["products"]
+        made = [f"{found.folder}/done/{name}.json"]
+        made += [f"{found.folder}/{Path(path).relative_to(folder).as_posix()}" for path in products]
+        written = max((state[1] for state in products.values() if state), default=0)
+        used = [
+            self._add(
+                f"#{name}-{column}",
+                "PropertyValue",
+                name=USED[column][0],
+                value=value,
+                unitCode=USED[column][1],
+                propertyID=f"https://snakemake.github.io/benchmarks#{column}",
+            )
+            for column, value in _benchmark(folder / f"benchmarks/{name}.tsv").items()
+        ]
+        return self._add(
+            f"#job-{name}",
+            "CreateAction",
+            name=f"Job {name}",
+            description=message,
+            instrument=tool,
+            object=self.files[found.config],
+            result=[self.files[one] for one in made if one in self.files],
+            endTime=datetime.fromtimestamp(written // 10**9, UTC).isoformat() if written else None,
+            actionStatus=DONE,
+            resourceUsage=used or None,
+        )
+
+
+def _several(value: Any) -> list[str]:
+    return [str(one) for one in (value if isinstance(value, list) else [value])]
+
+
+def _benchmark(path: Path) -> dict[str, str]:
+    """What Snakemake measured of a job, of what it could; nothing where it did not."""
+    try:
+        head, row = (line.split("\t") for line in path.read_text().splitlines()[:2])
+    except (OSError, ValueError):
+        return {}
+    cells = dict(zip(head, row))
+    return {name: cells[name] for name in USED if cells.get(name, "").replace(".", "", 1).isdigit()}

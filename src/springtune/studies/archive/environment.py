@@ -1,0 +1,83 @@
+"""The software that a study is computed with: what lock files ask for, what is installed, and on which machine."""
+
+import os
+import platform
+from pathlib import Path
+
+LOCK_FILES = ("requirements/run.txt", "requirements/cholesky.txt")
+"""Lock files of what a study runs on, from the checkout on; the second is an extra that a machine may lack."""
+
+
+def minor(version: str) -> str:
+    """A version of Python without its last number: what wheels are built for.
+
+    Examples
+    --------
+    >>> minor("3.11.7")
+    '3.11'
+    """
+    return ".".join(version.split(".")[:2])
+
+
+def locked(path: Path) -> dict[str, str]:
+    """Versions that a lock file asks for on this machine.
+
+    Parameters
+    ----------
+    path : Path
+        Requirements with ``==``, as `make lock` writes them.
+
+    Returns
+    -------
+    dict of str to str
+        By the normalised name of the distribution; those for other systems or versions of Python are left out.
+    """
+    from packaging.requirements import InvalidRequirement, Requirement
+    from packaging.utils import canonicalize_name
+
+    found = {}
+    for line in path.read_text().splitlines():
+        text = line.removesuffix("\\").strip()
+        if not text or text.startswith(("#", "-")):
+            continue
+        try:
+            one = Requirement(text)
+        except InvalidRequirement:
+            continue
+        if one.marker is None or one.marker.evaluate():
+            found[str(canonicalize_name(one.name))] = str(one.specifier).removeprefix("==")
+    return found
+
+
+def departures(lock: Path) -> dict[str, tuple[str, str]]:
+    """What is installed here otherwise than a lock file asks for.
+
+    Parameters
+    ----------
+    lock : Path
+
+    Returns
+    -------
+    dict of str to tuple of str
+        By distribution: the version that is locked, and the one that is here, "none" where there is none.
+    """
+    from ..runs.keys import installed
+
+    here = {name: (version, installed(name)) for name, version in locked(lock).items()}
+    return {name: pair for name, pair in here.items() if pair[0] != pair[1]}
+
+
+def machine() -> dict[str, str]:
+    """What numbers and times depend on besides the software; neither the machine's name nor its user's.
+
+    Returns
+    -------
+    dict of str to str
+    """
+    found = {"architecture": platform.machine(), "system": platform.system(), "cores": str(os.cpu_count())}
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return found | ({"processor": models[0]} if models else {})

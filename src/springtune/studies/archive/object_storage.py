@@ -1,0 +1,168 @@
+"""Stored results of a stage in one file, for object storage.
+
+Storage has what is whole or nothing under a name, but asks a request for each: so a stage is one object. A pack names
+its files and their checksums, which are compared when it is unpacked; results are added to those that are there.
+"""
+
+import io
+import json
+import shutil
+import sys
+import tarfile
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+from springtune.safe_io import atomic
+
+from ..kinds import load_study
+from ..runs import checked_json, records
+from .merge_parts import MergeError, adopt, is_stored, take_in
+
+CONTENTS = "contents.json"
+"""First file in a pack: checksums of the others by name."""
+
+ENDING = ".tar"
+"""Of the name of a pack."""
+
+UNPACKED = "fetched"
+"""Folder in a study's, in which packs are unpacked before they are added."""
+
+
+class PackError(Exception):
+    """A pack that is not what was packed."""
+
+
+def pack(folder: Path, done: Sequence[Path], output: Path) -> None:
+    """Pack what jobs have made; the same results make the same bytes.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the study's results are.
+    done : sequence of Path
+        Records of the jobs.
+    output : Path
+    """
+    made: dict[str, list[object] | None] = {}
+    for record in done:
+        made |= checked_json.demand(record)["products"]
+    files = {Path(name).relative_to(folder).as_posix(): known[2] for name, known in sorted(made.items()) if known}
+    with atomic.replacing(output) as unfinished, tarfile.open(unfinished, "w", format=tarfile.PAX_FORMAT) as archive:
+        _add(archive, CONTENTS, json.dumps(files, indent=1).encode())
+        for name, checksum in files.items():
+            if records.checksum(folder / name) != checksum:
+                raise PackError(f"{folder / name}: is not what its job made; run the study, which makes it again")
+            _add(archive, name, (folder / name).read_bytes())
+
+
+def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
+    member = tarfile.TarInfo(name)
+    member.size, member.mode = len(content), 0o644
+    archive.addfile(member, io.BytesIO(content))
+
+
+def unpack(path: Path, folder: Path) -> list[Path]:
+    """Unpack a pack.
+
+    Parameters
+    ----------
+    path : Path
+    folder : Path
+        Where its files go.
+
+    Returns
+    -------
+    list of Path
+        Names of the files in the folder.
+
+    Raises
+    ------
+    PackError
+        If it is not what was packed.
+    """
+    remedy = "publish it again from where the study was run"
+    try:
+        with tarfile.open(path, "r:") as archive:
+            members = {member.name: member for member in archive.getmembers()}
+            files = json.loads(_content(archive, members[CONTENTS]))
+            for name, checksum in files.items():
+                if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+                    raise PackError(f"{path}: names a file elsewhere, '{name}'; it is no pack of springtune")
+                atomic.write_bytes(folder / name, _content(archive, members[name]))
+                if records.checksum(folder / name) != checksum:
+                    raise PackError(f"{path}: '{name}' is not what was packed; {remedy}")
+    except (tarfile.TarError, EOFError, KeyError, ValueError) as error:
+        raise PackError(f"{path}: is not whole: {error}; {remedy}") from None
+    return [Path(name) for name in files]
+
+
+def _content(archive: tarfile.TarFile, member: tarfile.TarInfo) -> bytes:
+    file = archive.extractfile(member)
+    return file.read() if file else b""
+
+
+def fetch(config: str, packs: Sequence[Path]) -> str:
+    """Add what packs hold to a study's results, and record its jobs as done whose results are all there.
+
+    Parameters
+    ----------
+    config : str
+        YAML file of the study.
+    packs : sequence of Path
+
+    Returns
+    -------
+    str
+        What was done, in words.
+
+    Raises
+    ------
+    PackError, MergeError
+        If a pack is not whole, or has other results than are here; nothing is added then.
+    """
+    study = load_study(config)
+    folder = Path("results", study.name)
+    place = folder / UNPACKED
+    shutil.rmtree(place, ignore_errors=True)
+    try:
+        names = [name for one in packs for name in unpack(one, place)]
+        stored = {name: [place / name] for name in names if is_stored(name)}
+        written = take_in(study, stored, folder)
+        left = adopt(study, folder, 1)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    rest = f"; {left} jobs are left for `springtune run {config}`" if left else "; all that it asks for is here"
+    return f"{folder}: {len(packs)} packs, {len(stored)} files, {written} of them written{rest}"
+
+
+def copy(output: Sequence[Path], files: Sequence[Path]) -> None:
+    """Copy files, each under a name of its own."""
+    for path, file in zip(output, files, strict=True):
+        with atomic.replacing(path) as unfinished:
+            shutil.copyfile(file, unfinished)
+
+
+def main(what: str, *arguments: str) -> None:
+    """Do what a rule asks for.
+
+    Parameters
+    ----------
+    what : str
+        ``pack FOLDER OUTPUT RECORDS``, ``fetch CONFIG PACKS`` or ``copy OUTPUTS FILES``.
+    *arguments : str
+    """
+    try:
+        if what == "pack":
+            folder, output, *done = map(Path, arguments)
+            pack(folder, done, output)
+        elif what == "fetch":
+            print(fetch(arguments[0], [*map(Path, arguments[1:])]))
+        else:
+            half = len(arguments) // 2
+            copy([*map(Path, arguments[:half])], [*map(Path, arguments[half:])])
+    except (PackError, MergeError) as error:
+        raise SystemExit(str(error)) from None
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

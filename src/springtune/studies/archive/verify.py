@@ -1,0 +1,277 @@
+"""Whether what lies in a study's folder is what was made, and whether a sample of it can be made again."""
+
+import json
+import random
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from springtune.problem.status import Status
+from springtune.registry import imported
+from springtune.safe_io import atomic
+
+from ..config.kind import kinds
+from ..config.model import SceneSpec
+from ..kinds import load_study
+from ..kinds.scenes.division import of_scenes
+from ..kinds.shapes.division import of_shape_scenes
+from ..output import reading
+from ..output.summary import SCENES
+from ..runs import checked_json, records, rerun, store
+from ..runs.damage import ASIDE, DamagedError, rename
+from ..runs.keys import installed
+from ..runs.plan import BUNDLES_FILE, plan
+from ..runs.run_tasks import RECORDS, TASKS
+from ..runs.task_costs import Spent
+from ..runs.task_limits import LIMITS_TOLD
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..config.model import Study
+    from ..kinds.shapes.expand import ShapeScene
+    from ..output.dataset import Label
+
+OF_SHAPES = "/shapes"
+"""Group of the scenes of shapes."""
+
+COMPARED = {
+    SCENES: ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement"),
+    OF_SHAPES: ("value", "error", "reference_value"),
+}
+"""Numbers of a scene that are made again, by group; one of each quantity where a scene has many."""
+
+SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
+"""Relative differences that are none: with the versions of the software that the dataset was made with, and with
+others, whose factors round differently; equilibria are solved to 1e-10 of the load."""
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file of results is what was written."""
+    try:
+        store.contents(path)
+    except DamagedError:
+        return False
+    return True
+
+
+SEALS: dict[str, Callable[[Path], bool]] = {
+    ".h5": _is_whole,
+    ".json": lambda path: checked_json.read(path) is not None,
+}
+"""Whether a file is as it was written, by the checksum in it; by the file's ending."""
+
+
+@dataclass(frozen=True)
+class Again:
+    """A scene that was made again.
+
+    Attributes
+    ----------
+    labels : str
+        Of the scene.
+    before, after : str
+        Its status in the dataset, and now.
+    difference : float
+        Largest relative difference of its numbers [1].
+    limit : float
+        Largest one that is none [1].
+    """
+
+    labels: str
+    before: str
+    after: str
+    difference: float
+    limit: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it is what the dataset says."""
+        return self.before == self.after and self.difference <= self.limit
+
+
+@dataclass(frozen=True)
+class Files:
+    """What the files of a study are.
+
+    Attributes
+    ----------
+    compared : int
+        Files that were compared with their checksums.
+    faults : tuple of tuple of str
+        Names of jobs, each with a file that is not as the job made it, or that it has not been done.
+    stale : tuple of str
+        Names of jobs that were done, and of which something else is asked for now: the study or the program changed.
+    """
+
+    compared: int
+    faults: tuple[tuple[str, str], ...]
+    stale: tuple[str, ...]
+
+
+def files(study: "Study", folder: Path) -> Files:
+    """Compare all files of a study with their checksums.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where its results are.
+
+    Returns
+    -------
+    Files
+    """
+    jobs, stale = rerun.jobs(study, plan(study, folder, 1)), []
+    notes = [*sorted((folder / TASKS).glob("*_*.json")), *folder.glob(BUNDLES_FILE)]
+    faults = [(path.stem, f"{path}{records.DAMAGED}") for path in notes if not SEALS[".json"](path)]
+    compared = {*map(str, notes)}
+    recorded = {name: job.record for name, job in jobs.items()}
+    if any(name == Path(BUNDLES_FILE).stem for name, _ in faults):  # jobs are planned that are not those of before
+        recorded |= {path.stem: path for path in sorted((folder / RECORDS).glob("*.json"))}
+    for name, path in recorded.items():
+        job, record = jobs.get(name), checked_json.read(path, digest=str, products=dict)
+        compared |= {str(path)} if path.exists() else set()
+        if record:
+            own = list(records.faults(path, record["digest"], record["products"], wholly=True))
+            compared |= {made for made, known in record["products"].items() if known and Path(made).exists()}
+        else:  # files that have a checksum of their own are compared with that
+            own = [records.fault(path, "", ())]
+            sealing = [one for one in map(Path, job.products if job else ()) if one.suffix in SEALS and one.exists()]
+            own += [f"{one}{records.DAMAGED}" for one in sealing if not SEALS[one.suffix](one)]
+            compared |= {*map(str, sealing)}
+        faults += [(name, why) for why in own]
+        if job and not own and rerun.fault(job, jobs):
+            stale.append(name)
+    return Files(len(compared), tuple(faults), tuple(stale))
+
+
+def set_aside(found: Files) -> list[Path]:
+    """Give damaged files another name, so that the next run makes them again.
+
+    Parameters
+    ----------
+    found : Files
+
+    Returns
+    -------
+    list of Path
+        Their names before.
+    """
+    whys = dict.fromkeys(why for _, why in found.faults if why.endswith(records.DAMAGED))
+    paths = [Path(why.removesuffix(records.DAMAGED)) for why in whys]
+    for path in paths:
+        rename(path)
+    return paths
+
+
+def left(folder: Path) -> list[Path]:
+    """Files that were set aside, and those that a process which was killed was writing."""
+    return sorted(path for path in folder.rglob("*") if path.name.endswith((ASIDE, atomic.UNFINISHED)))
+
+
+def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]:
+    """Make scenes again that are drawn from a dataset, by its own config.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``dataset.nc``.
+    beside : Path
+        Folder that files named in the config are seen from.
+    number : int
+        Of scenes; all of them where there are fewer.
+    seed : int
+        Of the drawing.
+
+    Yields
+    ------
+    Again
+
+    Raises
+    ------
+    ValueError, OSError
+        If there is no dataset.
+    StudyError
+        If its config cannot be read any more, such as where a file that it names is gone.
+    """
+    with reading.open(folder) as tree, tempfile.TemporaryDirectory() as temporary:
+        before = {name: tree[name].to_dataset().load() for name in COMPARED if name == SCENES or name in tree.groups}
+        root = before[SCENES]
+        config = Path(temporary) / f"{root.attrs['study']}.yaml"
+        atomic.write_text(config, root.attrs["config"])
+        study = load_study(config, beside)
+        # What was lost to limits would take as much again.
+        held = [
+            (name, scene)
+            for name, scenes in _scenes(study).items()
+            for scene, labels in scenes.items()
+            if LIMITS_TOLD not in str(before[name].message.sel(labels).item())
+        ]
+        drawn = set(random.Random(seed).sample(held, min(number, len(held))))
+        part = _part(study, {scene for _, scene in drawn})
+        made = _made(part, Path(temporary) / "results" / study.name)
+    software = json.loads(root.attrs["software"])
+    same = all(installed(name) == version for name, version in software.items() if name != "python")
+    for name, scenes in _scenes(part).items():
+        for scene, labels in scenes.items():
+            called = study.name_of(scene) if isinstance(scene, SceneSpec) else scene.name
+            limit = SAME_SOFTWARE if same else OTHER_SOFTWARE
+            yield _compared(called, labels, before[name], made[name], COMPARED[name], limit)
+
+
+def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]]":
+    """Scenes of a study with the cells that are theirs, by group of its dataset."""
+    shapes = study.parts["shapes"]
+    found: dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]] = {
+        SCENES: {scene: study.labels(scene) for scene in study.scenes},
+        OF_SHAPES: {scene: asdict(scene) for scene in (shapes.scenes if shapes else ())},
+    }
+    return {name: scenes for name, scenes in found.items() if scenes}
+
+
+def _part(study: "Study", chosen: "set[SceneSpec | ShapeScene]") -> "Study":
+    """A study of a few scenes of another one, and of what these need."""
+    found = of_shape_scenes(of_scenes(replace(study, further_references=(), printed=()), chosen), chosen)
+    kept = {name: found.parts[name] for name in ("scenes", "shapes")}
+    return replace(found, parts=dict.fromkeys(study.parts, ()) | kept)
+
+
+def _made(study: "Study", folder: Path) -> "dict[str, xr.Dataset]":
+    """Groups of the dataset of a study that have scenes, made in this process."""
+    for job in plan(study, folder, 1).jobs.values():
+        spent = Spent()
+        imported(job.stage.module).run(job.content, spent)
+        if spent.broken:
+            raise spent.broken[0]
+    found: dict[str, xr.Dataset] = {}
+    for kind in kinds():
+        if kind.name in ("scenes", "shapes") and study.parts[kind.name]:
+            found |= kind.module("collect").groups(study, folder)
+    return found
+
+
+def _compared(
+    name: str,
+    labels: "dict[str, Label]",
+    before: "xr.Dataset",
+    after: "xr.Dataset",
+    numbers: tuple[str, ...],
+    limit: float,
+) -> Again:
+    cells = [data.sel({name: label for name, label in labels.items() if name in data.dims}) for data in (before, after)]
+    differences = [0.0]
+    for number in numbers:
+        for old, new in zip(*(np.ravel(cell[number]).tolist() for cell in cells), strict=True):
+            if np.isnan(old) != np.isnan(new):
+                differences.append(np.inf)
+            elif old != new and not np.isnan(old):
+                # An error that is small is a difference of large numbers.
+                size = 1.0 if number.endswith("error") else max(abs(old), abs(new))
+                differences.append(abs(new - old) / size)
+    old_status, new_status = (str(Status(int(cell.status))) for cell in cells)
+    return Again(name, old_status, new_status, max(differences), limit)

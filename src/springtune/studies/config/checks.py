@@ -1,0 +1,345 @@
+"""Whether the values of a study go together."""
+
+import math
+import os
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MOST_MESHED
+from springtune.problem.loads import LOADS
+from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
+from springtune.problem.quantities import nearest
+from springtune.springs import DEFINITIONS
+from springtune.springs.lattice import COEFFICIENT
+
+from .combinations import SAME_VALUE, check_groups, count, values_of
+from .messages import Key, Problems
+from .model import Grid, MeshSpec, Reference, SceneSpec
+from .sections import GRID_PARAMETERS, PLAUSIBLE, StatedStiffness, StudyConfig
+
+MOST_CELLS = 2_500_000
+"""Most cells of a dataset: combinations of labels of all its dimensions, whether or not a grid asks for them."""
+
+MOST_CURVE_POINTS = 10_000_000
+"""Most points of all sensitivity curves in a dataset."""
+
+FEWER = "give shorter lists, or split the study into several"
+"""Remedy where a study asks for too much."""
+
+MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
+"""Remedy where it is as large as it is meant to be."""
+
+
+def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str]) -> None:
+    """A name that refers to what the study declares."""
+    if name not in names:
+        problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
+
+
+def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
+    """A material of beams: one that the study declares, and isotropic."""
+    check_known(problems, path, "material", name, config.materials)
+    given = config.materials[name] if name in config.materials else None
+    if given and given.young_modulus is None and given.uniaxial_test is None:
+        problems.add(
+            path,
+            f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are; put the sheet "
+            "under 'shapes', whose references take any material",
+        )
+
+
+def check_names(config: StudyConfig, problems: Problems) -> None:
+    """Names that refer to what the study declares, and pairs of numbers."""
+    mesh_types = mesh_type_names(config)
+    for name, rows in (config.mesh_files or {}).items():
+        if name in MESH_TYPES:
+            problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
+        for number, one in enumerate(rows):
+            check_known(problems, ("mesh_files", name, number, "beam"), "beam", one.beam, config.beams)
+    for name, grid in config.grids.items():
+        for mesh_type in grid.mesh_type:
+            if mesh_type not in mesh_types:
+                message = f"unknown mesh type '{mesh_type}'; {nearest(mesh_type, mesh_types)}"
+                problems.add(("grids", name, "mesh_type"), f"{message}; or declare it under mesh_files")
+        for beam in grid.beam:
+            check_known(problems, ("grids", name, "beam"), "beam", beam, config.beams)
+        for material in grid.material:
+            check_beam_material(problems, ("grids", name, "material"), material, config)
+        for beam in grid.force or ():
+            if beam is not None:
+                check_known(problems, ("grids", name, "force", beam), "beam", beam, config.beams)
+        if grid.force and None not in grid.force:
+            for beam in grid.beam:
+                if beam not in grid.force:
+                    problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
+    calibrated, paper = config.definitions.calibrated, config.definitions.paper
+    if calibrated:
+        check_known(problems, ("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
+    seen = set()
+    for number, row in enumerate(paper.stiffness if paper else ()):
+        path = ("definitions", "paper", "stiffness", number)
+        check_known(problems, (*path, "material"), "material", row.material, config.materials)
+        if row.mesh_type not in mesh_types:
+            problems.add(
+                (*path, "mesh_type"), f"unknown mesh type '{row.mesh_type}'; {nearest(row.mesh_type, mesh_types)}"
+            )
+        if (row.mesh_type, row.material) in seen:
+            problems.add(path, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
+        seen.add((row.mesh_type, row.material))
+    if not config.sensitivity.start < config.sensitivity.stop:
+        start, stop = config.sensitivity.start, config.sensitivity.stop
+        problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
+
+
+def most_scenes() -> int:
+    """Most scenes of a study.
+
+    Raises
+    ------
+    ValueError
+        If the environment gives something else than a whole number above zero.
+    """
+    text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
+    try:
+        found = int(float(text))
+    except (ValueError, OverflowError):
+        found = 0
+    if found < 1:
+        raise ValueError(
+            f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; give one such as 2000000, or none"
+        )
+    return found
+
+
+def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problems) -> None:
+    """How many scenes grids have, before they are expanded, and whether what goes together has as many values."""
+    for name, grid in config.grids.items():
+        check_groups(name, grid, content["grids"][name], problems)
+    problems.stop()
+    try:
+        most = most_scenes()
+    except ValueError as error:
+        problems.add((), str(error))
+        problems.stop()
+    before = 0
+    for name, grid in config.grids.items():
+        number, lengths = count(grid)
+        if before + number > most:
+            shown = " x ".join(f"{size} {label}" for label, size in lengths.items() if size > 1)
+            beside = f" beside {before} of the grids above" if before else ""
+            problems.add(
+                ("grids", name),
+                f"{_counted(number)} scenes ({shown}){beside}; a study has at most {most}: {FEWER}, {MORE_SCENES}",
+            )
+            return
+        before += number
+    _check_labels(config, problems)
+
+
+def _check_labels(config: StudyConfig, problems: Problems) -> None:
+    """How large the dataset becomes, as far as lists tell before they are expanded."""
+    if not config.grids or any(grid.exclude for grid in config.grids.values()):
+        return  # exclusions may leave labels out
+    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in LABELLED}
+    check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
+
+
+LABELLED = tuple(name for name in GRID_PARAMETERS if name != "pressure")
+"""Parameters of grids that are dimensions, or may be."""
+
+
+def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
+    """How much a section asks for, before it is expanded: the product of its lists."""
+    lists = {label: len(getattr(section, label)) for label in labels}
+    count = math.prod(lists.values())
+    if count > most:
+        shown = " x ".join(f"{size} {label}" for label, size in lists.items() if size > 1)
+        problems.add(path, f"{_counted(count)} combinations ({shown}); a study has at most {most}: {FEWER}")
+
+
+def check_particles(
+    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
+) -> None:
+    """Mesh sizes against the box that they are for: no mesh of an absurd number of particles."""
+    size = min(sizes)
+    particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
+    if particles > MOST_MESHED:
+        least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED):.2g} mm"
+        problems.add(path, f"{1e3 * size:g} mm gives {particles:.0e} particles; give {least} or more")
+
+
+def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
+    """How large the dataset becomes: each combination of labels has a cell, whichever grid has which label."""
+    shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
+    cells = math.prod(map(len, lists.values()))
+    if cells > MOST_CELLS:
+        most = f"a dataset has at most {MOST_CELLS}"
+        problems.add(
+            ("grids",),
+            f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}; parameters that change "
+            "together are better drawn under 'samples'",
+        )
+    if not cells:
+        return  # a study of study kinds alone
+    once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))
+    points = once * config.sensitivity.points
+    if curves and points > MOST_CURVE_POINTS:
+        of = f"{config.sensitivity.points} on each of {once} curves"
+        most = f"give at most {MOST_CURVE_POINTS}, or set sensitivity: false in grids that need no curves"
+        problems.add(("sensitivity", "points"), f"{_counted(points)} points, {of}; {most}")
+
+
+def check_numbers(lists: dict[str, set[Any]], problems: Problems) -> None:
+    """Numbers that are labels must differ by more than what they are found by."""
+    for name, values in lists.items():
+        numbers = sorted(value for value in values if isinstance(value, float))
+        for one, other in zip(numbers, numbers[1:]):
+            if other - one <= SAME_VALUE * other:
+                problems.add(("grids",), f"{name} has {one!r} and {other!r}, which are one label; write them alike")
+
+
+def _counted(count: int) -> str:
+    return str(count) if count < 1e7 else f"{count:.3g}"
+
+
+def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:
+    """Definitions that derive a stiffness on triangles from mesh and material alone."""
+    able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+    for name in names:
+        if name not in able:
+            message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
+            problems.add(path, f"{message}; choose of {', '.join(able)}")
+
+
+def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
+    """What moves has a density; materials that are not declared are another problem."""
+    if name in config.materials and config.materials[name].density is None:
+        problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
+
+
+def mesh_type_names(config: StudyConfig) -> list[str]:
+    """Names of all mesh types, made ones first."""
+    return [*MESH_TYPES, *(config.mesh_files or ())]
+
+
+def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[Grid], problems: Problems) -> None:
+    """Mesh sizes against the beams they are for."""
+    for expanded in grids:
+        name, grid = expanded.name, config.grids[expanded.name]
+        made = {(scene.mesh.mesh_size, scene.mesh.beam.name) for scene in expanded.scenes if scene.mesh.file is None}
+        written = content["grids"][name]["mesh_size"]
+        for number, size in enumerate(grid.mesh_size):
+            listed = isinstance(written, list)
+            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else _in_mm(size)
+            path = ("grids", name, "mesh_size", number) if listed else ("grids", name, "mesh_size")
+            for beam in dict.fromkeys(grid.beam):
+                if (size, beam) not in made:
+                    continue
+                length, height = config.beams[beam].length, config.beams[beam].height
+                if size > min(length, height):
+                    side = _in_mm(min(length, height))
+                    problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
+                elif length * height / (COEFFICIENT * size**2) > MOST_MESHED:
+                    particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
+                    least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED):.2g} mm"
+                    problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
+
+
+def _in_mm(length: float) -> str:
+    return f"{1e3 * length:g} mm"
+
+
+def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
+    """Definitions against the cells and loads of the grids that use them."""
+    for grid in grids:
+        found: dict[str, None] = {}
+        for name, mesh_type, on in dict.fromkeys((one.definition, one.mesh.mesh_type, one.load) for one in grid.scenes):
+            definition = DEFINITIONS[name]
+            made = MESH_TYPES.get(mesh_type)
+            if made and made.corners not in definition.cells:
+                needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
+                found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
+            if definition.uniaxial and not LOADS[on].kind.uniaxial:
+                kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
+                found[f"'{definition.name}' is for {kinds} and load '{on}' is neither; {SEPARATE}"] = None
+        for message in found:
+            problems.add(("grids", grid.name, "definition"), message)
+
+
+SEPARATE = "give them grids of their own"
+"""Remedy where two values of a grid do not go together."""
+
+
+def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Sequence[Grid], problems: Problems) -> None:
+    """Parameters of the definitions against what the grids need of them."""
+    _check_kinds(grids, problems)
+    stated = {(row.mesh_type, row.material): row.value for row in stated_rows(config)}
+    sheets: dict[tuple[str, str], dict[tuple[float, float], None]] = {}  # thickness and Young's modulus
+    for grid in grids:
+        lacking = set()
+        for scene in grid.scenes:
+            pair = (scene.mesh.mesh_type, scene.material.name)
+            if scene.definition == "paper":
+                sheets.setdefault(pair, {})[scene.mesh.beam.thickness, scene.material.young_modulus] = None
+                if pair not in stated and pair not in lacking:
+                    lacking.add(pair)
+                    example = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
+                    problems.add(
+                        ("grids", grid.name, "definition"),
+                        f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; "
+                        f"add {example} to definitions.paper.stiffness",
+                    )
+        if not config.definitions.calibrated and any(scene.definition == "calibrated" for scene in grid.scenes):
+            problems.add(
+                ("grids", grid.name, "definition"),
+                "'calibrated' needs to know on what; add definitions.calibrated with a beam and a load",
+            )
+    for number, row in enumerate(stated_rows(config)):
+        modulus = config.materials[row.material].young_modulus
+        if modulus is None:
+            continue  # there is no E t to judge it by
+        every = {(beam.thickness, modulus): None for beam in config.beams.values()}
+        for thickness, modulus in sheets.get((row.mesh_type, row.material), every):
+            expected = COEFFICIENT * modulus * thickness
+            if not expected / PLAUSIBLE <= row.value <= expected * PLAUSIBLE:
+                written = content["definitions"]["paper"]["stiffness"][number]["value"]
+                other = "" if modulus == config.materials[row.material].young_modulus else f" and of {modulus:.4g} Pa"
+                problems.add(
+                    ("definitions", "paper", "stiffness", number, "value"),
+                    f"'{written}' cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick"
+                    f"{other}, is {expected:.4g} N/m; give a stiffness near that, in N/m",
+                )
+                break
+
+
+def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
+    """Rows of stated stiffnesses; none where the study states none."""
+    return config.definitions.paper.stiffness if config.definitions.paper else []
+
+
+def check_files(
+    meshes: Iterable[MeshSpec], scenes: Iterable[SceneSpec], references: Iterable[Reference], problems: Problems
+) -> None:
+    """Different things must not share a name: names become files."""
+    parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
+    pairs = {(reference.beam.name, reference.material.name) for reference in references}
+    flat = {
+        replace(mesh, beam=replace(mesh.beam, thickness=min(mesh.beam.length, mesh.beam.height))) for mesh in meshes
+    }
+    sizes = {mesh.mesh_size for mesh in meshes}
+    boxes = {(mesh.beam.length, mesh.beam.height) for mesh in meshes}
+    extents = [f"{1e3 * length:g} x {1e3 * height:g} mm" for length, height in boxes]
+    for path, what, names, remedy in (
+        (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
+        (("beams",), "extents of beams", extents, "give these beams the same, names keep six digits"),
+        (("beams",), "meshes", [mesh.name for mesh in flat], "rename a beam"),
+        (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
+        (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
+    ):
+        for name, number in Counter(name.casefold() for name in names).most_common(1):
+            if number > 1:
+                problems.add(path, f"{number} different {what} are all named '{name}'; {remedy}")
+                return

@@ -1,0 +1,424 @@
+"""From the sections of a study to all that they ask for."""
+
+import os
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from springtune.mesh import MESH_TYPES
+from springtune.mesh.formats import LARGEST_FILE
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import KINEMATICS, LOADS
+from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
+from springtune.problem.parameters import SWEPT
+from springtune.springs import DEFINITIONS
+from springtune.springs.lattice import COEFFICIENT
+
+from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
+from .combinations import Combination, combinations
+from .fields import RANGE_DIGITS
+from .messages import Problems, clipped
+from .model import (
+    FURTHER_REFERENCES,
+    CurveSpec,
+    Grid,
+    MeshFiles,
+    MeshSpec,
+    Reference,
+    SceneSpec,
+    Study,
+    StudyKind,
+    swept_value,
+)
+from .printed import read_printed
+from .sections import StudyConfig
+
+Ranks = dict[str, dict[str, int]]
+"""Place of each label in the order of its dimension."""
+
+Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
+
+
+def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> MeshFiles:
+    """Meshes from files by (mesh type, beam's name, mesh size)."""
+    found: MeshFiles = {}
+    beams = declared(config, folder).beams
+    for name, rows in (config.mesh_files or {}).items():
+        for number, row in enumerate(rows):
+            path, label = folder / row.file, (name, row.beam, row.mesh_size)
+            where = ("mesh_files", name, number)
+            fault = file_fault(path)
+            if fault:
+                problems.add((*where, "file"), f"'{path}' {fault}")
+            if label in found:
+                problems.add(where, f"a second file for beam '{row.beam}' at this mesh size; remove one")
+            found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
+    problems.stop()
+    return found
+
+
+def files_of_tests(config: StudyConfig, folder: Path, problems: Problems) -> tuple[Path, ...]:
+    """Files of tests that materials are fitted to or compared with, each read once to see what is wrong with it."""
+    found: list[Path] = []
+    for name, material in config.materials.items():
+        own = [getattr(material, key) for key in ("uniaxial_test", "equibiaxial_test", "pure_shear_test")]
+        if not material.uniaxial_test:
+            continue
+        try:
+            material.material(name, folder)
+        except ValueError as error:
+            problems.add(("materials", name), str(error))
+        found += [folder / file for file in own if file is not None]
+    problems.stop()
+    return tuple(found)
+
+
+def file_fault(path: Path) -> str:
+    """Why a mesh file cannot be what is meant, and the remedy; empty where it may be. Its content is not looked at."""
+    try:
+        if path.is_file():
+            if path.stat().st_size > LARGEST_FILE:
+                return f"is larger than {LARGEST_FILE // 1_000_000} MB, the most that is read; write a coarser mesh"
+            return "" if os.access(path, os.R_OK) else "may not be read; change its permissions"
+    except (OSError, ValueError):  # a name that no file can have
+        pass
+    return "is not a file; give its path relative to the study's folder"
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Bodies and materials that a study declares, by name.
+
+    Attributes
+    ----------
+    beams : dict of str to Beam
+    materials : dict of str to Material or AnisotropicMaterial
+    folder : Path
+        Folder that the names of the study's files are seen from.
+    """
+
+    beams: dict[str, Beam]
+    materials: dict[str, AnyMaterial]
+    folder: Path = Path()
+
+
+def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
+    """What a study declares.
+
+    Parameters
+    ----------
+    config : StudyConfig
+    folder : Path, optional
+        As of `Declared`.
+
+    Returns
+    -------
+    Declared
+    """
+    return Declared(
+        {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
+        {name: material.material(name, folder) for name, material in config.materials.items()},
+        folder,
+    )
+
+
+def _ranks(config: StudyConfig) -> Ranks:
+    """Place of each label in the order of its dimension."""
+    names: dict[str, Iterable[str]] = {
+        "beam": config.beams,
+        "mesh_type": mesh_type_names(config),
+        "material": config.materials,
+        "load": LOADS,
+        "definition": DEFINITIONS,
+        "kinematics": KINEMATICS,
+    }
+    return {dimension: {name: rank for rank, name in enumerate(labels)} for dimension, labels in names.items()}
+
+
+def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Reference], tuple[float, ...]]:
+    """Sort key of meshes, scenes, curves and references."""
+    beams, mesh_types, materials, loads = (ranks[name] for name in ("beam", "mesh_type", "material", "load"))
+    definitions, kinematics = ranks["definition"], ranks["kinematics"]
+
+    def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> tuple[float, ...]:
+        if isinstance(item, SceneSpec | CurveSpec):
+            mesh, material = item.mesh, item.material
+            beam = mesh.beam
+            place = beams[beam.name], mesh_types[mesh.mesh_type], mesh.mesh_size
+            own = materials[material.name], loads[item.load]
+            law = kinematics[item.kinematics], abs(item.force), beam.thickness
+            moduli = material.young_modulus, material.poisson_ratio
+            if isinstance(item, CurveSpec):
+                return (*place, *own, *law, *moduli, 0.0)
+            return (*place, *own, definitions[item.definition], *law, *moduli, item.stiffness_scale)
+        if isinstance(item, MeshSpec):
+            return beams[item.beam.name], mesh_types[item.mesh_type], item.mesh_size, item.beam.thickness
+        material = item.material
+        own = materials[material.name], loads[item.load]
+        moduli = material.young_modulus, material.poisson_ratio
+        return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
+
+    return key
+
+
+def swept(config: StudyConfig) -> tuple[str, ...]:
+    """Parameters that are dimensions: those that a grid gives values of its own, and a force that has several.
+
+    Parameters
+    ----------
+    config : StudyConfig
+
+    Returns
+    -------
+    tuple of str
+        Of `SWEPT`.
+    """
+    found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
+    several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
+    several += [grid.pressure for grid in config.grids.values() if grid.pressure]
+    if any(len(set(values)) > 1 for values in several):
+        found.add("force")
+    return tuple(name for name in SWEPT if name in found)
+
+
+class _Bodies:
+    """Beams, materials and meshes of a study's combinations, each made once."""
+
+    def __init__(self, config: StudyConfig, mesh_files: MeshFiles, folder: Path) -> None:
+        self._declared, self._files = declared(config, folder), mesh_files
+        self._beams: dict[tuple[str, float | None], Beam] = {}
+        self._materials: dict[tuple[str, float | None, float | None], Material] = {}
+        self._meshes: dict[tuple[Beam, str, float], MeshSpec | None] = {}
+
+    def beam(self, one: Combination) -> Beam:
+        """Beam of a combination, its thickness the combination's where that has one."""
+        name, thickness = key = one["beam"], one.get("thickness")
+        if key not in self._beams:
+            beam = self._declared.beams[name]
+            self._beams[key] = beam if thickness is None else replace(beam, thickness=thickness)
+        return self._beams[key]
+
+    def material(self, one: Combination) -> Material:
+        """Material of a combination, with the moduli that it has of its own."""
+        key = one["material"], one.get("young_modulus"), one.get("poisson_ratio")
+        if key not in self._materials:
+            own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
+            material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
+            # Moduli of rubber are those of its law: who asks for others is told so.
+            self._materials[key] = material if isinstance(material, Rubber) else replace(material, **own)
+        return self._materials[key]
+
+    def mesh(self, beam: Beam, one: Combination) -> MeshSpec | None:
+        """Mesh of a combination; None where there is no file for it."""
+        mesh_type, size = one["mesh_type"], one["mesh_size"]
+        key = beam, mesh_type, size
+        if key not in self._meshes:
+            made = mesh_type in MESH_TYPES
+            found = MeshSpec(*key) if made else self._files.get((mesh_type, beam.name, size))
+            # A file is of a beam's extent; its thickness is the combination's.
+            self._meshes[key] = found if found is None or found.beam == beam else replace(found, beam=beam)
+        return self._meshes[key]
+
+
+def _force(pressure: float, beam: Beam) -> float:
+    """Force of a pressure on the upper side [N], rounded as a label that other pressures and thicknesses may share."""
+    return float(f"{pressure * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
+
+
+def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
+    """Grids with their scenes and curves."""
+    bodies, several = _Bodies(config, mesh_files, problems.folder), "force" in swept(config)
+    forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
+    grids = []
+    for name, grid in config.grids.items():
+        scenes: list[SceneSpec] = []
+        curves: dict[CurveSpec, None] = {}
+        absent = set()
+        signs = {load: (LOADS[load].sign, LOADS[load].follower) for load in grid.load}
+        for one in combinations(name, grid, problems):
+            beam, material, load = bodies.beam(one), bodies.material(one), one["load"]
+            if isinstance(material, Rubber):
+                for key in ("young_modulus", "poisson_ratio"):
+                    if key in one:
+                        problems.add(
+                            ("grids", name, key),
+                            f"material '{material.name}' has a uniaxial_test, which says its moduli; take it out of "
+                            "this grid, or remove the key",
+                        )
+            magnitude = _force(one["pressure"], beam) if "pressure" in one else one["force"]
+            if not several:
+                other, other_grid = forces.setdefault((beam, material, load), (magnitude, name))
+                if other != magnitude:
+                    problems.add(
+                        ("grids", name, "force"),
+                        f"{magnitude:g} N on beam '{beam.name}' of {material.name} in {load}, but grid '{other_grid}' "
+                        f"has {other:g} N; give both the same force, or both forces in a list: force is a dimension "
+                        "then",
+                    )
+            mesh = bodies.mesh(beam, one)
+            if mesh is None:
+                absent.add((one["mesh_type"], beam.name, f"{1e3 * one['mesh_size']:g} mm"))
+                continue
+            sign, follows = signs[load]
+            common = (mesh, material, load, sign * magnitude)
+            scenes.append(SceneSpec(*common, one["definition"], one["kinematics"], one.get("stiffness_scale", 1.0)))
+            if grid.sensitivity and not follows:  # k enters as F/k only where forces stay
+                curves[CurveSpec(*common, one["kinematics"])] = None
+        for mesh_type, beam_name, length in sorted(absent):
+            row = f"{{file: <path>, beam: {beam_name}, mesh_size: {length}}}"
+            problems.add(("grids", name, "mesh_size"), f"no file for {length}; add {row} to mesh_files.{mesh_type}")
+        if not scenes and not absent:
+            problems.add(("grids", name, "exclude"), "leaves nothing of the grid; exclude less, or remove the grid")
+        grids.append(Grid(name, tuple(scenes), tuple(curves)))
+    problems.stop()
+    return tuple(grids)
+
+
+def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Problems) -> list[CurveSpec]:
+    """Curves that calibrate the scenes of the definition ``calibrated``."""
+    calibration = config.definitions.calibrated
+    if not calibration:
+        return []
+    cells = {
+        (scene.mesh, scene.material, scene.load, scene.force): None
+        for scene in scenes
+        if (scene.mesh.beam.name, scene.load) == (calibration.beam, calibration.load)
+    }
+    needed = {
+        (scene.mesh.mesh_type, scene.material, scene.kinematics): None
+        for scene in scenes
+        if scene.definition == "calibrated"
+    }
+    groups: dict[tuple[str, Material], list[tuple[MeshSpec, Material, str, float]]] = {}
+    for cell in cells:
+        groups.setdefault((cell[0].mesh_type, cell[1]), []).append(cell)
+    for (mesh_type, material), members in groups.items():
+        for what, unit, values in (
+            ("forces", "N", {abs(force) for _, _, _, force in members}),
+            ("thicknesses", "mm", {1e3 * mesh.beam.thickness for mesh, _, _, _ in members}),
+        ):
+            if len(values) > 1 and any((mesh_type, material) == one[:2] for one in needed):
+                listed = ", ".join(f"{value:g} {unit}" for value in sorted(values))
+                problems.add(
+                    ("definitions", "calibrated"),
+                    f"beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name} has "
+                    f"{len(values)} {what} ({clipped(listed)}), and one stiffness is calibrated; give it one value, "
+                    "or calibrate on a beam or load that is not swept",
+                )
+    curves: list[CurveSpec] = []
+    for mesh_type, material, kinematics in needed:
+        found = [CurveSpec(*cell, kinematics) for cell in groups.get((mesh_type, material), ())]
+        if not found:
+            problems.add(
+                ("definitions", "calibrated"),
+                f"no grid has beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name}"
+                ", but scenes there are 'calibrated'; add it to a grid, or calibrate on another beam or load",
+            )
+        curves += found
+    return curves
+
+
+def build(
+    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[StudyKind], problems: Problems, about: dict[str, Any]
+) -> Study:
+    """Study of a config and its grids, with the parts of all study kinds."""
+    ranks = _ranks(config)
+    order = _order(ranks)
+
+    def in_order(items: Iterable[Item]) -> tuple[Item, ...]:
+        return tuple(sorted(dict.fromkeys(items), key=order))
+
+    scenes = in_order(scene for grid in grids for scene in grid.scenes)
+    curves = [curve for grid in grids for curve in grid.curves] + _calibrating(config, scenes, problems)
+    meshes = in_order(scene.mesh for scene in scenes)
+    references = in_order(Reference(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes)
+    check_files(meshes, scenes, references, problems)
+    problems.stop()
+    names = swept(config)
+    used = _used(meshes, scenes, references, names)
+    check_numbers(used, problems)
+    check_cells(config, used, bool(curves), problems)
+    problems.stop()
+    bodies = declared(config, problems.folder)
+    parts = {kind.name: kind.expand(config, bodies) for kind in kinds}
+    if config.printed and names:
+        problems.add(
+            ("printed",),
+            f"printed cells know no {' or '.join(names)}, which grids sweep; give the sweep a study of its own, or "
+            "remove the key",
+        )
+        problems.stop()
+    made = [output.name for kind in kinds for output in kind.outputs]
+    first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
+    steps = [first + (last - first) * step / (points - 1) for step in range(points)]
+    calibrated = config.definitions.calibrated
+    study = Study(
+        title=config.title,
+        meshes=meshes,
+        scenes=scenes,
+        curves=in_order(curves),
+        references=references,
+        outputs=tuple(name for name in made if name in config.outputs),
+        further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
+        materials=bodies.materials,
+        parts=parts,
+        limits={"seconds": config.limits.seconds, "memory": config.limits.memory},
+        grids=grids,
+        stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
+        stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},
+        calibration=(calibrated.beam, calibrated.load) if calibrated else None,
+        printed=read_printed(about["printed_path"], mesh_type_names(config), problems) if about["printed_path"] else (),
+        axes=_axes(ranks, used, names, [kind.axes(parts[kind.name]) for kind in kinds if parts[kind.name]]),
+        swept=names,
+        **about,
+    )
+    for output in (output for kind in kinds for output in kind.outputs if output.name in study.outputs):
+        lack = output.lack(study)
+        if lack:
+            problems.add(("outputs",), f"'{output.name}' {lack}")
+    problems.stop()
+    return study
+
+
+def _used(
+    meshes: Iterable[MeshSpec], scenes: Sequence[SceneSpec], references: Sequence[Reference], names: Iterable[str]
+) -> dict[str, set[Any]]:
+    """Labels of each dimension that scenes have."""
+    used: dict[str, set[Any]] = {
+        "beam": {mesh.beam.name for mesh in meshes},
+        "mesh_type": {mesh.mesh_type for mesh in meshes},
+        "mesh_size": {mesh.mesh_size for mesh in meshes},
+        "material": {one.material.name for one in references},
+        "load": {one.load for one in references},
+        "definition": {scene.definition for scene in scenes},
+        "kinematics": {scene.kinematics for scene in scenes},
+    }
+    for name in names:
+        if name == "stiffness_scale":
+            used[name] = {scene.stiffness_scale for scene in scenes}
+        else:
+            used[name] = {swept_value(one, one.beam, name) for one in references}
+    return used
+
+
+def _axes(
+    ranks: Ranks,
+    used: dict[str, set[Any]],
+    names: Iterable[str],
+    further: Iterable[Mapping[str, Collection[str | float]]],
+) -> dict[str, tuple[str | float, ...]]:
+    """Labels of each dimension; groups of a dataset share those that its root has."""
+    used, own = dict(used), {}
+    # A study kind may have labels that no beam has, such as loads of its own.
+    order: dict[str, dict[str | float, None]] = {name: dict.fromkeys(labels) for name, labels in ranks.items()}
+    for labels in further:
+        for name, values in labels.items():
+            if name in used:
+                used[name] = used[name] | set(values)
+                if name in order:
+                    order[name] |= dict.fromkeys(values)
+            else:
+                own[name] = values
+    axes = {name: tuple(label for label in labels if label in used[name]) for name, labels in order.items()}
+    return axes | {name: tuple(sorted(used[name])) for name in ("mesh_size", *names)} | own

@@ -1,0 +1,175 @@
+"""What is wrong with a file: messages that name file, line, key, value and remedy."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from pydantic_core import PydanticCustomError
+
+from springtune.safe_io.escapes import UNSEEN, shown
+
+Key = str | int
+"""A step of a path into a file: a key of a mapping, a number in a list."""
+
+LONGEST_SHOWN = 60
+"""Most characters of a value that a message shows."""
+
+SHOWN_PROBLEMS = 5
+"""Problems that one message lists; it counts the others."""
+
+
+class StudyError(ValueError):
+    r"""A study that cannot be run; the message names file, line, key, value and remedy.
+
+    Parameters
+    ----------
+    *lines : str
+        Lines of the message; control characters in them are shown as ``\x1b``.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> try:
+    ...     st.load_study("config/papers.yaml")
+    ... except st.StudyError as error:
+    ...     print(error)
+    config/papers.yaml: cannot be read: No such file or directory; give the path of a study such as config/paper.yaml
+    """
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__(*map(shown, lines))
+
+    def __str__(self) -> str:
+        return "\n".join(self.args)
+
+
+class Problems:
+    """Collects what is wrong with a file and raises it as one `StudyError`.
+
+    Parameters
+    ----------
+    file : str
+        The file as its user named it.
+    lines : dict of tuple to int, optional
+        Line of each path of keys.
+    folder : Path, optional
+        Folder that the names of its files are seen from.
+
+    Examples
+    --------
+    >>> problems = Problems("study.yaml", {("beams",): 3})
+    >>> problems.add(("beams", "small"), "no length; give one such as '200 mm'")
+    >>> problems.stop()
+    Traceback (most recent call last):
+    ...
+    springtune.studies.config.messages.StudyError: study.yaml:3: beams.small: no length; give one such as '200 mm'
+    """
+
+    def __init__(self, file: str, lines: Mapping[tuple[Key, ...], int] | None = None, folder: Path = Path()) -> None:
+        self._file, self._lines, self.folder = file, lines or {}, folder
+        self._places: dict[tuple[Key, ...], str] = {}
+        self._found: list[tuple[int, str]] = []
+
+    def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
+        """Note what is wrong.
+
+        Parameters
+        ----------
+        path : iterable of str or int
+            Keys that lead to it; its line, or that of what holds it, is part of the message.
+        message : str
+            What is wrong, and the remedy.
+        line : int, optional
+            Where it is, if no path leads there.
+        """
+        path = tuple(path)
+        # What is missing has no line of its own; that of what should hold it helps.
+        above = (path[:size] for size in range(len(path), 0, -1))
+        line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
+        place = self._places.get(path) or (f"{self._file}:{line}" if line else self._file)
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{clipped(key)}" for key in path).removeprefix(".")
+        self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
+
+    def located(self, path: tuple[Key, ...], place: str) -> None:
+        """Tell where a value stands that comes from another file.
+
+        Parameters
+        ----------
+        path : tuple of str or int
+            Keys that lead to it.
+        place : str
+            File and line.
+        """
+        self._places[path] = place
+
+    @property
+    def nothing(self) -> bool:
+        """Whether nothing was found."""
+        return not self._found
+
+    def stop(self) -> None:
+        """Raise if anything was found.
+
+        Raises
+        ------
+        StudyError
+            With the first of them, in the file's order.
+        """
+        if not self._found:
+            return
+        messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
+        more = len(messages) - SHOWN_PROBLEMS
+        messages[SHOWN_PROBLEMS:] = [f"... and {more} more"] if more > 0 else []
+        raise StudyError(*messages)
+
+
+def refuse(message: str, *path: Key) -> PydanticCustomError:
+    """Error of a validator.
+
+    Parameters
+    ----------
+    message : str
+    *path : str or int
+        Leads from the validated value to the culprit inside it.
+
+    Returns
+    -------
+    PydanticCustomError
+        To be raised.
+    """
+    return PydanticCustomError("study", "{message}", {"message": message, "path": path})
+
+
+def show(value: object) -> str:
+    """A value of the file, for a message.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> show("200 mm"), show([]), show({"length": "1 m"})
+    ("'200 mm'", 'an empty list', 'a mapping')
+    """
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return "a list" if value else "an empty list"
+    if value is None:
+        return "nothing"
+    return f"'{clipped(str(value))}'"
+
+
+def clipped(text: str) -> str:
+    """Text of which a message shows the beginning."""
+    return shown(text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}...")
+
+
+def unseen(text: str) -> str:
+    """What is wrong with a text that is not one line of characters that can be seen, and the remedy; or nothing."""
+    found = UNSEEN.search(text)
+    return f"{show(text)} has '{shown(found[0])}'; write one line of characters that can be seen" if found else ""

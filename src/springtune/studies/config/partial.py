@@ -1,0 +1,100 @@
+"""Files of parts of a study: the whole study's text, and below it the section that says which part is asked for."""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from .messages import Problems
+from .model import Part
+from .sections import StudyConfig
+from .yaml_lines import read_yaml
+
+PART_BELOW = (
+    "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
+)
+"""Comment between the whole study and the section ``part``."""
+
+LONGEST_NAME = 255
+"""Characters of the longest text that may name a file."""
+
+
+def is_part(text: str) -> bool:
+    """Whether a text asks for a part of a study."""
+    return PART_BELOW in text
+
+
+def whole_text(text: str) -> str:
+    """Text of the study that a file asks for a part of, or that it is."""
+    return text.rpartition(PART_BELOW)[0] if is_part(text) else text
+
+
+def digest_of(text: str) -> str:
+    """SHA-256 of the text of a study."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def part_text(text: str, part: Part) -> str:
+    """Text of a file that asks for a part of a study.
+
+    Parameters
+    ----------
+    text : str
+        Of the study.
+    part : Part
+
+    Returns
+    -------
+    str
+    """
+    return f"{text}{PART_BELOW}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
+
+
+def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | None:
+    """Part of a study that a file asks for; None where it asks for all.
+
+    Raises
+    ------
+    StudyError
+        If the study in it is not the one that was split.
+    """
+    if config.part is None:
+        return None
+    part = Part(config.part.number, config.part.of, config.part.by, config.part.study)
+    if digest_of(whole_text(text)) != part.study:
+        problems.add(
+            ("part", "study"),
+            "the study above it was changed since it was split, so that its parts no longer fit together; change the "
+            "whole study and split it again, or remove this section",
+        )
+        problems.stop()
+    return part
+
+
+def named_files(text: str, path: Path) -> list[Path]:
+    """Files that a study names, whichever key it is that names them.
+
+    Parameters
+    ----------
+    text : str
+        Of the study.
+    path : Path
+        Of its file, which names of others are seen from.
+
+    Returns
+    -------
+    list of Path
+        Absolute.
+    """
+    content, _ = read_yaml(text, str(path))
+    found = {value for value in _texts(content) if value.strip() and len(value) < LONGEST_NAME}
+    files = (path.parent / value for value in sorted(found))
+    return [file.resolve() for file in files if file.is_file()]
+
+
+def _texts(content: Any) -> Iterator[str]:
+    if isinstance(content, str):
+        yield content
+    elif isinstance(content, dict | list):
+        for value in content.values() if isinstance(content, dict) else content:
+            yield from _texts(value)

@@ -1,0 +1,48 @@
+"""Kinds of study: one package each."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..config.kind import kinds
+
+if TYPE_CHECKING:
+    from ..config.model import Study
+
+
+def load_study(path: str | Path, beside: Path | None = None) -> "Study":
+    """Read, validate and expand a study.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML file.
+    beside : Path, optional
+        Folder that the names of its files are seen from; its own without.
+
+    Returns
+    -------
+    Study
+        Its scenes and curves and all that they need, in a canonical order.
+
+    Raises
+    ------
+    StudyError
+        If anything is wrong with the file; nothing else is raised.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> study = st.load_study("config/paper.yaml")
+    >>> len(study.scenes), len(study.curves)
+    (270, 90)
+    >>> study.axes["mesh_size"]
+    (0.001, 0.002, 0.005)
+    """
+    from ..config.load import load  # here, since pydantic takes a fifth of a second to import
+
+    study = load(path, kinds(), beside)
+    if study.part is None:
+        return study
+    from .division import part_of  # here: few studies are parts
+
+    return part_of(study)

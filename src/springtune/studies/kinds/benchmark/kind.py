@@ -1,0 +1,226 @@
+"""Run time against error: a study's section ``benchmark``."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from springtune.linalg import SOLVERS
+from springtune.mechanics.integrators import PRECISIONS
+from springtune.mesh import MESH_TYPES
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
+from springtune.problem.quantities import nearest
+from springtune.springs import DEFINITIONS
+
+from ...config.checks import check_beam_material, check_density, check_known, check_particles, check_product
+from ...config.fields import (
+    BeamName,
+    DefinitionName,
+    Force,
+    Length,
+    Load,
+    MaterialName,
+    MeshType,
+    Named,
+    OneOrMore,
+    number,
+    one_of,
+)
+from ...config.kind import Kind
+from ...config.sections import Section
+from .names import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+MOST_RUNS = 100_000
+"""Most combinations of scenes, approaches and mesh sizes that a benchmark measures."""
+
+OtherApproach = Annotated[str, one_of("approach", OTHER_APPROACHES)]
+Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)]
+
+
+class BenchmarkSceneConfig(Section):
+    """A scene of the benchmark."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
+    force: Force = Field(description="Magnitude of the force.")
+
+
+class BenchmarkConfig(Section):
+    """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
+
+    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
+    second_beam: BeamName | None = Field(
+        None,
+        description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
+        "it keeps that on both. None is called the quickest without.",
+    )
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
+    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
+        list(OTHER_APPROACHES),
+        validate_default=False,
+        description="Other approaches: finite elements, CalculiX where it is on the machine, motion to rest, and what "
+        "the paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
+    )
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    finest: Length | None = Field(None, description="The shortest of them that most approaches have; all without.")
+    finest_of: dict[str, Length] = Field(
+        default_factory=dict,
+        description="The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`.",
+    )
+    most_seconds: Seconds = Field(
+        "30",
+        validate_default=True,
+        description="Seconds of the processor that a run may take; what takes more is a hole that says so, and so are "
+        "finer sizes of it.",
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene of the benchmark, see `springtune.studies.kinds.benchmark.measure`.
+
+    Attributes
+    ----------
+    name : str
+    beam : Beam
+    material : Material
+        With a density.
+    load : str
+        Key of `springtune.problem.loads.LOADS`.
+    force : float
+        Force on the loaded side, tension positive [N].
+    approaches : tuple of str
+    mesh_sizes : tuple of float
+        Lengths of an edge [m], ascending.
+    finest : tuple of float
+        The shortest edge of each approach [m].
+    most_seconds : float
+        Seconds of the processor that a run may take.
+    second_beam : Beam or None
+        Beam on which errors are checked.
+    """
+
+    name: str
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+    approaches: tuple[str, ...]
+    mesh_sizes: tuple[float, ...]
+    finest: tuple[float, ...]
+    most_seconds: float
+    second_beam: Beam | None
+
+
+def in_benchmark(load: str) -> bool:
+    """Whether all approaches of the benchmark can hold and pull a beam like that."""
+    kind = LOADS[load].kind
+    return kind.clamped and kind.loaded.far and not LOADS[load].follower
+
+
+def _check(config, problems):
+    if not config.benchmark:
+        return
+    section = config.benchmark
+    labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
+    check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
+    if section.second_beam:
+        check_known(problems, ("benchmark", "second_beam"), "beam", section.second_beam, config.beams)
+    for beam in dict.fromkeys([*(scene.beam for scene in section.scenes.values()), section.second_beam]):
+        if beam in config.beams:
+            extent = config.beams[beam].length, config.beams[beam].height
+            check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
+            side = min(config.beams[beam].length, config.beams[beam].height)
+            if max(section.mesh_size) > side / 2:
+                large = f"{1e3 * max(section.mesh_size):g} mm"
+                message = f"{large} is too large for '{beam}'; give at most {500 * side:g} mm"
+                problems.add(("benchmark", "mesh_size"), message)
+    for name, scene in section.scenes.items():
+        place = ("benchmark", "scenes", name)
+        check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
+        check_beam_material(problems, (*place, "material"), scene.material, config)
+        check_density(config, scene.material, (*place, "material"), problems)
+        if not in_benchmark(scene.load):
+            able = ", ".join(filter(in_benchmark, LOADS))
+            problems.add((*place, "load"), f"'{scene.load}' is no load of the benchmark; choose of {able}")
+    for name in section.definition:
+        if DEFINITIONS[name].needs:
+            able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)
+            problems.add(("benchmark", "definition"), f"'{name}' needs more than mesh and material; choose of {able}")
+    for name in section.mesh_type:
+        if name not in MESH_TYPES:
+            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
+    approaches = approach_names(section.definition, section.mesh_type, section.approach)
+    for name in section.finest_of:
+        if name not in approaches:
+            message = f"'{name}' is no approach of this benchmark; {nearest(name, approaches)}"
+            problems.add(("benchmark", "finest_of", name), message)
+    given = {("finest",): section.finest} | {("finest_of", name): size for name, size in section.finest_of.items()}
+    for place, size in given.items():
+        if size is not None and size not in section.mesh_size:
+            known = ", ".join(f"{1e3 * one:g} mm" for one in sorted(section.mesh_size))
+            problems.add(
+                ("benchmark", *place), f"{1e3 * size:g} mm is no mesh size of this benchmark; choose of {known}"
+            )
+
+
+def _expand(config, declared):
+    section = config.benchmark
+    if not section:
+        return ()
+    mesh_types = [name for name in MESH_TYPES if name in section.mesh_type]
+    definitions = [name for name in DEFINITIONS if name in section.definition]
+    others = [name for name in OTHER_APPROACHES if name in section.approach]
+    approaches = approach_names(definitions, mesh_types, others)
+    finest = section.finest or min(section.mesh_size)
+    return tuple(
+        Case(
+            name,
+            declared.beams[scene.beam],
+            declared.materials[scene.material],
+            scene.load,
+            LOADS[scene.load].sign * scene.force,
+            approaches,
+            tuple(sorted(section.mesh_size)),
+            tuple(section.finest_of.get(name, finest) for name in approaches),
+            section.most_seconds,
+            declared.beams[section.second_beam] if section.second_beam else None,
+        )
+        for name, scene in section.scenes.items()
+    )
+
+
+def _axes(cases):
+    return {
+        "mesh_size": {size for one in cases for size in one.mesh_sizes},
+        "scene": tuple(one.name for one in cases),
+        "approach": cases[0].approaches,
+        "curve_count": CURVE_COUNTS,
+        "thread_count": THREAD_COUNTS,
+        "precision": PRECISIONS,
+        "linear_solver": SOLVERS,
+    }
+
+
+KIND = Kind(
+    "benchmark",
+    study_fields={
+        "benchmark": (
+            BenchmarkConfig | None,
+            Field(None, description="Run time against error; it makes the group `/benchmark`."),
+        )
+    },
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    stages=STAGES,
+    outputs=OUTPUTS,
+)

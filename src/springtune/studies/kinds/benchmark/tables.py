@@ -1,0 +1,234 @@
+"""The page of the benchmark: every number from the dataset."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.status import Status
+from springtune.safe_io.atomic import write_text
+from springtune.safe_io.escapes import markdown
+
+from ...output.tables import markdown_table
+from .names import PARTS
+from .outputs import PAGE
+
+TARGETS = (0.01, 0.001, 0.0001)
+"""Errors to reach [1]."""
+
+
+def write(tree, folder):
+    """Write the page in Markdown.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        With the group ``/benchmark``.
+    folder : str or Path
+
+    Returns
+    -------
+    list of str
+        Names of the files written.
+    """
+    write_text(Path(folder) / PAGE, page(tree))
+    return [PAGE]
+
+
+def page(tree: xr.DataTree) -> str:
+    """Markdown: the quickest ways to an error, costs of one mesh size, orders and exponents, curves."""
+    data = tree["benchmark"].to_dataset()
+    loads = ", ".join(f"{float(value):.1f}" for value in data.machine_load.values)
+    parts = [f"Machine load at the start of each scene: {loads}.", "", _rule(data), ""]
+    for scene in map(str, data.scene.values):
+        cells = data.sel(scene=scene)
+        if np.isfinite(cells.assured_error).any():
+            parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(cells), ""]
+        parts += [f"### {scene}: approaches on one mesh size", "", *_one_size(cells), ""]
+        lost = _holes(cells.approach.values, cells.mesh_size.values, cells.status, cells.message)
+        if lost:
+            parts += [f"### {scene}: what has no numbers", "", *lost, ""]
+    parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
+    parts += ["### A sensitivity curve", "", *_curve(data), ""]
+    return "\n".join([*parts, "### Explicit steps", "", *_explicit(data), ""])
+
+
+def _time(seconds):
+    seconds = float(seconds)
+    if np.isnan(seconds):
+        return ""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+
+
+def _percent(value):
+    value = 100 * float(value)
+    return "" if np.isnan(value) else f"{value:+.2g} %".replace("-", "−")
+
+
+def _plain(value, digits):
+    return "" if np.isnan(float(value)) else f"{float(value):.{digits}f}"
+
+
+def _rule(data):
+    """How the quickest ways are chosen."""
+    if not np.isfinite(data.assured_error).any():
+        return "Nothing is called the quickest way to an error: the study has no second beam to check it on."
+    return (
+        "The quickest ways to an error: a mesh size of an approach counts where it and all finer ones that were run, "
+        "at least one, stay within the error, on the beam and on a second one "
+        f"({data.attrs['second_beam']}). An error that happens to cross zero on its way counts for nothing."
+    )
+
+
+def _quickest(cells):
+    """The three approaches that come first to each error and keep it, with their mesh size."""
+    rows = []
+    errors, seconds = cells.assured_error.transpose("approach", "mesh_size").values, cells.seconds.values
+    for target in TARGETS:
+        good = np.where(errors <= target, seconds, np.inf)
+        best = good.min(axis=1)
+        row = [f"{100 * target:g} %"]
+        for i in np.argsort(best)[:3]:
+            if np.isfinite(best[i]):
+                size = 1e3 * float(cells.mesh_size.values[good[i].argmin()])
+                row.append(f"`{cells.approach.values[i]}`, {size:g} mm: {_time(best[i])}")
+        rows.append(row + [""] * (4 - len(row)))
+    return markdown_table(["error", "first", "second", "third"], rows)
+
+
+def _holes(approaches, sizes, status, message):
+    """What was asked for and has no numbers: a line a reason, with its approaches and mesh sizes."""
+    flags, words = (one.transpose(..., "mesh_size").values for one in (status, message))
+    found = {}
+    for i, approach in enumerate(approaches):
+        for j in np.flatnonzero((flags[i] != Status.NOT_REQUESTED) & (flags[i] != Status.SOLVED)):
+            found.setdefault(str(words[i, j]), {}).setdefault(str(approach), []).append(sizes[j])
+    lines = []
+    for why, places in found.items():
+        named = [f"`{name}` ({', '.join(f'{1e3 * size:g}' for size in at)} mm)" for name, at in places.items()]
+        lines.append(f"- {', '.join(named)}: {markdown(why)}")
+    return lines
+
+
+def _one_size(cells):
+    """Error, seconds and memory on the finest size that half of the approaches are asked for."""
+    asked = (cells.status != Status.NOT_REQUESTED) | np.isfinite(cells.seconds)
+    counts = asked.transpose("approach", "mesh_size").values.sum(axis=0)
+    place = int(np.flatnonzero(counts >= 0.5 * counts.max())[0])
+    cells = cells.isel(mesh_size=place)
+    order = np.argsort(np.abs(cells.error.values))
+    rows = []
+    for i in order:
+        cell = cells.isel(approach=i)
+        if np.isnan(cell.seconds):
+            continue
+        rows.append([
+            f"`{cell.approach.item()}`", _percent(cell.error), _time(cell.seconds), _time(cell.cold_seconds),
+            *(_time(cell[f"{part}_seconds"]) for part in PARTS),
+            f"{float(cell.peak_memory) / 1e6:.0f}", _plain(cell.error_rate, 1), _plain(cell.cost_exponent, 2),
+        ])  # fmt: skip
+    heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", *PARTS, "memory [MB]", "order",
+             "exponent of cost"]  # fmt: skip
+    return markdown_table(heads, rows)
+
+
+def _solvers(data):
+    first, again = data.solver_seconds, data.solver_again_seconds
+    status, message = data.solver_status, data.solver_message
+    asked = (status != Status.NOT_REQUESTED) | np.isfinite(first)
+    sizes = [size for size in data.mesh_size.values if asked.sel(mesh_size=size).any()]
+    rows = [
+        [f"{1e3 * size:g} mm"]
+        + [
+            f"{_time(first.sel(cell))}, {_time(again.sel(cell))}" if np.isfinite(first.sel(cell)) else ""
+            for cell in ({"mesh_size": size, "linear_solver": name} for name in data.linear_solver.values)
+        ]
+        for size in sizes
+    ]
+    heads = ["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)]
+    lost = _holes(data.linear_solver.values, data.mesh_size.values, status, message)
+    return markdown_table(heads, rows) + (["", *lost] if lost else [])
+
+
+def _curve(data):
+    if data.curve_message.item():
+        return [f"None was timed: {markdown(data.curve_message.item())}."]
+    rows = [
+        [str(count), *(_time(data[name].sel(curve_count=count)) for name in ("curve_seconds", "separate_seconds"))]
+        for count in data.curve_count.values
+    ]  # fmt: skip
+    lines = markdown_table(["stiffnesses", "one path", "solve by solve"], rows)
+    return [*lines, "", f"One linear solve there takes {_time(data.linear_seconds)}, a nonlinear one "
+            f"{_time(data.nonlinear_seconds)}."]  # fmt: skip
+
+
+def _explicit(data):
+    """Rates of explicit steps, by threads and precision, beside a plain copy of memory; errors of single precision."""
+    rates, moved = data.spring_updates / 1e6, data.explicit_bandwidth / 1e9
+    ways = [(threads, kind) for kind in data.precision.values for threads in data.thread_count.values]
+    rows = []
+    for size in data.mesh_size.values[np.isfinite(rates).any(["thread_count", "precision"]).values]:
+        cells = [dict(mesh_size=size, thread_count=threads, precision=kind) for threads, kind in ways]
+        numbers = [f"{float(rates.sel(cell)):.0f}, {float(moved.sel(cell)):.1f}" for cell in cells]
+        wrong = float(data.explicit_error.sel(mesh_size=size, precision=data.precision.values[-1]))
+        rows.append([f"{1e3 * size:g} mm", *numbers, f"{wrong:.1e}"])
+    if not rows:
+        words = {markdown(word) for word in data.explicit_message.values if word}
+        return [f"None was timed{': ' + '; '.join(sorted(words)) if words else ''}."]
+    heads = [f"{kind}, {threads} thread{'s' if threads > 1 else ''}" for threads, kind in ways]
+    heads = ["structured mesh", *heads, f"error, {data.precision.values[-1]}"]
+    copies = ", ".join(
+        f"{float(data.copy_bandwidth.sel(thread_count=threads)) / 1e9:.1f} GB/s by {threads}"
+        for threads in data.thread_count.values
+    )
+    lines = ["Nonlinear springs that steps advance, in millions a second, and what they read and write, be it in a "
+             f"cache, in GB/s. A plain copy of memory moves {copies}. The numbers of a run do not depend on threads; "
+             "errors are those of displacements against double precision, over the largest.", ""]  # fmt: skip
+    told = zip(data.mesh_size.values, data.explicit_message.values)
+    lost = [f"- {1e3 * size:g} mm: {markdown(word)}" for size, word in told if word]
+    return lines + markdown_table(heads, rows) + (["", *lost] if lost else [])
+
+
+NOISE = 1.3
+"""Ratio of seconds that runs of one program on one machine show among themselves."""
+
+
+def comparison(old: xr.Dataset, new: xr.Dataset) -> tuple[list[str], int]:
+    """Ratios of the seconds of two benchmarks, approach by approach.
+
+    A machine that is slower on the whole is no regression: ratios are over their median. Flagged is what lies outside
+    of `NOISE` and of three times the spread that the runs showed.
+
+    Parameters
+    ----------
+    old, new : xarray.Dataset
+        Groups ``/benchmark``.
+
+    Returns
+    -------
+    lines : list of str
+    flagged : int
+        Number of approaches that became slower.
+    """
+    both = {name: [label for label in old[name].values if label in new[name].values]
+            for name in ("scene", "approach", "mesh_size")}  # fmt: skip
+    old, new = old.sel(both), new.sel(both)
+    ratio = (new.seconds / old.seconds).transpose("approach", "scene", "mesh_size").values
+    if not np.isfinite(ratio).any():
+        return ["The two datasets have no case in common."], 0
+    spread = [
+        (one.seconds_spread / one.seconds).transpose("approach", "scene", "mesh_size").values for one in (old, new)
+    ]
+    middle = float(np.nanmedian(ratio))
+    lines = [f"{int(np.isfinite(ratio).sum())} cases in common, median ratio new / old {middle:.2f}."]
+    flagged = 0
+    for i, approach in enumerate(both["approach"]):
+        cells = np.isfinite(ratio[i])
+        if not cells.any():
+            continue
+        own = float(np.median(ratio[i][cells])) / middle
+        noise = max(NOISE, 1 + 3 * float(np.median(np.fmax(*(part[i][cells] for part in spread)))))
+        word = "slower" if own > noise else "faster" if own < 1 / noise else ""
+        flagged += own > noise
+        lines.append(f"{own:6.2f}  {approach}  {word}".rstrip())
+    return lines, flagged

@@ -1,0 +1,109 @@
+"""Compare what was solved with its references and gather everything in one dataset."""
+
+import sys
+from collections.abc import Collection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+from springtune.registry import imported
+from springtune.safe_io import atomic
+
+from ..config.kind import kinds, outputs
+from ..output import dataset, summary
+from ..runs import bundles, provenance, records, rerun
+from ..runs.dependencies import CODE_FILE, OURS
+from ..runs.plan import COSTS_FILE, plan, usual_costs
+from ..runs.run_tasks import RECORDS, mended
+from . import load_study
+
+if TYPE_CHECKING:
+    from ..config.model import Study
+
+
+def run(config: str | Path, folder: str | Path, output: str | Path, untold: Collection[str] = ()) -> list[Path]:
+    """Build the dataset of a study from its stored results.
+
+    Parameters
+    ----------
+    config : str or Path
+        YAML file of the study.
+    folder : str or Path
+        Where the study's results are.
+    output : str or Path
+        NetCDF file to write; the summary goes beside it.
+    untold : collection of str, optional
+        Attributes to leave empty, see `springtune.studies.runs.rerun.BLANKED`.
+
+    Returns
+    -------
+    list of Path
+        Both.
+    """
+    return _collected(load_study(config), config, Path(folder), Path(output), untold)
+
+
+def _collected(
+    study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()
+) -> list[Path]:
+    groups = mended(lambda: gathered(study, folder), folder)
+    try:
+        dataset.write(output, groups, provenance.attributes(study, config, untold))
+    except OSError as error:  # the message says it all
+        raise SystemExit(str(error)) from None
+    told = output.with_name(summary.FILE)
+    atomic.write_text(told, summary.text(groups, study.title))
+    bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
+    return [output, told]
+
+
+def main(config: str, folder: str, output: str, record: str, digest: str, *untold: str) -> None:
+    """Build a dataset and write the record of it.
+
+    Parameters
+    ----------
+    config, folder, output
+        As of `run`.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
+    *untold : str
+        Attributes to leave empty.
+    """
+    study = load_study(config)
+    OURS.recall(Path(folder).parent / CODE_FILE)
+    chosen = {option: name in untold for option, name in rerun.BLANKED.items()}
+    if rerun.jobs(study, plan(study, Path(folder), 1), chosen)[rerun.COLLECT].digest != digest:
+        raise SystemExit(f"{config} was changed while the study ran; call the same command again")
+    made = _collected(study, config, Path(folder), Path(output), untold)
+    records.write(record, digest, made, untold=list(untold))
+
+
+def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+    """Groups of the dataset of a study, of what its stages stored.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where its results are.
+
+    Returns
+    -------
+    dict of str to xarray.Dataset
+        By path in the dataset.
+    """
+    groups: dict[str, xr.Dataset] = {}
+    for kind in kinds():
+        if study.parts[kind.name]:
+            groups |= kind.module("collect").groups(study, folder)
+    for made in () if study.part else outputs().values():
+        if made.collect and made.name in study.outputs:
+            groups |= imported(made.collect).groups(study, folder)
+    return groups
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,163 @@
+"""Parts of a study for several sites: dealt out by what they are expected to cost, each scene to one of them.
+
+A part is found from the whole study and its number alone, whatever the machine has measured: all sites agree on it.
+What depends on all scenes of a study, such as the range of its interpolants, is that of the whole study in each part:
+results have the same keys and the same bits as in one place.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..config.kind import kinds
+from ..config.messages import StudyError
+from ..runs.bundles import Costs
+
+if TYPE_CHECKING:
+    from ..config.kind import Kind
+    from ..config.model import Study
+
+Name = tuple[str | int, ...]
+"""Of a piece, within its kind of study."""
+
+
+@dataclass(frozen=True)
+class Division:
+    """How a study is divided.
+
+    Attributes
+    ----------
+    by : str
+        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
+    most : float
+        Seconds that a piece of several tasks should not exceed.
+    """
+
+    by: str
+    most: float
+
+    def pieces(self, seconds: float, tasks: int) -> int:
+        """Number of pieces that so many tasks of so many seconds make."""
+        return min(tasks, ceil(seconds / self.most)) if self.most and seconds else 1
+
+    def of_section(self, found: Mapping[Name, float]) -> dict[Name, float]:
+        """Seconds of the pieces of a section of a study, all of which is one piece where grids stay together."""
+        return {(): sum(found.values())} if self.by == "grid" else dict(found)
+
+
+def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, list[Name]]]]:
+    """Pieces of a study, dealt out.
+
+    Parameters
+    ----------
+    study : Study
+        The whole one.
+    count : int
+        Number of parts.
+    by : str
+        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
+
+    Returns
+    -------
+    list of tuple
+        Of each part its share of the expected seconds, and names of pieces by kind.
+
+    Raises
+    ------
+    StudyError
+        If the study has fewer pieces than parts.
+    """
+    found = _pieces(study, Division(by, 0.0))
+    total = sum(found.values())
+    most = total / count
+    while by != "grid":
+        before, found = len(found), _pieces(study, Division(by, most))
+        if len(found) >= count or (len(found) == before and most < total / count):
+            break
+        most /= 2
+    if len(found) < count:
+        what = "grids and sections" if by == "grid" else "scenes or other tasks"
+        other = ", or split it by mesh (--by mesh)" if by == "grid" else ""
+        raise StudyError(f"{study.path}: {len(found)} {what} cannot be {count} parts; ask for at most "
+                         f"{len(found)}{other}")  # fmt: skip
+    seconds, held = [0.0] * count, [0] * count
+    shares: list[dict[str, list[Name]]] = [{} for _ in range(count)]
+    # The longest first, each to the part that has least.
+    for kind, name in sorted(found, key=lambda piece: -found[piece]):
+        least = min(range(count), key=lambda number: (seconds[number], held[number], number))
+        seconds[least] += found[kind, name]
+        held[least] += 1
+        shares[least].setdefault(kind, []).append(name)
+    return [(one / (sum(seconds) or 1.0), share) for one, share in zip(seconds, shares)]
+
+
+def part_of(study: "Study") -> "Study":
+    """The part of a study that it says it is.
+
+    Parameters
+    ----------
+    study : Study
+        With a `part`, and all that the whole study asks for.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    StudyError
+        If there is no such part.
+    """
+    if study.part is None:
+        return study
+    _, share = dealt(study, study.part.of, study.part.by)[study.part.number - 1]
+    return taken(study, share)
+
+
+def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
+    """What a study asks for with some of its pieces alone.
+
+    Parameters
+    ----------
+    study : Study
+    share : mapping of str to list of tuple
+        Names of pieces by kind, see `dealt`.
+
+    Returns
+    -------
+    Study
+    """
+    for kind in kinds():
+        if not study.parts[kind.name]:
+            continue
+        names = share.get(kind.name, [])
+        if () in names:  # all of it
+            continue
+        if kind.division:
+            study = kind.module(kind.division).take(study, names)
+        else:
+            study = replace(study, parts=study.parts | {kind.name: ()})
+    return study
+
+
+def _pieces(study: "Study", division: Division) -> dict[tuple[str, Name], float]:
+    """Seconds of each piece by kind and name."""
+    costs = Costs(Path("no costs"), {name: cost for kind in kinds() for name, cost in kind.costs.items()})
+    found: dict[tuple[str, Name], float] = {}
+    for kind in kinds():
+        if study.parts[kind.name]:
+            own: Mapping[Name, float] = (
+                kind.module(kind.division).pieces(study, costs, division)
+                if kind.division
+                else {(): _seconds(kind, study, costs)}
+            )
+            found |= {(kind.name, name): seconds for name, seconds in own.items()}
+    return found
+
+
+def _seconds(kind: "Kind", study: "Study", costs: Costs) -> float:
+    """Seconds of all tasks of a kind."""
+    made = (stage.members(study, costs) for stage in kind.stages if stage.members)
+    return sum(seconds for members in made for seconds, _ in members.values())

@@ -1,0 +1,148 @@
+"""Strips laid on a trapezoid: their shape, and area and elongation of each network beside finite elements."""
+
+import numpy as np
+
+from springtune.safe_io.escapes import no_mathematics
+
+from ...output import labels, style
+from ...output.dataset import STATUS
+from ...output.selection import cells, choose, group, labels_of
+
+
+def laying(tree):
+    """The figure of laid strips.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    yield "laying", plot_laying, {}
+
+
+@style.styled
+def plot_laying(data, ax=None, *, loading=None, friction=None):
+    """Strips laid on a trapezoid: a row a loading and friction with the shape, the area's error and the elongation.
+
+    Networks lie on each other to the eye, so that only one has its shape drawn; the others are told by their numbers.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/laying``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: three Axes a row; by default a new figure.
+    loading : str, optional
+        One loading in place of all.
+    friction : float, optional
+        One coefficient of friction [1] in place of all.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_rows, 3)
+        Of each loading and friction the shape, the error of the area, and the elongation.
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no laid strips, or nothing has the loading or friction, or ``ax`` is not three Axes a row.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_laying(tree, friction=0.0)
+    >>> [panel.get_title(loc="left") for panel in axes[:, 0]]
+    ['gravity', 'pressure']
+    """
+    laid = group(data, "laying")
+    for name, label in {"loading": loading, "friction": friction}.items():
+        if label is not None:
+            choose(laid.status != 0, **{name: label})
+            laid = laid.sel({name: [label]})
+    shown = cells(laid.status != 0, ("loading", "friction"))
+    names = labels_of(laid.status != 0, "definition")
+    wide = [1.9, 1.0, 1.0]
+    high = 1.05 + 0.16 * max(len(names), 4)
+    figure, axes = style.panels(ax, len(shown), 3, figsize=(style.PAGE, 0.25 + high * len(shown)), widths=wide)
+    place = {"left": 0.52, "right": 0.1, "top": 0.3, "down": 0.97}
+    style.arrange(figure, axes, bottom=0.74, across=0.14 + max(map(labels.width, names), default=0.0), **place)
+    for row, cell in zip(axes, shown):
+        _row(row, laid.sel(cell), cell, names)
+        row[0].apply_aspect()  # its limits
+    labels.settle(figure, axes, {**place, "bottom": 0.74, "across": 0.06})
+    return axes
+
+
+def _row(row, laid, cell, names):
+    """The panels of one loading and friction."""
+    shape, area, elongation = row
+    friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
+    first = _shape(shape, laid, names)
+    shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
+    shape.set(aspect="equal", adjustable="datalim")
+    labels.note(shape, first)
+    known, reference = float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
+    if np.isfinite(reference):
+        if np.isfinite(known):
+            elongation.axvspan(reference - 100 * known, reference + 100 * known, color="0.87", zorder=0)
+        elongation.axvline(reference, color="0.45", linewidth=1.5)
+        found = f" ± {100 * known:.2g}" if np.isfinite(known) else ", error unknown"
+        said = f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")
+        labels.note(elongation, labels.wrapped(said, _room(elongation)))
+    area.axvline(0, color="0.45", linewidth=1.5)
+    for panel, name in ((area, "area_error"), (elongation, "elongation")):
+        _dots(panel, laid, names, name)
+    area.set(xlabel="Error [%]", title="Area below the strip")
+    elongation.set(xlabel="Elongation [%]", title="Lower fibre")
+    elongation.tick_params(labelleft=False)
+    if ((laid.status == 1).sum("mesh_size") > 1).any():
+        labels.note(area, labels.wrapped("filled: finest mesh; hollow: coarser", _room(area)))
+
+
+def _room(panel):
+    """Width of a panel [inch]."""
+    return panel.get_window_extent().width / panel.figure.dpi
+
+
+def _shape(panel, laid, names):
+    """Draw the trapezoid, the reference and the finest network solved first; what was drawn, in words."""
+    corners = 1e3 * np.stack([laid.trapezoid_x.values, laid.trapezoid_y.values], axis=1)
+    panel.fill(*corners.T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
+    panel.axhline(0, color="0.45", linewidth=0.8)
+    reference = 1e3 * np.stack([laid.reference_x.values, laid.reference_y.values], axis=1)
+    reference, said = reference[np.isfinite(reference[:, 0])], "no reference"
+    if len(reference):
+        panel.fill(*reference.T, facecolor="0.72", edgecolor="none")
+        said = "grey: finite elements"
+    for definition in names:
+        strips = laid.sel(definition=definition)
+        for place in np.flatnonzero(strips.status.values == 1)[:1]:
+            strip = strips.isel(mesh_size=place)
+            points = 1e3 * np.stack([strip.strip_x.values, strip.strip_y.values], axis=1)
+            points = points[np.isfinite(points[:, 0])]
+            panel.plot(*np.vstack([points, points[:1]]).T, color=style.line(1)["color"], linewidth=0.9)
+            return f"{said}; line: {definition}, {1e3 * float(strip.mesh_size):g} mm"
+    return f"{said}; no network was solved"
+
+
+def _dots(panel, laid, names, variable):
+    """A dot a definition and mesh size, the finest filled; where none was solved, why."""
+    for number, definition in enumerate(names):
+        strips, look = laid.sel(definition=definition), style.line(number)
+        solved = np.flatnonzero(strips.status.values == 1)
+        values = 100 * strips[variable].values
+        mark = {"linestyle": "", "marker": look["marker"], "color": look["color"]}
+        panel.plot(values[solved[1:]], np.full(len(solved[1:]), number), markerfacecolor="white", **mark)
+        panel.plot(values[solved[:1]], np.full(len(solved[:1]), number), markersize=4.5, label=definition, **mark)
+        if not len(solved):
+            flags = strips.status.values
+            said = ", ".join(STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])) or "not asked for"
+            panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
+                       fontsize=style.SMALL, color="0.25")  # fmt: skip
+    panel.set_yticks(range(len(names)), map(no_mathematics, names))
+    panel.set_ylim(len(names) - 0.4, -0.6)
+    panel.margins(x=0.12)

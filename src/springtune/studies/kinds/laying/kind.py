@@ -1,0 +1,190 @@
+"""Strips laid on a trapezoid: every combination of the values of a study's section ``laying``."""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated
+
+from pydantic import Field
+
+from springtune.problem.geometry import Strip, Trapezoid
+from springtune.problem.materials import Material
+from springtune.springs import DEFINITIONS
+
+from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
+from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
+from ...config.kind import Kind
+from ...config.sections import Section
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+LOADINGS = ("pressure", "gravity", "ends")
+"""What lays a strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
+
+REFERENCE_SIZES = (1.0, 1.25, 1.6)
+"""Mesh sizes on which a laid strip's reference is solved, over the one that is given; the first is the answer."""
+
+MOST_STRIPS = 10_000
+"""Most strips that a study lays; each takes seconds."""
+
+Friction = Annotated[float, number("a coefficient from 0 to 2, such as 0.3", 0, 2)]
+Loading = Annotated[str, one_of("loading", LOADINGS)]
+
+
+class TrapezoidConfig(Section):
+    """A symmetric trapezoid that stands on its lower base."""
+
+    lower_base: Length = Field(description="Length of the base on the floor.")
+    upper_base: Length = Field(description="Length of the upper base.")
+    height: Length = Field(description="Height.")
+
+
+class LayingConfig(Section):
+    """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
+
+    The reference of a loading and friction is a strip of linear triangles on a mesh of its own, and two coarser ones
+    that tell the band in which it is known.
+    """
+
+    strip: BeamName = Field(description="Beam that is the strip.")
+    trapezoid: TrapezoidConfig = Field(description="What it is laid on.")
+    material: MaterialName = Field(description="Material of the strip.")
+    support: MaterialName = Field(description="Material of the trapezoid; from 1e4 times as stiff on it is rigid.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    reference_size: Length = Field(
+        "1 mm", validate_default=True, description="Length of an edge of the reference's finest mesh."
+    )
+    loading: Annotated[list[Loading], OneOrMore()] = Field(
+        "pressure",
+        validate_default=True,
+        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: the "
+        "ends are drawn down to the floor.",
+    )
+    pressure: Stress = Field(description="Pressure, or weight over the upper face.")
+    friction: Annotated[list[Friction], OneOrMore()] = Field(
+        "0", validate_default=True, description="Coulomb's coefficients of friction."
+    )
+
+
+@dataclass(frozen=True)
+class LayingScene:
+    """A strip to lay on a trapezoid, see `springtune.studies.kinds.laying.lay`.
+
+    Attributes
+    ----------
+    strip : Strip
+    trapezoid : Trapezoid
+    material, support : Material
+        Of the strip and of the trapezoid.
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_size : float
+        Length of an edge [m].
+    loading : str
+        One of `LOADINGS`.
+    pressure : float
+        Pressure on the strip, or its weight over its upper face [Pa].
+    friction : float
+        Coulomb's coefficient [1].
+    """
+
+    strip: Strip
+    trapezoid: Trapezoid
+    material: Material
+    support: Material
+    definition: str
+    mesh_size: float
+    loading: str
+    pressure: float
+    friction: float
+
+
+@dataclass(frozen=True)
+class Laying:
+    """What a study lays.
+
+    Attributes
+    ----------
+    strips : tuple of LayingScene
+    references : tuple of LayingScene
+        Strips of finite elements that the others are compared with, on several meshes a loading and friction.
+    """
+
+    strips: tuple[LayingScene, ...]
+    references: tuple[LayingScene, ...]
+
+
+def _check(config, problems):
+    if not config.laying:
+        return
+    check_known(problems, ("laying", "strip"), "beam", config.laying.strip, config.beams)
+    for key in ("material", "support"):
+        check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
+    check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
+    check_product(problems, config.laying, ("laying",), ("definition", "mesh_size", "loading", "friction"), MOST_STRIPS)
+    if config.laying.strip in config.beams:
+        beam = config.beams[config.laying.strip]
+        check_particles(problems, ("laying", "mesh_size"), config.laying.mesh_size, beam.length, beam.height)
+        finest = [config.laying.reference_size]
+        check_particles(problems, ("laying", "reference_size"), finest, beam.length, beam.height)
+    base = config.laying.trapezoid
+    if not base.upper_base < base.lower_base:
+        problems.add(("laying", "trapezoid", "upper_base"), "is not below 'lower_base'; give a shorter upper base")
+
+
+def _expand(config, declared):
+    section = config.laying
+    if not section:
+        return None
+    beam, base = declared.beams[section.strip], section.trapezoid
+    parts = {
+        "strip": Strip(beam.length, beam.height, beam.thickness),
+        "trapezoid": Trapezoid(base.lower_base, base.upper_base, base.height),
+        "material": declared.materials[section.material],
+        "support": declared.materials[section.support],
+        "pressure": section.pressure,
+    }
+    labels = list(product(section.loading, section.friction))
+    strips = [
+        LayingScene(**parts, definition=definition, mesh_size=size, loading=loading, friction=friction)
+        for definition in DEFINITIONS
+        if definition in section.definition
+        for size in sorted(section.mesh_size)
+        for loading, friction in labels
+    ]
+    references = [
+        LayingScene(**parts, definition="delingette", mesh_size=size, loading=loading, friction=friction)
+        for loading, friction in labels
+        for size in (ratio * section.reference_size for ratio in REFERENCE_SIZES)
+    ]
+    return Laying(tuple(strips), tuple(references))
+
+
+def _axes(laying):
+    strips = laying.strips
+    return {
+        "definition": {one.definition for one in strips},
+        "mesh_size": {one.mesh_size for one in strips},
+        "loading": tuple(name for name in LOADINGS if any(one.loading == name for one in strips)),
+        "friction": tuple(sorted({one.friction for one in strips})),
+    }
+
+
+KIND = Kind(
+    "laying",
+    study_fields={
+        "laying": (
+            LayingConfig | None,
+            Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`."),
+        )
+    },
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    stages=STAGES,
+    outputs=OUTPUTS,
+    tables=lambda study: ["laying"] if study.parts["laying"] else [],
+    costs={"laying": (0.0, 1.5)},
+)

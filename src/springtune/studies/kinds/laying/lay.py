@@ -1,0 +1,173 @@
+r"""A strip laid on a trapezoid that stands on a rigid floor: the paper's section 4.2.
+
+::
+
+        v v v v v v v v v v v v v v      pressure that follows the upper face, or weight, or ends drawn down
+       +----------------------------+
+       +------+--------------+------+    strip, free but for its middle, which stays on the axis
+             /                \
+            /    trapezoid     \
+    -------+--------------------+-------  floor
+
+The trapezoid is deformable; where it is far stiffer than the strip it is not worth moving and counts as rigid, which
+leaves it no unknowns. The floor never has any.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle
+from springtune.mechanics.follower import FollowerPressure
+from springtune.mesh import MESH_TYPES, Mesh
+from springtune.scene.sheet import Sheet
+
+RIGID = 1e4
+"""Ratio of Young's moduli from which the trapezoid counts as rigid."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """What became of a strip.
+
+    Attributes
+    ----------
+    area : float
+        Area between the strip and the floor [m2].
+    elongation : float
+        Elongation of the strip's lower fibre [1].
+    penetration : float
+        Largest penetration over the mesh size [1].
+    force_error : float
+        Vertical contact force on the floor and rigid bodies less the load, over the load [1]; NaN for drawn ends.
+    load_share : float
+        Share of the load that was reached [1].
+    message : str
+        Why it is not the whole one; empty otherwise.
+    iterations : int
+        Newton steps.
+    seconds : float
+    skipped : str
+        What the scene did not need.
+    outline : ndarray of float, shape (n, 2)
+        Where the outline of the strip is, in order [m].
+    """
+
+    area: float
+    elongation: float
+    penetration: float
+    force_error: float
+    load_share: float
+    message: str
+    iterations: int
+    seconds: float
+    skipped: str
+    outline: np.ndarray
+
+
+def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="structured", loading="pressure",
+        pressure=0.02e6, friction=0.0, rigid=RIGID):  # fmt: skip
+    """Lay a strip on a trapezoid.
+
+    Parameters
+    ----------
+    strip : Strip
+    trapezoid : Trapezoid
+    material, support : Material
+        Of the strip and of the trapezoid.
+    definition : str
+        Key of `springtune.springs.DEFINITIONS` that derives a stiffness; of strip and trapezoid.
+    size : float
+        Mesh size [m].
+    mesh_type : str
+        Of the strip and the trapezoid, with an even number of cells along the strip.
+    loading : str
+        One of `springtune.studies.kinds.laying.kind.LOADINGS`.
+    pressure : float
+        Pressure on the upper face, or weight over it [Pa].
+    friction : float
+        Coulomb's coefficient [1].
+    rigid : float
+        Ratio of Young's moduli from which the trapezoid is rigid [1].
+
+    Returns
+    -------
+    Laid
+    """
+    begin = time.perf_counter()
+    body, mesh = _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pressure)
+    skipped = ["unknowns of the floor"]
+    if support.young_modulus >= rigid * material.young_modulus:
+        contact = Contact([body], [Obstacle(np.array(trapezoid.corners))], floor=True, size=size, friction=friction)
+        skipped.append("the trapezoid's deformation: it is rigid beside the strip")
+    else:
+        below = _support(strip, trapezoid, support, size)
+        contact = Contact([body, below], floor=True, size=size, friction=friction)
+    message = ""
+    try:
+        contact.solve(first=1e-3)
+    except ContactError as error:
+        message = str(error)
+    low = np.flatnonzero(mesh.points[:, 1] <= trapezoid.height * (1 + 1e-9))
+    fibre = body.points[low[np.argsort(mesh.points[low, 0])]]
+    lengths = np.linalg.norm(np.diff(fibre, axis=0), axis=1)
+    load = pressure * strip.length * strip.thickness
+    if loading == "pressure":  # as far as it still acts downwards
+        load = -float(contact.share * body.force * body.pressure.forces(body.displacements)[:, 1].sum())
+    outline = body.outline[:, 0]
+    around = [0]
+    while len(around) < len(outline):
+        around.append(int(body.neighbours[0][around[-1]]))
+    return Laid(
+        area=float(np.sum(0.5 * (fibre[1:, 1] + fibre[:-1, 1]) * np.diff(fibre[:, 0]))),
+        elongation=float(lengths.sum() / strip.length - 1),
+        penetration=contact.penetration / size,
+        force_error=float("nan") if loading == "ends" else float(contact.contact_force()[1] / abs(load) - 1),
+        load_share=contact.share,
+        message=message,
+        iterations=contact.iterations,
+        seconds=time.perf_counter() - begin,
+        skipped="; ".join(skipped),
+        outline=body.points[outline[around]],
+    )
+
+
+def _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pressure):
+    made = MESH_TYPES[mesh_type](strip.length, strip.height, size)
+    mesh = Mesh(made.points + [-0.5 * strip.length, trapezoid.height], made.triangles, made.quads)
+    sheet = Sheet(mesh, strip.thickness)
+    springs, _ = sheet.derive(definition, material)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    # Without friction nothing else keeps the strip from sliding off to one side.
+    held[np.abs(mesh.points[:, 0]) <= 1e-9 * strip.length, 0] = True
+    arguments, total = {}, pressure * strip.length * strip.thickness
+    if loading == "pressure":
+        top = mesh.outline_edges(1, mesh.points[:, 1].max())
+        arguments = {"pressure": FollowerPressure.of_side(mesh, top, 0), "force": -total}
+    elif loading == "gravity":
+        weights = -total * mesh.particle_areas / mesh.area
+        arguments = {"forces": np.stack([np.zeros(len(weights)), weights], axis=1)}
+    else:
+        low = np.abs(mesh.points[:, 1] - trapezoid.height) <= 1e-9 * trapezoid.height
+        ends = low & (np.abs(np.abs(mesh.points[:, 0]) - 0.5 * strip.length) <= 1e-9 * strip.length)
+        held[ends, 1] = True
+        arguments = {"prescribed": np.where(ends[:, None], [0.0, -trapezoid.height], 0.0)}
+    return Body(sheet.network(held, springs), springs.reference, **arguments), mesh
+
+
+def _support(strip, trapezoid, material, size):
+    """The trapezoid as a body: rows of linear triangles fitted between its sides, its small displacements alone.
+
+    Its sharp corners are no place for a negative area modulus, so it is `delingette` whatever the strip is.
+    """
+    mean = 0.5 * (trapezoid.lower_base + trapezoid.upper_base)
+    made = MESH_TYPES["structured"](mean, trapezoid.height, size)
+    y = made.points[:, 1]
+    width = trapezoid.lower_base + (trapezoid.upper_base - trapezoid.lower_base) * y / trapezoid.height
+    mesh = Mesh(np.stack([(made.points[:, 0] / mean - 0.5) * width, y], axis=1), made.triangles)
+    sheet = Sheet(mesh, strip.thickness)
+    springs, _ = sheet.derive("delingette", material)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[np.lexsort((np.abs(mesh.points[:, 0]), y))[0], 0] = True
+    return Body(sheet.network(held, springs), springs.reference, moves_little=True)

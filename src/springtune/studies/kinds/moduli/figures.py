@@ -1,0 +1,365 @@
+"""Definitions compared: effective against asked Poisson's ratio, error against mesh size, and errors by load."""
+
+import numpy as np
+from matplotlib.ticker import NullLocator
+
+from springtune.safe_io.escapes import no_mathematics
+
+from ...output import labels, style
+from ...output.dataset import STATUS, most_requested
+from ...output.selection import choose, group, labelled_beam, labels_of, unswept
+from .outputs import figures
+
+FLOOR = 1e-5
+"""Smallest error drawn on a logarithmic axis [1]; below is rounding and the reference's own error."""
+
+MOST_NAMED = 6
+"""Lines with a name in a panel of errors against mesh size; the others are there in grey."""
+
+BASELINE = "uniform"
+"""The definition that is named beside the best ones."""
+
+
+def definitions(tree):
+    """Figures that compare definitions: moduli, errors against mesh size by load, and heat maps by mesh type.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    root = unswept(group(tree, "/"))
+    for stem, selection in figures(root["load"].values.tolist(), root.mesh_type.values.tolist()).items():
+        if "load" in selection:
+            yield stem, plot_definitions_size, _main(root, ("beam", "kinematics", "material"), selection)
+        elif "mesh_type" in selection:
+            yield stem, plot_definitions_loads, _main(root, ("beam", "kinematics"), selection)
+        else:
+            yield stem, plot_moduli, {}
+
+
+def _main(root, names, selection):
+    """Labels that most scenes of a study have; where a selection has none of these, those that most of its own have."""
+    chosen = selection | {name: most_requested(root, name) for name in names}
+    if (root.status.sel(chosen) != 0).any():
+        return chosen
+    root = root[["status"]].sel({name: [label] for name, label in selection.items()})
+    for name in names:
+        chosen[name] = most_requested(root, name)
+        root = root.sel({name: [chosen[name]]})
+    return chosen
+
+
+def _arrange(figure, axes, title, ax=None, height=0.0, notes=()):
+    """Place panels of `style.multiples`, with room for notes below each; a figure of our own grows by that."""
+    under = labels.LINE * max(map(labels.lines_of, notes), default=0)
+    if ax is None and notes:
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
+    title = labels.wrapped(title, (style.PAGE if axes.shape[1] > 1 else style.COLUMN) - 0.1, 8.5)
+    place = {"left": 0.5, "right": 0.06, "bottom": 0.4 + under, "top": 0.36 + 0.14 * labels.lines_of(title),
+             "across": 0.5, "down": 0.68 + under, "title": title}  # fmt: skip
+    if notes:
+        labels.settle(figure, axes, place | {"across": 0.1})
+    else:
+        style.arrange(figure, axes, **place)
+
+
+def _statuses(flags):
+    """How many of some cells became what, in words."""
+    counts = {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
+    return ", ".join(f"{name} ({count})" for name, count in counts.items()) or "none was asked for"
+
+
+@style.styled
+def plot_moduli(data, ax=None):
+    """Effective Poisson's ratio against the one asked for, a panel a mesh type, each on its finest patch.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/moduli``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as mesh types; by default a new figure.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
+        One a mesh type.
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no moduli, or ``ax`` is not as many Axes as mesh types.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_moduli(tree)
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['structured', 'free']
+    >>> axes[0].get_xlabel(), axes[0].get_ylabel()
+    ('asked for', 'effective')
+    """
+    moduli = group(data, "moduli")
+    types = labels_of(moduli.status != 0, "mesh_type")
+    figure, axes, flat, height = style.multiples(ax, len(types), min(2, max(1, len(types))), 1.95)
+    title = "Effective Poisson's ratio against the one asked for; grey: as asked"
+    _arrange(figure, axes, title)
+    drawn = [_moduli(panel, moduli.sel(mesh_type=mesh_type)) for panel, mesh_type in zip(flat, types)]
+    for panel, mesh_type in zip(flat, types):
+        panel.set(title=mesh_type, xlabel="asked for", ylabel="effective")
+    _arrange(figure, axes, title, ax, height, [said for _, said, _ in drawn])
+    for panel, (ends, said, why) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    return flat
+
+
+def _moduli(panel, here):
+    """Draw one mesh type: ends of lines for their names, a note, and what to say where there is no line."""
+    curves, lacking, wanted = {}, [], here.poisson_ratio.values
+    for definition in here.definition.values:
+        one = here.sel(definition=definition)
+        sizes = np.flatnonzero((one.status == 1).any("poisson_ratio").values)
+        if len(sizes):
+            curves[str(definition)] = one.effective_poisson_ratio.values[sizes[0]]
+        elif (one.status != 0).any():
+            lacking.append(str(definition))
+    low, high = wanted.min(), max(wanted.max(), wanted.min() + 1e-3)
+    panel.plot([low, high], [low, high], color="0.8", linewidth=3.5, zorder=0)
+    panel.set_xlim(low - 0.02, high + 0.02)
+    values = np.concatenate([[low, high], *curves.values()])
+    bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
+    panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
+    ends = []
+    for number, names in enumerate(labels.alike(curves, 0.012)):
+        found, look = curves[names[0]], style.line(number)
+        panel.plot(wanted, found, label=", ".join(names), **look)
+        known = np.flatnonzero(np.isfinite(found))
+        if len(known):
+            ends.append((wanted[known[-1]], found[known[-1]], ", ".join(names), look["color"]))
+    room = panel.get_window_extent().width / panel.figure.dpi
+    said = labels.wrapped(f"no moduli: {', '.join(lacking)}", room) if lacking and ends else ""
+    return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
+
+
+@style.styled
+def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None, kinematics=None):
+    """Field error against mesh size with fitted rates, a panel a mesh type, a line a definition.
+
+    Definitions that are one line to the eye share it; of many the best and `uniform` have names, the others are grey.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its root.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as mesh types; by default a new figure.
+    beam, material, load, kinematics : str, optional
+        Labels of the scenes. One that is not given must leave no choice.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_mesh_types,)
+        One a mesh type.
+
+    Raises
+    ------
+    ValueError
+        If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as mesh types.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_definitions_size(tree, beam="200x40", material="steel", load="traction", kinematics="linear")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['structured', 'free']
+    >>> axes[0].figure.get_suptitle()
+    '200x40 mm, steel, traction: error of the displacement field in L2, fitted rate in brackets'
+    """
+    root = unswept(group(data, "/"))
+    chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
+    root = root.sel(chosen)
+    error = root.field_error
+    types = labels_of(root.status != 0, "mesh_type")
+    figure, axes, flat, height = style.multiples(ax, len(types), min(2, max(1, len(types))), 1.95)
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['material']}, {chosen['load']}"
+    rates = ", fitted rate in brackets" if len(labels_of(root.status != 0, "mesh_size")) > 1 else ""
+    title = f"{title}: error of the displacement field in L2{rates}"
+    _arrange(figure, axes, title)
+    drawn = [_field_errors(panel, error.sel(mesh_type=name), root.status.sel(mesh_type=name))
+             for panel, name in zip(flat, types)]  # fmt: skip
+    values = 100 * np.maximum(error.values[np.isfinite(error.values)], FLOOR)
+    for panel, mesh_type in zip(flat, types):
+        panel.set(title=mesh_type, xlabel="Mesh size [mm]", ylabel="Error [%]")
+        if len(values):
+            panel.set_ylim(0.7 * values.min(), 1.4 * values.max())
+        style.plain(panel, "y")
+    _arrange(figure, axes, title, ax, height, [said for _, said, _ in drawn])
+    for panel, (ends, said, why) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    return flat
+
+
+def _field_errors(panel, error, status):
+    """Draw one mesh type, see `_moduli`: the best definitions and the baseline with names, the others in grey."""
+    asked = np.flatnonzero((status != 0).any("definition").values)
+    error, status = error.isel(mesh_size=asked), status.isel(mesh_size=asked)
+    every = error.transpose("definition", "mesh_size").values
+    flags = status.transpose("definition", "mesh_size").values
+    sizes, names = 1e3 * error.mesh_size.values, error.definition.values
+    known = np.isfinite(every)
+    curves = {str(name): 100 * np.maximum(row, FLOOR) for name, row, there in zip(names, every, known) if there.any()}
+    panel.set(xscale="log", yscale="log", xlim=(sizes.min() / 1.2, sizes.max() * 1.2))
+    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    panel.xaxis.set_minor_locator(NullLocator())
+    if not curves:
+        return [], "", f"No definition has a field error here: {_statuses(flags)}."
+    together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
+    together.sort(key=lambda one: np.nanmean(np.log(curves[one[0]])))
+    base, named = next((one for one in together if BASELINE in one), None), together[:MOST_NAMED]
+    if base is not None and base not in named:
+        named[-1] = base
+    others = [name for one in together if one not in named for name in one]
+    for name in others:
+        panel.plot(sizes, curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
+    ends, order = [], names.tolist()
+    for one in named:
+        values, look = curves[one[0]], style.line(order.index(one[0]))
+        there = np.flatnonzero(np.isfinite(values))
+        label = ", ".join(one)
+        if len(there) > 1:
+            rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
+            label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
+        panel.plot(sizes, values, label=label, **look)
+        ends.append((sizes[there[-1]], values[there[-1]], label, look["color"]))
+    said = [f"grey: {', '.join(others)}"] if others else []
+    lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
+    said += [f"no error: {', '.join(lacking)}"] if lacking else []
+    for name, there, flag in zip(names, known, flags):
+        without = sizes[~there & (flag > 0)]
+        if there.any() and len(without):
+            said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said), ""
+
+
+@style.styled
+def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, materials=None, kinematics=None):
+    """Heat map of the deformation error, definition by load, each on its finest mesh, a panel a material.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its root.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as materials; by default a new figure, with a bar of colours.
+    beam, mesh_type, kinematics : str, optional
+        Labels of the scenes. One that is not given must leave no choice.
+    materials : sequence of str, optional
+        By default of those with most scenes three, from the lowest to the highest Poisson's ratio.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_materials,)
+        One a material.
+
+    Raises
+    ------
+    ValueError
+        If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as materials.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_definitions_loads(tree, beam="200x40", mesh_type="free", kinematics="linear")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['steel', 'rubber']
+    >>> [tick.get_text() for tick in axes[0].get_xticklabels()]
+    ['traction', 'compression', 'pressure']
+    """
+    root = unswept(group(data, "/"))
+    chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)
+    root = root.sel(chosen)
+    solved = root.status == 1
+    if materials is None:
+        materials = _spread(root, solved)
+    for material in materials:
+        choose(root.status != 0, material=material)
+    if solved.any():
+        root = root.isel(definition=np.flatnonzero(solved.any(["mesh_size", "load", "material"])))
+    root = root.isel(load=np.flatnonzero((root.status != 0).any(["mesh_size", "definition", "material"])))
+    names, loads = root.definition.values.tolist(), root["load"].values.tolist()
+    left, bottom = 0.12 + max(map(labels.width, names)), 0.32 + max(map(labels.width, loads))
+    room = {wide: (wide - left - 0.62 - 0.08 * (len(materials) - 1)) / (len(loads) * len(materials))
+            for wide in (style.COLUMN, style.PAGE)}  # fmt: skip
+    wide = style.COLUMN if room[style.COLUMN] >= CELL_WIDTH else style.PAGE
+    figure, axes = style.panels(
+        ax, ncols=len(materials), sharey=True, figsize=(wide, 0.62 + bottom + 0.165 * len(names))
+    )
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
+    lines = labels.wrapped(f"{title}: deformation error [%] on the finest mesh solved", wide - 0.1, 8.5)
+    style.arrange(figure, axes, left=left, right=0.62, bottom=bottom, top=0.35 + 0.14 * labels.lines_of(lines),
+                  across=0.08, title=lines)  # fmt: skip
+    doubted = False
+    for panel, material in zip(axes[0], materials):
+        cells = root.sel(material=material)
+        beyond = cells.reference_applies == 0 if "reference_applies" in cells else cells.status < 0
+        beyond = beyond.any([name for name in beyond.dims if name != "load"]).values
+        image = _heat(panel, *(cells[name].transpose("mesh_size", "definition", "load").values
+                               for name in ("deformation_error", "status")), beyond)  # fmt: skip
+        doubted |= bool(beyond.any())
+        panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
+        panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
+        panel.set_yticks(range(len(names)), map(no_mathematics, names))
+        panel.set_title(material)
+        panel.grid(False)
+    if figure is not None:
+        width, height = style.size(figure)
+        bar = figure.add_axes([1 - 0.52 / width, bottom / height, 0.1 / width, 1 - (bottom + 0.63) / height])
+        figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
+        flags = root.status.values
+        said = ["×: no result"] * bool((flags > 1).any()) + ["–: not asked for"] * bool((flags == 0).any())
+        said += ["*: beyond small strain"] * doubted
+        figure.text(0.05 / width, 0.05 / height, "; ".join(said), fontsize=style.SMALL, color="0.25")
+    return axes[0]
+
+
+CELL_WIDTH = 0.3
+"""Width that the number in a cell needs [inch]."""
+
+
+def _heat(panel, errors, flags, beyond):
+    """Draw errors by definition and load, each with its number, marked beyond small strain: an image."""
+    error = np.full(errors.shape[1:], np.nan)
+    for values in 100 * errors[::-1]:  # the finest mesh that each was solved on stays
+        error = np.where(np.isfinite(values), values, error)
+    asked = (flags != 0).any(axis=0)
+    shade = np.log10(np.clip(np.abs(error), 0.1, 100))
+    image = panel.imshow(shade, cmap="YlOrBr", vmin=-1, vmax=2, aspect="auto")
+    for row, column in np.ndindex(error.shape):
+        size = abs(error[row, column])
+        text = f"{error[row, column]:+.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
+        text += "*" * bool(beyond[column])
+        if np.isnan(size):
+            text = "×" if asked[row, column] else "–"
+        colour = "white" if shade[row, column] > 1.2 else "0.5" if text == "–" else "k"
+        panel.text(column, row, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
+    return image
+
+
+def _spread(root, solved):
+    """Materials of which most loads are there; of these the first, the middle and the last by Poisson's ratio."""
+    counts = solved.any("mesh_size").sum(["definition", "load"]).values
+    full = np.flatnonzero(counts > 0.5 * counts.max() if counts.any() else counts == 0)
+    order = full[np.argsort(root.material_poisson_ratio.values[full], kind="stable")]
+    return root.material.values[[*dict.fromkeys((order[0], order[len(order) // 3], order[-1]))]].tolist()

@@ -1,0 +1,125 @@
+"""Effective moduli of definitions: a flag of a grid, and the box on whose meshes they are measured."""
+
+from dataclasses import dataclass
+from itertools import product
+
+from pydantic import Field
+
+from springtune.mesh import MESH_TYPES
+from springtune.problem.geometry import Beam
+from springtune.springs import DEFINITIONS
+
+from ...config.checks import check_particles
+from ...config.fields import Flag, Length
+from ...config.kind import Kind
+from ...config.sections import Section
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+
+class PatchConfig(Section):
+    """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
+
+    They are those of the mesh that a beam of this extent gets: give the extent of the beam that they stand beside.
+    """
+
+    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
+    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Effective moduli of a definition on a patch.
+
+    Attributes
+    ----------
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_type : str
+    mesh_size : float
+        Length of an edge [m].
+    poisson_ratio : float
+        Poisson's ratio that the definition is asked for [1].
+    """
+
+    definition: str
+    mesh_type: str
+    mesh_size: float
+    poisson_ratio: float
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What a study measures.
+
+    Attributes
+    ----------
+    patch : Beam
+        Box on whose meshes moduli are measured; its thickness does not matter.
+    measurements : tuple of Measurement
+    """
+
+    patch: Beam
+    measurements: tuple[Measurement, ...]
+
+
+def _check(config, problems):
+    for name, grid in config.grids.items():
+        made = grid.moduli and any(mesh_type in MESH_TYPES for mesh_type in grid.mesh_type)
+        if made:
+            box = config.patch.length, config.patch.height
+            check_particles(problems, ("grids", name, "mesh_size"), grid.mesh_size, *box)
+
+
+def _expand(config, declared):
+    """Moduli of definitions that derive a stiffness, on every grid that asks for them."""
+    found = {}
+    for grid in config.grids.values():
+        if grid.moduli:
+            derived = [name for name in grid.definition if DEFINITIONS[name].needs != "stiffness"]
+            own = (declared.materials[name].poisson_ratio for name in grid.material)
+            ratios = dict.fromkeys(grid.poisson_ratio or own)
+            found |= dict.fromkeys(product(derived, grid.mesh_type, grid.mesh_size, ratios))
+    if not found:
+        return None
+    box = Beam(config.patch.length, config.patch.height, min(config.patch.length, config.patch.height), "patch")
+    return Measurements(box, tuple(Measurement(*labels) for labels in sorted(found)))
+
+
+def _axes(moduli):
+    return {"poisson_ratio": tuple(sorted({one.poisson_ratio for one in moduli.measurements}))}
+
+
+def _summary(moduli):
+    patches = {(one.mesh_type, one.mesh_size) for one in moduli.measurements}
+    on = "1 patch" if len(patches) == 1 else f"{len(patches)} patches"
+    return [["moduli", len(moduli.measurements), f"measured on {on}"]]
+
+
+KIND = Kind(
+    "moduli",
+    study_fields={
+        "patch": (
+            PatchConfig,
+            Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured."),
+        )
+    },
+    grid_fields={
+        "moduli": (
+            Flag,
+            Field(
+                "false",
+                validate_default=True,
+                description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
+                "Poisson's ratio, on the box under `patch`. Definitions that are told their stiffness have none.",
+            ),
+        )
+    },
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    summary=_summary,
+    stages=STAGES,
+    outputs=OUTPUTS,
+    costs={"moduli": (5e-4, 2e-6)},
+)

@@ -1,0 +1,36 @@
+"""What is made of moduli, beside the errors of scenes."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from ...config.kind import Output
+
+if TYPE_CHECKING:
+    from ...config.model import Study
+
+TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
+"""Tables that compare definitions: of scenes, of moduli, and what to use."""
+
+
+def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, dict[str, object]]:
+    """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type."""
+    found: dict[str, dict[str, object]] = {"definitions_moduli": {}}
+    found |= {f"definitions_size_{load}": {"load": load} for load in loads}
+    return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
+
+
+def _lack(study: "Study") -> str:
+    return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
+
+
+OUTPUTS = (
+    Output(
+        "definitions",
+        "figures and tables that compare definitions",
+        figures=lambda study: figures(study.axes["load"], study.axes["mesh_type"]),
+        plot="studies.kinds.moduli.figures:definitions",
+        tables=lambda study: list(TABLES),
+        write="studies.kinds.moduli.tables",
+        lack=_lack,
+    ),
+)

@@ -1,0 +1,253 @@
+"""Tables that compare definitions: all scenes, all moduli, and which definition to use."""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from springtune.safe_io.atomic import write_text
+
+from ...output.dataset import STATUS, most_requested
+from ...output.selection import unswept
+from ..scenes.variables import SCENE
+from .outputs import TABLES
+from .variables import PATCH
+
+SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
+MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulus_error", "spring_ratio")
+
+
+def write(tree, folder):
+    """Write two CSV files and a page in Markdown.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        With the group ``/moduli``.
+    folder : str or Path
+
+    Returns
+    -------
+    list of str
+        Names of the files written.
+    """
+    root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
+    scene = (*SCENE, *(str(name) for name in root.status.dims if name not in SCENE))  # what is swept, too
+    texts = (_csv(root, scene, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
+    for name, text in zip(TABLES, texts):
+        write_text(Path(folder) / name, text)
+    return list(TABLES)
+
+
+def _csv(data, dimensions, values):
+    """One row for each cell that was asked for."""
+    status = data.status.transpose(*dimensions).values
+    labels = [data[name].values.tolist() for name in dimensions]
+    columns = [data[name].transpose(*dimensions).values for name in (*values, "message")]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*dimensions, "status", *values, "message"])
+    for place in map(tuple, np.argwhere(status != 0)):
+        row = [label[i] for label, i in zip(labels, place)]
+        found = [column[place] for column in columns]
+        numbers = ["" if np.isnan(value) else f"{value:.6g}" for value in found[:-1]]
+        writer.writerow([*row, STATUS[status[place]], *numbers, found[-1]])
+    return text.getvalue()
+
+
+# -- which definition to use -------------------------------------------------------------------------------------------
+
+TABLE_MESH_TYPES = ("structured", "free", "braced", "alternating", "right")
+TABLE_LOADS = ("traction", "bending", "shear")
+
+
+ADVICE = (
+    # what one has, what to use, on which mesh type
+    ("Triangles, and the simulator can couple the sides of a triangle", "delingette", "free"),
+    ("Triangles, springs and an energy of their area", "patch-area", "free"),
+    ("the same, without a patch test", "area", "free"),
+    ("Triangles, springs alone, each fitted", "patch-fit", "free"),
+    ("Triangles, springs alone, scaled", "patch", "free"),
+    ("Rows of near-equilateral triangles, springs alone, no patch test", "van-gelder", "structured"),
+    ("Squares with both diagonals and an energy of their area", "area", "braced"),
+    ("Squares with both diagonals, springs alone", "lattice", "braced"),
+    ("One stiffness for all springs, whatever it costs", "uniform", "structured"),
+)
+
+
+COARSENESS = (0.05, 0.1, np.inf)
+"""Mesh size over the height of the beam [1] up to which errors are summed up together."""
+
+
+def _advice(root):
+    """What to use, with the range of its errors over all beams and mesh sizes, by mesh size over height."""
+    kinematics = most_requested(root, "kinematics")
+    materials = _materials(root, most_requested(root, "beam"))
+    loads = [load for load in TABLE_LOADS if load in root["load"].values]
+    here = root[["deformation_error", "status"]].sel(kinematics=kinematics)
+    ratios = root.mesh_size.values / root.beam_height.values[:, None]
+    heads = [f"{load}, ν = {nu:g}" for load in loads for nu in materials]
+    rows, seen = [], np.zeros((len(COARSENESS), *ratios.shape), dtype=bool)
+    for situation, name, mesh_type in ADVICE:
+        if name not in here.definition.values or mesh_type not in here.mesh_type.values:
+            continue
+        cells = here.sel(definition=name, mesh_type=mesh_type, load=loads, material=list(materials.values()))
+        cells = cells.transpose("load", "material", "beam", "mesh_size")
+        shape = (len(heads), *ratios.shape)
+        errors, flags = (cells[part].values.reshape(shape) for part in ("deformation_error", "status"))
+        low = 0.0
+        for number, high in enumerate(COARSENESS):
+            within = (ratios > low * (1 + 1e-9)) & (ratios <= high * (1 + 1e-9)) & (flags != 0).any(axis=0)
+            low = high
+            if within.any():
+                seen[number] |= within
+                texts = [_range(error[within], flag[within]) for error, flag in zip(errors, flags)]
+                size = f"to {min(high, ratios[within].max()):.3g}"
+                rows.append([situation, f"`{name}`", mesh_type, size, str(within.sum()), *texts])
+                situation = ""
+    if not rows:
+        return []
+    lines = [f"| what you have | usual choice | mesh type | a/H | meshes | {' | '.join(heads)} |"]
+    lines.append("|---|---|---|---|---:|" + "---:|" * len(heads))
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    meshes = "; ".join(
+        ", ".join(f"{root.beam.values[i]} at {1e3 * root.mesh_size.values[j]:g} mm" for i, j in np.argwhere(group))
+        for group in seen if group.any()
+    )  # fmt: skip
+    said = "Each line is the range over all meshes of the study up to its a/H and beyond that of the line before"
+    return [*lines, "", f"{said}: {meshes}."]
+
+
+def _range(errors, flags):
+    """Lowest to highest error of the cells that were asked for, and how many have none."""
+    there = errors[flags == 1]
+    ends = list(dict.fromkeys(_signed(value) for value in (there.min(), there.max()))) if len(there) else []
+    text = " to ".join([*(end.removesuffix(" %") for end in ends[:-1]), *ends[-1:]])
+    missing, requested = int((flags > 1).sum()), int((flags != 0).sum())
+    notes = [f"{missing} not solved"] if missing else []
+    notes += [f"{requested} of {len(flags)}"] if 0 < requested < len(flags) else []
+    return f"{text} ({', '.join(notes)})".strip() if notes else text
+
+
+def decision(tree: xr.DataTree) -> str:
+    """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells.
+
+    Every figure is a cell of the dataset, or the range, median or largest one of cells that the table names.
+    """
+    root, moduli = unswept(tree.to_dataset()), tree["moduli"].to_dataset()
+    advice = _advice(root)
+    parts = ["### In short", "", *advice, ""] if advice else []
+    for mesh_type in TABLE_MESH_TYPES:
+        lines = _attained(root, moduli, mesh_type) if mesh_type in root.mesh_type.values else []
+        if lines:
+            parts += [f"### Mesh type `{mesh_type}`", "", *lines, ""]
+    cells = _paper_cells(root)
+    parts += ["### The paper's cells", "", *cells, ""] if cells else []
+    return "\n".join(parts + _beyond(root))
+
+
+def _beyond(root):
+    """Scenes of these tables whose reference does not apply; nothing without any."""
+    here = root.sel(kinematics=most_requested(root, "kinematics"))
+    if "reference_applies" not in here:
+        return []
+    place = ("material", "load")
+    beyond = (here.reference_applies == 0) & (here.status == 1)
+    beyond = beyond.any([name for name in beyond.dims if name not in place]).transpose(*place)
+    if not beyond.any():
+        return []
+    named = "; ".join(f"{here.material.values[i]}, {here['load'].values[j]}" for i, j in np.argwhere(beyond.values))
+    return [f"Beyond small strain, where errors hold more than the network's own: {named}.", ""]
+
+
+def _materials(root, beam):
+    """Name by Poisson's ratio: the material nearest to 0.3 and the one with the largest, of those with most scenes."""
+    requested = (
+        (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"]).sum("load").values
+    )
+    ratios = root.material_poisson_ratio.values
+    found = np.flatnonzero(requested == requested.max())
+    chosen = sorted(
+        {found[np.argmin(np.abs(ratios[found] - 0.3))], found[np.argmax(ratios[found])]}, key=lambda i: ratios[i]
+    )
+    return {float(ratios[i]): str(root.material.values[i]) for i in chosen}
+
+
+def _attained(root, moduli, mesh_type):
+    """Moduli and deformation errors of one and the same mesh size, the finest, of the beam that most scenes are of."""
+    beam = most_requested(root, "beam")
+    materials = _materials(root, beam)
+    loads = [load for load in TABLE_LOADS if load in root["load"].values]
+    fine, height = min(root.mesh_size.values), float(root.beam_height.sel(beam=beam))
+    here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_requested(root, "kinematics"))
+    ratios = [ratio for ratio in materials if ratio in moduli.poisson_ratio.values]
+    heads = [f"E at {nu:g}" for nu in ratios] + [f"ν at {nu:g}" for nu in ratios]
+    heads += [f"{load}, {nu:g}" for load in loads for nu in materials]
+    rows = []
+    for name in root.definition.values:
+        if name not in moduli.definition.values or mesh_type not in moduli.mesh_type.values:
+            continue
+        patch, scenes = moduli.sel(definition=name, mesh_type=mesh_type), here.sel(definition=name)
+        both = (patch.status == 1).any("poisson_ratio") & (scenes.status == 1).any(["material", "load"])
+        if not both.any():
+            continue
+        size = float(both.mesh_size[both.values].min())
+        patch, scene = patch.sel(mesh_size=size), scenes.sel(mesh_size=size)
+        cells = [_signed(patch.young_modulus_error.sel(poisson_ratio=nu)) for nu in ratios]
+        cells += [_plain(patch.effective_poisson_ratio.sel(poisson_ratio=nu), 3) for nu in ratios]
+        cells += [
+            _signed(scene.deformation_error.sel(load=load, material=material))
+            for load in loads
+            for material in materials.values()
+        ]
+        seconds = float(scene.definition_seconds.max())
+        cells.append(f"{1e3 * seconds:.0f} ms" if seconds >= 5e-4 else "< 1 ms")
+        mark = "" if size == fine else f" ({1e3 * size:g} mm)"
+        rows.append(f"| `{name}`{mark} | {' | '.join(cells)} |")
+    if not rows:
+        return []
+    box = [1e3 * moduli.attrs[f"patch_{part}"] for part in ("length", "height")]
+    same = np.allclose(box, [1e3 * float(root[f"beam_{part}"].sel(beam=beam)) for part in ("length", "height")])
+    extent = f"{box[0]:g} x {box[1]:g} mm"
+    of = f"beam of {extent}" if same else f"beam {beam}; moduli are of the meshes of a {extent} sheet"
+    note = f"All at {1e3 * fine:g} mm (a/H = {fine / height:.3g}), but where a row says otherwise; {of}."
+    head = [f"| definition | {' | '.join(heads)} | cost |", "|---|" + "---:|" * (len(heads) + 1)]
+    return [note, "", *head, *rows]
+
+
+def _paper_cells(root):
+    """Median and largest error over beams, mesh sizes and the paper's three loads and materials."""
+    pairs = (("steel", "traction"), ("steel", "compression"), ("rubber", "traction"))
+    if not {"steel", "rubber"} <= set(root.material.values) or not {"traction", "compression"} <= set(
+        root["load"].values
+    ):
+        return []
+    errors = [
+        root.deformation_error.sel(material=material, load=load, kinematics=most_requested(root, "kinematics"))
+        for material, load in pairs
+    ]
+    lines = ["| definition | mesh type | steel, median | largest | rubber, median | largest |"]
+    lines.append("|---|---|---:|---:|---:|---:|")
+    for name in root.definition.values:
+        for mesh_type in root.mesh_type.values:
+            found = [error.sel(definition=name, mesh_type=mesh_type).values.ravel() for error in errors]
+            if np.isfinite(found[2]).any():
+                texts = []
+                for values in (np.concatenate(found[:2]), found[2]):
+                    values = 100 * np.abs(values[np.isfinite(values)])
+                    texts += [f"{np.median(values):.2f} %", f"{values.max():.2f} %"]
+                lines.append(f"| `{name}` | {mesh_type} | {' | '.join(texts)} |")
+    return lines
+
+
+def _signed(value):
+    value = 100 * float(value)
+    if np.isnan(value):
+        return ""
+    return f"{value:+.1f} %".replace("-", "−") if abs(value) >= 0.05 else "0.0 %"
+
+
+def _plain(value, digits):
+    return "" if np.isnan(float(value)) else f"{float(value):.{digits}f}".replace("-", "−")

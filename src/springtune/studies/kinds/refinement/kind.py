@@ -1,0 +1,271 @@
+"""Refinement: a study's section ``refine``, one task a refinement and definition."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from springtune.mesh import MESH_TYPES
+from springtune.problem.geometry import Beam, warn_of_thickness
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
+from springtune.springs import DEFINITIONS
+
+from ...config.checks import check_beam_material, check_known, check_particles
+from ...config.fields import (
+    BeamName,
+    DefinitionName,
+    Force,
+    Kinematics,
+    Length,
+    Load,
+    MaterialName,
+    Named,
+    OneOrMore,
+    Scalar,
+    number,
+    one_of,
+)
+from ...config.kind import Kind
+from ...config.messages import refuse, show
+from ...config.sections import Section
+from .batches import Rule
+from .names import SPACINGS, VARIED
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+MOST_REFINED = 10_001
+"""Most values of a refinement."""
+
+MADE = ("mesh_size", "force")
+"""Parameters that a refinement states where it does not vary them; beam and material have the others."""
+
+
+def _read_share(value: str) -> float:
+    text = value.strip()
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        raise refuse(f"{show(value)} is not a share; give one such as '1 %'") from None
+    if not 0 < share < 1:  # a plain 1 is meant as 1 %, as likely as not
+        raise refuse(f"{show(value)} is out of range; give a share above 0 % and below 100 %, such as '1 %'")
+    return share
+
+
+Share = Annotated[
+    float,
+    Scalar(_read_share, {"type": ["string", "number"], "examples": ["1 %"]}, "a share such as '1 %'"),
+]
+End = Annotated[
+    str,
+    Scalar(str, {"type": ["string", "number"], "examples": ["1 mm"]}, "a value of the parameter, such as '1 mm'"),
+]
+Count = Annotated[int, number("a whole number from 2 to 10001, such as 33", 2, MOST_REFINED, whole=True)]
+MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
+ParameterName = Annotated[str, one_of("parameter", VARIED)]
+Spacing = Annotated[str, one_of("spacing", SPACINGS)]
+
+
+class RefinementConfig(Section):
+    """Values of one parameter, added in batches where the error changes its sign or crosses a tolerance.
+
+    The first batch is evenly spaced. Every further one halves all intervals in which the deformation error crosses
+    zero or the tolerance, of either sign, until they are as narrow as the resolution, or there are as many values as
+    there may be. Each definition has values of its own. A larger `most` goes on where a smaller one ended.
+    """
+
+    beam: BeamName = Field(description="Beam.")
+    mesh_type: MadeType = Field("structured", validate_default=True, description="Mesh type, of those that are made.")
+    mesh_size: Length | None = Field(
+        None, description="Length of an edge; not where it is the parameter, needed elsewhere."
+    )
+    material: MaterialName = Field(description="Material.")
+    load: Load = Field(description="Load.")
+    force: Force | None = Field(None, description="Magnitude; not where it is the parameter, needed elsewhere.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference."
+    )
+    kinematics: Kinematics = Field("nonlinear", validate_default=True, description="Kinematics of the network.")
+    parameter: ParameterName = Field(description="What is varied: " + "; ".join(
+        f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip
+    start: End = Field(alias="from", description="Smallest value, with its unit.")
+    stop: End = Field(alias="to", description="Largest value, with its unit.")
+    points: Count = Field("5", validate_default=True, description="Values of the first batch, both ends included.")
+    spacing: Spacing = Field(
+        "linear", validate_default=True, description="Whether values or their logarithms are evenly spaced."
+    )
+    tolerance: Share = Field("1 %", validate_default=True, description="Size of the error that matters.")
+    resolution: Share = Field(
+        "0.1 %",
+        validate_default=True,
+        description="Width of an interval that is narrow enough, of that between the ends.",
+    )
+    most: Count = Field("33", validate_default=True, description="Values at most, of each definition.")
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A refinement of one definition.
+
+    Attributes
+    ----------
+    name : str
+    beam : Beam
+    material : Material
+    load : str
+        Key of `springtune.problem.loads.LOADS`.
+    force : float
+        With its sign [N]; that of the load where it is the parameter, and its size elsewhere.
+    mesh_type : str
+    mesh_size : float
+        Length of an edge [m]; zero where it is the parameter.
+    definition, kinematics : str
+    parameter : str
+        Key of `springtune.studies.kinds.refinement.names.VARIED`.
+    rule : Rule
+    """
+
+    name: str
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+    mesh_type: str
+    mesh_size: float
+    definition: str
+    kinematics: str
+    parameter: str
+    rule: Rule
+
+
+def _check(config, problems):
+    for name, section in (config.refine or {}).items():
+        path = "refine", name
+        check_known(problems, (*path, "beam"), "beam", section.beam, config.beams)
+        check_beam_material(problems, (*path, "material"), section.material, config)
+        _check_definitions(section, path, problems)
+        material = config.materials.get(section.material)
+        if material and material.uniaxial_test and section.parameter in ("young_modulus", "poisson_ratio"):
+            problems.add(
+                (*path, "material"),
+                f"'{section.material}' has a uniaxial_test, which says its moduli; vary another parameter, or take "
+                "another material",
+            )
+        for made in MADE:
+            given = getattr(section, made) is not None
+            if given and made == section.parameter:
+                problems.add((*path, made), "is the parameter that is varied; remove it, or vary another one")
+            elif not given and made != section.parameter:
+                example = {"mesh_size": "2 mm", "force": "10 kN"}[made]
+                problems.add(path, f"no {made}; give one such as {made}: {example}, or vary it")
+        if section.most < section.points:
+            problems.add((*path, "most"), f"{section.most} is below 'points', {section.points}; give at least as many")
+        ends = _ends(section, path, problems)
+        if section.beam in config.beams and (ends or section.parameter != "mesh_size"):
+            sizes = {"mesh_size": section.mesh_size}
+            if section.parameter == "mesh_size":
+                sizes = dict(zip(("from", "to"), ends))
+            _check_sizes(section, sizes, config.beams[section.beam], path, problems)
+
+
+def _ends(section, path, problems):
+    """Both ends of a refinement in SI units; nothing where they are wrong, which is noted."""
+    known, found = VARIED[section.parameter], []
+    for key, text in (("from", section.start), ("to", section.stop)):
+        try:
+            found.append(known.read(text))
+        except ValueError as error:
+            problems.add((*path, key), str(error))
+    if len(found) < 2:
+        return None
+    if not found[0] < found[1]:
+        problems.add((*path, "from"), f"'{section.start}' is not below 'to', '{section.stop}'; give a smaller 'from'")
+        return None
+    if section.spacing == "logarithmic" and not found[0]:
+        problems.add((*path, "from"), "0 has no logarithm; give a larger one, or spacing: linear")
+        return None
+    return found
+
+
+def _check_sizes(section, sizes, beam, path, problems):
+    for key, size in sizes.items():
+        if size is None:
+            continue
+        refusal = MESH_TYPES[section.mesh_type].refusal(beam.length, beam.height, size, f"beam '{section.beam}'")
+        if refusal:
+            problems.add((*path, key), f"{1e3 * size:g} mm {refusal}")
+        else:
+            check_particles(problems, (*path, key), [size], beam.length, beam.height)
+
+
+def _check_definitions(section, path, problems):
+    corners, kind = MESH_TYPES[section.mesh_type].corners, LOADS[section.load].kind
+    able = [
+        other
+        for other, one in DEFINITIONS.items()
+        if not one.needs and corners in one.cells and (kind.uniaxial or not one.uniaxial)
+    ]
+    for name in section.definition:
+        if name not in able:
+            on = f"on '{section.mesh_type}' meshes in {section.load}"
+            message = f"'{name}' needs a reference or a stated stiffness, or other cells or loads; {on} choose of"
+            problems.add((*path, "definition"), f"{message} {', '.join(able)}")
+
+
+def _expand(config, declared):
+    found = []
+    for name, section in (config.refine or {}).items():
+        known = VARIED[section.parameter]
+        start, stop = known.read(section.start), known.read(section.stop)
+        rule = Rule(
+            start,
+            stop,
+            section.points,
+            section.spacing == "logarithmic",
+            section.tolerance,
+            section.resolution,
+            section.most,
+        )
+        beam, material = declared.beams[section.beam], declared.materials[section.material]
+        if section.parameter == "thickness":
+            warn_of_thickness(max(start, stop), (beam.length, beam.height), f"refine.{name}")
+        force = LOADS[section.load].sign * (1.0 if section.force is None else section.force)
+        body = beam, material, section.load, force, section.mesh_type, section.mesh_size or 0.0
+        found += [
+            Refinement(name, *body, definition, section.kinematics, section.parameter, rule)
+            for definition in DEFINITIONS
+            if definition in section.definition
+        ]
+    return tuple(found)
+
+
+def _axes(refinements):
+    return {
+        "definition": {one.definition for one in refinements},
+        "refinement": tuple(dict.fromkeys(one.name for one in refinements)),
+    }
+
+
+def _summary(refinements):
+    if not refinements:
+        return []
+    first, most = (sum(getattr(one.rule, name) for one in refinements) for name in ("points", "most"))
+    return [["refined", first, f"values to begin with, at most {most}, where errors cross zero or a tolerance"]]
+
+
+KIND = Kind(
+    "refinement",
+    study_fields={
+        "refine": (
+            Annotated[dict[str, RefinementConfig], Named("refinement", for_files=False)] | None,
+            Field(None, description="Values that are added where an error matters; they make the group `/refinement`."),
+        )
+    },
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    summary=_summary,
+    stages=STAGES,
+    outputs=OUTPUTS,
+    costs={"refinement": (3e-2, 1.2e-5)},
+)

@@ -1,0 +1,180 @@
+"""Designs: points of the unit cube, and the parameters of scenes that distributions make of them.
+
+All are extendable: the first half of a sample of twice the size is the sample, bit for bit.
+"""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .names import FIRST_ROLES, SOBOL_INDICES, rows_each
+
+
+def points(design: str, size: int, dimensions: int, seed: int, first: int = 0, last: int | None = None) -> np.ndarray:
+    """Points of the unit cube.
+
+    Parameters
+    ----------
+    design : str
+        One of `springtune.studies.kinds.samples.names.DESIGNS`.
+    size : int
+        How many: a power of two.
+    dimensions : int
+    seed : int
+    first, last : int, optional
+        First of them to return, and that after the last one.
+
+    Returns
+    -------
+    ndarray of float, shape (last - first, dimensions)
+
+    Notes
+    -----
+    Sobol points are scrambled (Owen 1998, as scipy does), `dimensions` of them first for the rows A and as many for B.
+    A Latin hypercube has one point in each of `size` strata of every dimension; one of twice the size keeps its points,
+    each of which lies in one half of its stratum, and fills the other halves in an order of its own (as Sallaberry,
+    Helton and Hora, Reliab. Eng. Syst. Saf. 93:1047, 2008, without their correlations).
+
+    Examples
+    --------
+    >>> first, more = (points("latin-hypercube", size, 2, seed=1) for size in (8, 16))
+    >>> bool((more[:8] == first).all()), sorted(int(16 * x) for x in more[:, 0]) == list(range(16))
+    (True, True)
+    """
+    if design == "latin-hypercube":
+        return _latin_hypercube(size, dimensions, seed)[first:last].copy()
+    from scipy.stats import qmc  # here: it costs half a second
+
+    engine = qmc.Sobol(dimensions, scramble=True, seed=np.random.default_rng(seed))
+    if first:
+        engine.fast_forward(first)
+    return np.asarray(engine.random((size if last is None else last) - first))
+
+
+@lru_cache(maxsize=1)  # all tasks of a sample ask for parts of the same points
+def _latin_hypercube(size: int, dimensions: int, seed: int) -> np.ndarray:
+    found = np.random.default_rng([seed, 0]).random((1, dimensions))
+    while len(found) < size:
+        count = len(found)
+        random = np.random.default_rng([seed, count])
+        new = np.empty_like(found)
+        for axis in range(dimensions):
+            # Sizes are powers of two, so that products with them are exact.
+            empty = np.setdiff1d(np.arange(2 * count), (2 * count * found[:, axis]).astype(int))
+            places = random.permutation(empty) + random.random(count)
+            new[:, axis] = np.minimum(places, np.nextafter(np.floor(places) + 1.0, 0.0)) / (2 * count)
+        found = np.concatenate([found, new])
+    return found
+
+
+def quantile(distribution: Mapping[str, Any], shares: np.ndarray) -> np.ndarray:
+    """Values of a distribution below which it has shares of its probability.
+
+    Parameters
+    ----------
+    distribution : dict
+        ``distribution`` (a name), ``low`` and ``high``, its ends, and ``mode`` or ``mean`` and ``deviation``.
+    shares : ndarray of float
+        From 0 to 1.
+
+    Returns
+    -------
+    ndarray of float
+
+    Examples
+    --------
+    >>> spread = {"distribution": "log-uniform", "low": 1.0, "high": 100.0}
+    >>> quantile(spread, np.array([0.0, 0.5, 1.0])).round(9).tolist()
+    [1.0, 10.0, 100.0]
+    """
+    from scipy import stats
+
+    name, low, high = distribution["distribution"], distribution["low"], distribution["high"]
+    if name == "fixed":
+        return np.full_like(shares, low)
+    if name == "uniform":
+        frozen = stats.uniform(low, high - low)
+    elif name == "log-uniform":
+        frozen = stats.loguniform(low, high)
+    elif name == "triangular":
+        frozen = stats.triang((distribution["mode"] - low) / (high - low), low, high - low)
+    else:
+        mean, deviation = distribution["mean"], distribution["deviation"]
+        frozen = stats.truncnorm((low - mean) / deviation, (high - mean) / deviation, mean, deviation)
+    # Rounding must not take a value beyond what was checked.
+    return np.clip(frozen.ppf(shares), low, high)
+
+
+def varied(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Names of the parameters that are not fixed, in their order."""
+    return [name for name, one in parameters.items() if one["distribution"] != "fixed"]
+
+
+def roles(design: str, names: list[str]) -> list[str]:
+    """What each row of a base sample is.
+
+    Parameters
+    ----------
+    design : str
+    names : list of str
+        Parameters that vary.
+
+    Returns
+    -------
+    list of str
+        ``"A"``, ``"B"``, and for each parameter A with this one of B; a single text where rows stand alone.
+
+    Examples
+    --------
+    >>> roles("sobol-indices", ["length", "force"])
+    ['A', 'B', 'AB_length', 'AB_force']
+    """
+    return [*FIRST_ROLES, *(f"AB_{name}" for name in names)] if design == SOBOL_INDICES else [FIRST_ROLES[0]]
+
+
+def draw(
+    design: str, seed: int, parameters: Mapping[str, Mapping[str, Any]], first: int, last: int
+) -> dict[str, np.ndarray]:
+    """Parameters of the scenes of some base samples.
+
+    Parameters
+    ----------
+    design : str
+        One of `springtune.studies.kinds.samples.names.DESIGNS`.
+    seed : int
+    parameters : dict of str to dict
+        Distributions by the parameter's name, see `quantile`.
+    first, last : int
+        First base sample, and that after the last one.
+
+    Returns
+    -------
+    dict of str to ndarray of float, shape (n_rows,)
+        By the parameter's name, ``mesh_size`` among them; rows of a base sample one after the other, see `roles`.
+
+    Notes
+    -----
+    Rows A and B of a base sample are the halves of one point of twice the dimensions; AB_i is A with the parameter i of
+    B (Saltelli et al., Comput. Phys. Commun. 181:259, 2010).
+    """
+    names = varied(parameters)
+    count, pair = len(names), design == SOBOL_INDICES
+    size = 1 << (last - 1).bit_length()  # a power of two
+    shares = points(design, size, count * (2 if pair else 1), seed, first, last)
+    rows = rows_each(design, count)
+    table = np.repeat(shares[:, None, :count], rows, axis=1)
+    if pair:
+        other = shares[:, count:]
+        table[:, 1] = other
+        for axis in range(count):
+            table[:, 2 + axis, axis] = other[:, axis]
+    table = table.reshape(-1, count)
+    found = {
+        name: quantile(one, table[:, names.index(name)] if name in names else np.zeros(len(table)))
+        for name, one in parameters.items()
+    }
+    if "mesh_size" not in found:
+        found["mesh_size"] = found["relative_mesh_size"] * found["height"]
+    return found

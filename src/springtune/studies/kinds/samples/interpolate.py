@@ -1,0 +1,56 @@
+"""Stage `interpolate`: the references of all beams of a sample, as one function of aspect and Poisson's ratio.
+
+Where no such function is good enough the references of a small sample are solved one by one.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from ...runs import store
+from ...runs.task_costs import Spent
+from ..scenes import stored_interpolant
+from .designs import draw
+
+
+def run(tasks: dict[str, Any], spent: Spent) -> None:
+    """Build the interpolants that are not there yet.
+
+    Parameters
+    ----------
+    tasks : dict
+        ``folder``; ``references``, each with ``key``, ``kind`` (of load, by name) and ``box`` (of aspect ratios and
+        Poisson's ratios); and ``sample`` where references may be solved one by one: ``design, seed, parameters,
+        first, last`` as `springtune.studies.kinds.samples.designs.draw` takes them.
+    spent : Spent
+        What tasks cost is added to it.
+    """
+    pairs = set()
+    if tasks["sample"]:
+        drawn = draw(**tasks["sample"])
+        pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
+    for task in tasks["references"]:
+        problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
+        path = Path(tasks["folder"]) / f"{task['key']}.h5"
+        stored_interpolant.make(path, task | {"problems": problems}, spent)
+
+
+def lose(tasks: dict[str, Any], key: str, why: str, limits: str) -> None:
+    """Store that a reference or an interpolant is beyond its limits; parameters as of other stages."""
+    path = Path(tasks["folder"]) / f"{key.partition(' ')[0]}.h5"
+    store.add(path, {key: stored_interpolant.hole(why) | {store.LIMITS: limits}})
+
+
+def problem_key(reference: str, aspect_ratio: float, nu: float) -> str:
+    """Key of a reference that is solved by itself, in the file of the interpolant that it lacks.
+
+    Parameters
+    ----------
+    reference : str
+        Key of the interpolant.
+    aspect_ratio, nu : float
+
+    Returns
+    -------
+    str
+    """
+    return f"{reference} {float(aspect_ratio)!r} {float(nu)!r}"

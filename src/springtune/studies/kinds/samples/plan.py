@@ -1,0 +1,153 @@
+"""Stages of samples: what their jobs are to do, and the keys of what they store."""
+
+from functools import cache
+from pathlib import Path
+
+from springtune.problem.loads import LOADS
+
+from ...config.kind import Stage
+from ...runs.hashing import hash_of
+from ...runs.keys import definition_key, mesh_type_key, stage_key
+from ..scenes.interpolated import expected_solves
+from .names import MOST_SOLVED, blocks, rows_each
+
+UNIFORM = "uniform"
+"""Definition whose networks tell the best uniform stiffness."""
+
+
+def load_kinds(sample):
+    """Kinds of load of a sample."""
+    return list(dict.fromkeys(LOADS[name].kind for name in sample.loads))
+
+
+def definitions(sample):
+    """Definitions whose networks are solved."""
+    wanted = (UNIFORM,) if sample.best_stiffness and UNIFORM not in sample.definitions else ()
+    return (*sample.definitions, *wanted)
+
+
+def reference_box(sample):
+    """First and last aspect ratio, and first and last Poisson's ratio."""
+    length, height, ratio = (sample.parameters[name] for name in ("length", "height", "poisson_ratio"))
+    return [length["low"] / height["high"], length["high"] / height["low"]], [ratio["low"], ratio["high"]]
+
+
+def reference_key(sample, kind):
+    """Key of the references of a kind of load, as one function."""
+    code = stage_key("studies.kinds.samples.interpolate", without=("studies.kinds.samples.designs",))
+    return hash_of(kind.name, reference_box(sample), code)
+
+
+def block_key(sample, first, last):
+    """Key of the parameters of some base samples, and stem of the file of their results on meshes of any type."""
+    return hash_of(
+        sample.design, sample.seed, sample.parameters, first, last, stage_key("studies.kinds.samples.designs")
+    )
+
+
+@cache
+def _solved_with(mesh_type, definition):
+    return hash_of(stage_key("studies.kinds.samples.stage"), mesh_type_key(mesh_type), definition_key(definition))
+
+
+def result_key(sample, load, definition):
+    """Key of the scenes of a load and definition, in the file of any base samples.
+
+    Of linear kinematics they are for 1 N, which loads of a kind share.
+    """
+    linear = sample.kinematics == "linear"
+    how = LOADS[load].kind.name if linear else [LOADS[load].kind.name, LOADS[load].sign, LOADS[load].follower]
+    return hash_of(how, sample.mesh_type, sample.kinematics, _solved_with(sample.mesh_type, definition))
+
+
+def _reference_members(study, costs):
+    sample = study.parts["samples"]
+    if not sample:
+        return {}
+    seconds = costs.of("interpolant", expected_solves(reference_box(sample)))
+    return {kind.name: (seconds, kind) for kind in load_kinds(sample)}
+
+
+def _references(study, folder, kinds):
+    sample = study.parts["samples"]
+    box, drawn = reference_box(sample), None
+    if sample.rows <= MOST_SOLVED:
+        drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
+        drawn |= {"first": 0, "last": sample.size}
+    return {
+        "folder": str(folder / "samples"),
+        "references": [{"key": reference_key(sample, kind), "kind": kind.name, "box": box} for kind in kinds],
+        "sample": drawn,
+    }
+
+
+def _reference_products(content):
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["references"]]
+
+
+def _members(study, costs):
+    """Tasks of some base samples each; those of a sample of half the size are the first of them."""
+    sample = study.parts["samples"]
+    if not sample:
+        return {}
+    return {
+        f"{first}-{last}": (seconds_of(sample, (first, last), costs), (first, last))
+        for first, last in drawn_blocks(sample)
+    }
+
+
+def drawn_blocks(sample):
+    """First and last base sample of each task: of the whole sample, or of the part that a study asks for."""
+    return sample.blocks or blocks(sample.design, sample.size)
+
+
+def seconds_of(sample, ends, costs):
+    """What the task of some base samples is expected to take."""
+    each = rows_each(sample.design, len(sample.varied)) * len(sample.loads) * len(definitions(sample))
+    return costs.of("sampled", (ends[1] - ends[0]) * each)
+
+
+def _content(study, folder, members):
+    sample = study.parts["samples"]
+    results = {}
+    for load in sample.loads:
+        for definition in definitions(sample):
+            scene = {"kind": LOADS[load].kind.name, "definition": definition}
+            if sample.kinematics == "nonlinear":
+                scene |= {"sign": LOADS[load].sign, "follower": LOADS[load].follower}
+            results[result_key(sample, load, definition)] = scene
+    return {
+        "folder": str(folder / "samples"),
+        "design": sample.design,
+        "seed": sample.seed,
+        "parameters": sample.parameters,
+        "mesh_type": sample.mesh_type,
+        "kinematics": sample.kinematics,
+        "meshed": hash_of(stage_key("studies.kinds.samples.stage"), mesh_type_key(sample.mesh_type)),
+        "results": results,
+        "blocks": [{"key": block_key(sample, *ends), "first": ends[0], "last": ends[1]} for ends in members],
+    }
+
+
+def _products(content):
+    return [Path(content["folder"]) / f"{block['key']}.h5" for block in content["blocks"]]
+
+
+STAGES = (
+    Stage(
+        "interpolate",
+        "studies.kinds.samples.interpolate",
+        "Interpolating the references of samples",
+        _references,
+        _reference_products,
+        _reference_members,
+    ),
+    Stage(
+        "sample",
+        "studies.kinds.samples.stage",
+        "Solving the networks of samples",
+        _content,
+        _products,
+        _members,
+    ),
+)

@@ -1,0 +1,35 @@
+"""References as curves and the dataset want them, whether solved by themselves or interpolated.
+
+Scenes need whole fields, which interpolants have not: the stage `solve` reads `stored_reference` alone, and does not
+depend on finite elements.
+"""
+
+from . import stored_interpolant, stored_reference
+
+
+def read(folder, reference, fields=()):
+    """Reference of a beam, material and kind of load.
+
+    Parameters
+    ----------
+    folder, fields
+        As of `springtune.studies.kinds.scenes.stored_reference.read`.
+    reference : dict
+        As there; where it is interpolated, with ``interpolant``, the key of that, and ``problem``, the aspect ratio and
+        Poisson's ratio.
+
+    Returns
+    -------
+    dict
+        As there. One that is interpolated has no arrays, and ``solves``, the number of solutions behind it.
+    """
+    if "interpolant" not in reference:
+        return stored_reference.read(folder, reference, fields)
+    interpolant, results, seconds, why = stored_interpolant.read(folder, reference["interpolant"])
+    if interpolant is None:
+        found = results.get(reference["key"], {"message": why, "seconds": 0.0})
+    else:
+        answers = interpolant.evaluate(*reference["problem"])
+        found = {name: float(getattr(answers, name)) for name in stored_interpolant.ANSWERS}
+        found |= {"message": "", "seconds": seconds, "solves": interpolant.solves}
+    return stored_reference.scaled(found, reference)

@@ -1,0 +1,35 @@
+"""Stage `calibrate`: the calibrated stiffness of each mesh type, from the best stiffness of its sensitivity curves."""
+
+from pathlib import Path
+
+from springtune.springs.calibrated import calibrate
+
+from ...runs import checked_json, store
+
+
+def run(tasks, spent):
+    """Calibrate from the stored curves.
+
+    Parameters
+    ----------
+    tasks : dict
+        ``curves`` (folder) and ``groups``, each with ``name`` and ``members``, and each of these with
+        ``mesh, curve`` (its key)``, load, force``.
+    spent : Spent
+        What tasks cost is added to it.
+    """
+    results = {}
+    for group in tasks["groups"]:
+        try:
+            results[group["name"]] = {"stiffness": calibrate(_best(tasks, member) for member in group["members"])}
+        except ValueError as error:
+            results[group["name"]] = {"stiffness": None, "message": str(error)}
+    checked_json.write(tasks["file"], results)
+
+
+def _best(tasks, member):
+    """What a curve is called, its best stiffness [N/m], and why there is none."""
+    name = member["curve"]
+    curve = store.read(Path(tasks["curves"]) / f"{member['mesh']}.h5", [name])[name]
+    called = f"{member['mesh']} in {member['load']} of {member['force']:g} N"
+    return called, curve["best_stiffness"], curve["best_message"]

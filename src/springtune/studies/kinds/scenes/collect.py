@@ -1,0 +1,400 @@
+"""Scenes, references and curves, gathered in the root of a dataset and its groups."""
+
+from functools import cache
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.boundary import FACE_POSITIONS
+from springtune.problem.compare import deformation_error
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Rubber
+from springtune.problem.status import Status
+from springtune.reference.field import interpolate, outline
+from springtune.reference.limits import objection
+from springtune.springs.lattice import predicted_stiffness
+
+from ...config.model import Reference
+from ...config.shown import keeps_fields
+from ...output.dataset import NO_NODE, Filler
+from ...output.selection import OF_FIELDS
+from ...runs import checked_json, store
+from . import any_reference, plan, stored_mesh
+from .outputs import pressed
+from .stored_scene import PACKED, fields_key, unpacked
+from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, fields_of, swept
+
+COPIED = (
+    "displacement",
+    "stiffness",
+    "message",
+    "iterations",
+    "residual",
+    "negative_pivots",
+    "field_error",
+    "definition_seconds",
+    "definition_evaluations",
+    "spring_ratio",
+    "load_share",
+    "solver",
+)
+"""What of a scene's result goes into the dataset as it is."""
+
+
+SMALL_STRAIN = "small-strain-plane-stress"
+"""Name of the reference that all studies have."""
+
+FACE_VARIABLES = {
+    "displacement": "face_displacement",
+    "face_mean": "face_mean_displacement",
+    "face_profile": "face_profile",
+    "last_displacement": "last_face_displacement",
+}
+"""Values of a pressed face by their names in a result."""
+
+
+def groups(study, folder):
+    """Groups of a dataset.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where the study's results are.
+
+    Returns
+    -------
+    dict of str to xarray.Dataset
+    """
+    axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
+    root = Filler(swept(ROOT, study).empty(axes))
+    _meshes(study, folder, root)
+    displacements, objections = _references(study, folder, root)
+    block = _block(study, folder, axes) if pressed(study) else None
+    kept = keeps_fields(study) and not plan.shown_scenes(study).isdisjoint(study.scenes)  # a part may show none
+    fields = _fields(study, folder, axes) if kept else None
+    _scenes(study, folder, root, block, fields, objections)
+    _bodies(study, root)
+    _printed(study, root)
+    data = root.data
+    _compare(data.deformation_error, data.displacement, data.reference_displacement)
+    found = {ROOT.name: data}
+    if study.curves:
+        found[SENSITIVITY.name] = _sensitivity(study, folder, displacements, axes)
+    if study.further_references:
+        found[FINITE_STRAIN.name] = _finite_strain(study, folder, axes, data.displacement)
+    if block:
+        pressed_faces = block.data
+        _compare(pressed_faces.face_error, pressed_faces.face_displacement, pressed_faces.reference_face_displacement)
+        found[BLOCK.name] = pressed_faces
+    if fields:
+        found[FIELDS.name] = fields.data
+    return found
+
+
+def _bodies(study, root):
+    """Materials and beams; what rubber was fitted by, and how well, beside its modulus."""
+    fits = {}
+    for material in {scene.material for scene in study.scenes}:
+        values = {
+            "material_young_modulus": material.young_modulus,
+            "material_poisson_ratio": material.poisson_ratio,
+            "material_density": np.nan if material.density is None else material.density,
+        }
+        labels = {"young_modulus": material.young_modulus, "poisson_ratio": material.poisson_ratio}
+        root.put(values, material=material.name, **labels)
+        if isinstance(material, Rubber):
+            fits[material.name] = material
+    if fits:
+        root.data.material_young_modulus.attrs["comment"] = "; ".join(
+            f"{name}: Yeoh's law of {', '.join(f'{c:.6g}' for c in law.coefficients)} Pa, fitted to a uniaxial test; "
+            "root mean square of its relative errors "
+            + ", ".join(f"{100 * error:.2g} % ({test})" for test, error in law.errors.items())
+            for name, law in sorted(fits.items())
+        )
+    for beam in {scene.mesh.beam for scene in study.scenes}:
+        body = {"beam_length": beam.length, "beam_height": beam.height, "beam_thickness": beam.thickness}
+        root.put(body, beam=beam.name, thickness=beam.thickness)
+
+
+def _reference_of(scene):
+    """Reference of a scene or a curve."""
+    return Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
+
+
+def _mesh_labels(mesh):
+    return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
+
+
+def _calibration(study, folder):
+    """Calibrated stiffnesses by group; none where no scene is calibrated."""
+    return checked_json.demand(plan.calibration_path(folder)) if plan.calibrated(study) else {}
+
+
+def _meshes(study, folder, root):
+    for mesh in study.meshes:
+        notes = stored_mesh.read_notes(folder / "meshes", plan.stem(mesh))
+        root.put({label: value for label, value in notes.items() if label in root.data}, **_mesh_labels(mesh))
+
+
+def _references(study, folder, root):
+    """Displacement of each reference, and by reference and kinematics objections to it."""
+    displacements, objections, interpolated = {}, {}, 0
+    read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
+    for one in study.references:
+        result = read(one.beam, one.material, one.load)  # for 1 N: whatever the forces, it is read once
+        labels = study.labels(one)
+        for kinematics in study.axes["kinematics"]:
+            objections[one, kinematics] = found = objection(result, one.force, kinematics)
+            root.put({"reference_applies": not found}, kinematics=kinematics, **labels)
+        values = {
+            "reference_seconds": result["seconds"],
+            "reference_message": objection(result, one.force, "nonlinear"),
+        }
+        if "force" in root.data.data_vars:
+            values["force"] = one.force
+        if "displacement" in result:
+            displacements[one] = one.force * result["displacement"]
+            values |= {
+                "reference_displacement": displacements[one],
+                "reference_error_estimate": result["error_estimate"],
+                "reference_rotation": abs(one.force) * result["rotation"],
+                "reference_strain": abs(one.force) * result["strain"],
+            }
+        root.put(values, **labels)
+        interpolated += "solves" in result
+    if interpolated:
+        root.data.reference_displacement.attrs["comment"] = (
+            f"{interpolated} of {len(study.references)} are interpolated between finite-element solutions over aspect "
+            "ratio and Poisson's ratio, which is part of reference_error_estimate; they have no field_error"
+        )
+    return displacements, objections
+
+
+def _reference(study, folder, one, fields=()):
+    reference = plan.reference_of(study, one.beam, one.material, one.load)
+    return any_reference.read(folder / "references", reference, fields)
+
+
+def _scenes(study, folder, root, block, fields, objections):
+    """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    compared = set()  # places of fields that have their reference
+    calibration = _calibration(study, folder)
+    arrays = ["face_profile"] * (block is not None)
+    shown = plan.shown_scenes(study) if fields else ()
+    for mesh, scenes in plan.by_mesh(study.scenes).items():
+        names = plan.solved_keys(study, mesh, calibration)
+        path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
+        results = store.read(path, set(names), arrays)
+        kept = {fields_key(name) for scene, name in zip(scenes, names) if scene in shown}
+        of_fields = store.read(path, kept, [PACKED]) if kept else {}
+        labels = [study.labels(scene) for scene in scenes]
+        against = {}
+        for scene in scenes:
+            one = id(scene.material), scene.load, scene.force, scene.kinematics
+            if one not in against:
+                against[one] = objections[_reference_of(scene), scene.kinematics]
+        rows = []
+        for scene, name in zip(scenes, names):
+            result = results[name]
+            values = {"status": result["status"], "solve_seconds": result["seconds"]}
+            values |= {label: result[label] for label in COPIED if label in result}
+            why = against[id(scene.material), scene.load, scene.force, scene.kinematics]
+            if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
+                values["message"] = "; ".join(filter(None, (values.get("message"), why)))
+            rows.append(values)
+        root.put_each(rows, labels)
+        for scene, name, place in zip(scenes, names, labels) if block or of_fields else ():
+            if LOADS[scene.load].kind.pressed:
+                result = results[name]
+                block.put({new: result[old] for old, new in FACE_VARIABLES.items() if old in result}, **place)
+            result = unpacked(of_fields.get(fields_key(name), {}))
+            if "displacements" in result:  # of one value of what is swept
+                x, y = result["displacements"].T
+                of_springs = {"stiffness": result["spring_stiffnesses"], "spring_force": result["spring_forces"]}
+                fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **place)
+                body = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
+                if tuple(body.values()) not in compared:  # scenes differ in their definitions
+                    compared.add(tuple(body.values()))
+                    fields.put_rows(_at_particles(study, folder, scene, fields.data), **body)
+
+
+def _at_particles(study, folder, scene, fields):
+    """Displacements of the reference of a scene where its particles are at rest [m]; nothing without a reference."""
+    reference = plan.reference_of(study, scene.mesh.beam, scene.material, scene.load)
+    found = any_reference.read(folder / "references", reference, ["x", "y", "displacements"])
+    if "x" not in found:
+        return {}
+    places = fields[["x", "y"]].sel(_mesh_labels(scene.mesh))
+    points = np.stack([places.x.values, places.y.values], axis=1)
+    points = points[~np.isnan(points[:, 0])]
+    x, y = scene.force * interpolate(found["x"], found["y"], found["displacements"], points).T
+    return {"particle_reference_x": x, "particle_reference_y": y}
+
+
+def _printed(study, root):
+    for cell in study.printed:
+        labels = {name: getattr(cell, name) for name in CELL}
+        try:
+            root.put(
+                {
+                    "paper_displacement": cell.displacement,
+                    "paper_reference_displacement": cell.reference_displacement,
+                    "paper_deformation_error": cell.deformation_error,
+                    "paper_stiffness": cell.stiffness,
+                    "paper_table": cell.table,
+                    "paper_remark": cell.remark,
+                },
+                **labels,
+            )
+        except KeyError:
+            continue  # a cell that this study does not ask for
+
+
+def _sensitivity(study, folder, displacements, axes):
+    curves = Filler(swept(SENSITIVITY, study).empty(axes))
+    for mesh, members in plan.by_mesh(study.curves).items():
+        names = [plan.curve_key(study, curve) for curve in members]
+        results = store.read(folder / "curves" / f"{plan.stem(mesh)}.h5", names, ["displacement", "stable"])
+        for curve, name in zip(members, names):
+            result, stiffness = results[name], np.array(plan.stiffnesses(study, curve))
+            displacement = result["displacement"]
+            reference = displacements.get(_reference_of(curve), np.nan)
+            status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
+            status = np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status)
+            curves.put(
+                {
+                    "stiffness": stiffness,
+                    "displacement": displacement,
+                    "deformation_error": deformation_error(displacement, reference),
+                    "status": status,
+                    "message": result["message"],
+                    "best_stiffness": result["best_stiffness"],
+                    "best_stiffness_status": result["best_status"],
+                    "best_stiffness_message": result["best_message"],
+                    "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
+                    "curve_seconds": result["seconds"],
+                },
+                **study.labels(curve),
+            )
+    return curves.data
+
+
+def _block(study, folder, axes):
+    """Group of pressed faces with the references of all kinds; scenes are still to come."""
+    kinds = (SMALL_STRAIN, *study.further_references)
+    block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
+    for one in study.references:
+        if not LOADS[one.load].kind.pressed:
+            continue
+        labels = study.labels(one)
+        for kind in kinds:
+            block.put(_face_reference(study, folder, one, kind), reference=kind, **labels)
+    return block
+
+
+def _finite_strain(study, folder, axes, displacement):
+    """Group of references at finite strain, and the networks' errors against them."""
+    finite = Filler(swept(FINITE_STRAIN, study).empty(axes | {"reference": study.further_references}))
+    for one in study.references:
+        labels = study.labels(one)
+        for kind in study.further_references:
+            result = _finite_reference(folder, one, kind)
+            values = {"reference_message": result["message"]}
+            if "displacement" in result:
+                values["reference_displacement"] = result["displacement"]
+                values["reference_error_estimate"] = result["error_estimate"]
+            finite.put(values, reference=kind, **labels)
+    _compare(finite.data.deformation_error, displacement, finite.data.reference_displacement)
+    return finite.data
+
+
+def _finite_reference(folder, one, kind, fields=()):
+    return store.read_one(folder / "references", plan.finite_key(one, kind), fields)
+
+
+def _compare(error, network, reference):
+    """Write deformation errors where both displacements are: of a dataset that is mostly holes few cells."""
+    network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
+    there = np.isfinite(network) & np.isfinite(reference)
+    error.values[there] = deformation_error(network[there], reference[there])
+
+
+def _face_reference(study, folder, one, kind):
+    """Middle, mean and profile of a pressed face of a reference."""
+    from scipy.interpolate import CubicSpline  # here: only pressed faces need it
+
+    if kind == SMALL_STRAIN:
+        result, scale = _reference(study, folder, one, ["x", "displacements"]), one.force
+        if "x" in result:
+            result |= {"positions": result["x"] / one.beam.length, "profile": result["displacements"][:, -1, 1]}
+    else:
+        result, scale = _finite_reference(folder, one, kind, ["positions", "profile"]), 1.0
+    values = {"reference_message": result["message"]}
+    if "displacement" in result:
+        values |= {
+            "reference_face_displacement": scale * result["displacement"],
+            "reference_face_mean_displacement": scale * result["mean_displacement"],
+            "reference_error_estimate": result["error_estimate"],
+        }
+        if "profile" in result:  # one that is interpolated has none
+            profile = CubicSpline(result["positions"], result["profile"])
+            values["reference_face_profile"] = scale * profile(FACE_POSITIONS)
+    return values
+
+
+def _fields(study, folder, axes):
+    """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
+    whole = plan.shown_scenes(study)
+    scenes = [scene for scene in study.scenes if scene in whole]
+    shown = {scene.mesh for scene in scenes}
+    kept = [
+        mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))
+    ]
+    meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
+    outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
+    cells = {spec: cells_of(mesh) for spec, mesh in meshes.items()}
+    lengths = {
+        "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
+        "spring": max((len(mesh.edges) for mesh in meshes.values()), default=1),
+        "spring_end": 2,
+        "cell": max((len(corners) for corners in cells.values()), default=1),
+        "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
+        "outline_point": max((len(points) for points, _ in outlines.values()), default=1),
+    }
+    numbers = {name: tuple(range(length)) for name, length in lengths.items()}
+    fields = Filler(fields_of(study).empty(axes | numbers))
+    fields.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    for spec, mesh in meshes.items():
+        labels = _mesh_labels(spec)
+        fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
+        fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
+    for scene in scenes:
+        labels = study.labels(scene)
+        fields.put({f"{OF_FIELDS}{name}": labels[name] for name in study.swept}, **labels)
+    for one, (points, displacements) in outlines.items():
+        moved = one.force * displacements
+        beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
+        fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
+        fields.put_rows(
+            {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
+        )
+    return fields
+
+
+def cells_of(mesh):
+    """Corners of the cells of a mesh, -1 where a cell has fewer than another one, shape (n_cells, n_corners)."""
+    cells = np.full((sum(map(len, mesh.cells.values())), max(mesh.cells)), NO_NODE)
+    start = 0
+    for count, corners in mesh.cells.items():
+        cells[start : start + len(corners), :count] = corners
+        start += len(corners)
+    return cells
+
+
+def _outline(study, folder, one):
+    """Points of a reference on the outline of its beam, in order around it, and their displacements for 1 N."""
+    result = _reference(study, folder, one, ["x", "y", "displacements"])
+    if "x" not in result:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    return outline(result["x"], result["y"], result["displacements"])

@@ -1,0 +1,858 @@
+"""Figures of scenes: sensitivity curves, errors against mesh size, deformed networks, the pressed block."""
+
+import math
+
+import numpy as np
+
+from springtune.problem.loads import LOADS
+from springtune.problem.parameters import with_unit
+
+from ...config.kind import distinct
+from ...output import labels, style
+from ...output.dataset import NO_NODE, STATUS
+from ...output.own_law import of_own_law, own_law
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
+from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
+
+# -- sensitivity curves ------------------------------------------------------------------------------------------------
+
+MOST_SHOWN = 60.0
+"""Largest error shown [%]."""
+
+
+def sensitivity(tree):
+    """Figures of sensitivity curves: one for each beam, mesh type, material and load.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    yield from _each("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
+
+
+USUAL = "nonlinear"
+"""Kinematics that a figure is of; where a study asks for other ones alone it is of those, and says so."""
+
+
+def _each(name, plot, status, names):
+    """Figures of each selection that has cells, of the usual kinematics or, without them, of the first that it has."""
+    for stem, selection in distinct(name, names, cells(status != 0, names)).items():
+        there = labels_of((status != 0).sel(selection), "kinematics")
+        yield stem, plot, selection | {"kinematics": USUAL if USUAL in there else there[0]}
+
+
+@style.styled
+def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"):
+    """Deformation error against uniform stiffness, a line a mesh size, as in figures 7 and 8 of the paper.
+
+    Marks show where each curve is lowest and where the stiffness of its lattice predicts that. Unstable equilibria are
+    thin.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/sensitivity`` (then without force, reference and what the paper prints).
+    ax : Axes or Figure, optional
+        Where to plot; by default a new figure.
+    beam, mesh_type, material, load, kinematics : str, optional
+        Labels of the curves. One that is not given must leave no choice.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no curves, or the selection leaves a choice, or nothing.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_sensitivity(tree, beam="200x40", mesh_type="structured", material="steel", load="traction")
+    >>> axes.get_title(loc="left").splitlines()[0]
+    '200x40 mm, structured, steel, traction'
+    >>> axes.get_ylabel()
+    '|Deformation error| [%]'
+    """
+    curves = group(data, "sensitivity")
+    selection = choose(
+        curves.status != 0, beam=beam, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics
+    )
+    curves, root = curves.sel(selection), group(data, "/")
+    values = last_swept(curves.status != 0)
+    known = at(root.sel(selection), values) if "reference_displacement" in root else None
+    # The force has a place of its own.
+    words = swept_words({name: value for name, value in values.items() if name != "force" or known is None})
+    return _sensitivity(at(curves, values), known, selection, words, ax)
+
+
+def _sensitivity(curves, root, selection, swept, ax):
+    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
+    panel, (unit, written) = axes[0, 0], labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
+    place = {"left": 0.45, "right": 0.14, "bottom": 0.4, "top": 0.52}
+    style.arrange(figure, axes, **place)
+    ends, seen = [], set()
+    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit
+    for number, size in enumerate(curves.mesh_size.values):
+        curve = curves.isel(mesh_size=number)
+        if (curve.status.values != 0).any():
+            end, found = draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
+            ends, seen = [*ends, *end], seen | found
+    errors = 100 * np.abs(curves.deformation_error.values)
+    highest = np.nanmax(errors, initial=0.0)
+    lowest_of_each = [np.nanmin(one) for one in errors.reshape(-1, errors.shape[-1]) if np.isfinite(one).any()]
+    top = MOST_SHOWN if max(lowest_of_each, default=0) < 0.8 * MOST_SHOWN else 1.1 * highest
+    panel.set(ylim=(0, min(top, 1.1 * highest) if highest else MOST_SHOWN), ylabel="|Deformation error| [%]")
+    panel.set_xlim(*((known.min(), known.max()) if len(known) else (0, 1)))
+    panel.set_xlabel(f"Uniform spring stiffness [{written}N/m]")
+    panel.set_title(_sensitivity_title(panel, root, selection, swept), pad=12)
+    if root is not None and "paper_stiffness" in root:
+        _mark_printed(panel, root.paper_stiffness.values, unit)
+    over = labels.TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
+    if ax is None:
+        figure.set_size_inches(style.COLUMN, 2.6 + over)
+    labels.settle(figure, axes, place | {"top": place["top"] + over})
+    if not ends:
+        labels.say(panel, _why_no_curve(curves), bare=False)
+        return panel
+    # Names first, since they widen the panel. They begin below the key.
+    labels.name_lines(panel, ends)
+    _key(panel, seen)
+    return panel
+
+
+def draw_curve(panel, curve, unit, name, look, known):
+    """Draw one curve: ends for names, and what of it needs a word."""
+    marker, colour, seen = look["marker"], look["color"], set()
+    line = {"color": colour, "linestyle": look["linestyle"]}
+    stiffness, error = curve.stiffness.values, 100 * np.abs(curve.deformation_error.values)
+    best, predicted, flags = float(curve.best_stiffness), float(curve.predicted_stiffness), curve.status.values
+    if np.isfinite(best):
+        # The curve's lowest point lies between two of its stiffnesses.
+        place = np.searchsorted(stiffness, best)
+        flags = np.insert(flags, place, 1)
+        stiffness, error = np.insert(stiffness, place, best), np.insert(error, place, 0.0)
+        panel.plot(best / unit, 0, marker=marker, markersize=4.5, color=colour, clip_on=False, zorder=4)
+        seen.add("minimum")
+    # Beyond the axes a mark would stand over the words at their ends.
+    if np.isfinite(predicted) and known.size and known.min() <= predicted / unit <= known.max():
+        panel.plot(predicted / unit, 0, marker="|", markersize=11, markeredgewidth=1.2, color=colour, clip_on=False)
+        seen.add("predicted")
+    unstable = np.where(flags == 4, error, np.nan)
+    panel.plot(stiffness / unit, np.where(flags == 4, np.nan, error), label=name, **line)
+    if np.isfinite(unstable).any():
+        seen.add("unstable")
+        panel.plot(stiffness / unit, unstable, color=colour, linewidth=0.5)
+    known = np.flatnonzero(np.isfinite(error))
+    if not len(known):
+        return [], seen
+    seen |= {STATUS[flag] for flag in np.unique(flags[np.isnan(error)]) if flag > 1}
+    return [(stiffness[known[-1]] / unit, error[known[-1]], name, colour)], seen
+
+
+KEY = {
+    "minimum": ("minimum", {"marker": "o", "markersize": 4.5, "linestyle": ""}),
+    "predicted": ("predicted", {"marker": "|", "markersize": 9, "markeredgewidth": 1.2, "linestyle": ""}),
+    "unstable": ("thin: unstable", {"linewidth": 0.5}),
+    "not_converged": ("gap: not converged", {"linestyle": ""}),
+    "failed": ("gap: failed", {"linestyle": ""}),
+}
+"""What of a sensitivity figure is explained beside its curves, and how it looks."""
+
+
+def _key(panel, seen):
+    shown = [(text, look) for name, (text, look) in KEY.items() if name in seen]
+    handles = [panel.plot([], [], color="0.3", **look)[0] for _, look in shown]
+    if shown:
+        panel.legend(handles, [text for text, _ in shown], loc="upper center", bbox_to_anchor=(0.52, 1.02),
+                     handlelength=1.2, labelspacing=0.25, borderaxespad=0.2,
+                     # No line runs through its words, wherever the paper's stiffness lies.
+                     frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)  # fmt: skip
+
+
+def _sensitivity_title(panel, root, selection, swept):
+    shown = dict(selection)
+    if root is not None and "beam" in shown:
+        shown["beam"] = labelled_beam(root, shown["beam"])
+    room = panel.get_window_extent().width / panel.figure.dpi
+    words = [*named(shown, "beam", "mesh_type", "material", "load"), *swept]
+    first = labels.wrapped(", ".join(words), room, 8)
+    if root is None:
+        return first
+    reference = float(root.reference_displacement)
+    text = f"reference {1e3 * reference:.4g} mm".replace("-", "−") if np.isfinite(reference) else "no reference"
+    return f"{first}\n{_force(float(root.force))}, {text}"
+
+
+def _mark_printed(panel, printed, unit):
+    """Where the paper's stiffness lies; its name stands above the panel, where no curve is."""
+    low, high = panel.get_xlim()
+    values = np.unique(printed[np.isfinite(printed)])
+    values = values[(values > low * unit) & (values < high * unit)]
+    for value in values:
+        panel.axvline(value / unit, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1)
+    if len(values):
+        text = "the paper's " + ", ".join(f"{value / unit:g}" for value in values)
+        panel.annotate(text, (values[0] / unit, 1), xycoords=("data", "axes fraction"), xytext=(0, 2), va="bottom",
+                       textcoords="offset points", ha="center", color="0.25", fontsize=style.SMALL)  # fmt: skip
+
+
+def _why_no_curve(curves):
+    """Words in place of curves none of which has an error."""
+    flags = np.unique(curves.status.values[curves.status.values != 0])
+    if 1 in flags:
+        return "solved, but without a reference there is no error"
+    said = ", ".join(STATUS[flag].replace("_", " ") for flag in flags)
+    messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
+    return f"no stiffness has an error: {said}" + "".join(f"; {text}" for text in messages[:1])
+
+
+def _force(newtons):
+    text = f"{newtons / 1e3:g} kN" if abs(newtons) >= 1e3 else f"{newtons:g} N"
+    return text.replace("-", "−") if np.isfinite(newtons) else "no force"
+
+
+def swept_words(values):
+    """Values of what the study sweeps that are shown, in words; nothing where nothing is swept."""
+    found = []
+    for name, value in values.items():
+        ends = list(dict.fromkeys((float(value.min()), float(value.max()))))
+        if (name, ends) != ("stiffness_scale", [1.0]):
+            found.append(" to ".join(with_unit(name, end) for end in ends))
+    return found
+
+
+def named(selection, *names):
+    """Labels of a selection for a title."""
+    found = [str(selection[name]) for name in names if name in selection]
+    return found + [str(name) for name in [selection.get("kinematics", USUAL)] if name != USUAL]
+
+
+# -- errors against mesh size ------------------------------------------------------------------------------------------
+
+
+def size(tree):
+    """Figures of errors against mesh size: one for each mesh type, material and load; see `sensitivity`."""
+    yield from _each("size", plot_size, group(tree, "/").status, SCENE_LABELS)
+
+
+@style.styled
+def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"):
+    """Deformation error against mesh size, a panel a beam, a line a definition.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its root.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as beams; by default a new figure.
+    beam : str, optional
+        One beam in place of all.
+    mesh_type, material, load, kinematics : str, optional
+        Labels of the scenes. One that is not given must leave no choice.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_beams,)
+        One a beam.
+
+    Raises
+    ------
+    ValueError
+        If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_size(tree, mesh_type="structured", material="steel", load="traction")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['100x20 mm', '200x40 mm']
+    >>> axes[0].get_xlabel(), axes[0].get_ylabel()
+    ('Mesh size [mm]', 'Deformation error [%]')
+    """
+    root = like_with_like(data)
+    root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
+    values = last_swept(root.status != 0, "mesh_size")
+    root = at(root, values)
+    parts = {name: parts_of(root.status.sel(beam=name) != 0) for name in beams}
+    shown = [(name, number) for name in beams for number in range(len(parts[name]))]
+    looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
+
+    def draw(panel, one):
+        name, number = one
+        drawn = _errors(
+            panel, root.sel(beam=name), {each: looks[each] for each in parts[name][number]}, one == shown[0]
+        )
+        part = f", {number + 1} of {len(parts[name])}" if len(parts[name]) > 1 else ""
+        panel.set_xlabel("Mesh size [mm]")
+        return ", ".join([labelled_beam(root, name) + part, *swept_words(_of_beam(values, name))]), *drawn
+
+    return error_panels(ax, shown, draw, compared(root, selection), bool(values))
+
+
+def like_with_like(data):
+    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+
+    Returns
+    -------
+    xarray.Dataset
+        With the attribute ``finite_strain`` where errors were exchanged.
+    """
+    root = group(data, "/")
+    finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
+    finite = None if finite is None else of_own_law(finite)
+    if finite is None:
+        return root
+    errors = finite.deformation_error
+    errors = root.deformation_error.where(root.kinematics == "linear", errors).transpose(*root.deformation_error.dims)
+    return root.assign(deformation_error=errors).assign_attrs(finite_strain=True)
+
+
+def compared(root, selection):
+    """Title of a figure of errors: what it is of, and whether they are against finite strain."""
+    finite = root.attrs.get("finite_strain") and selection["kinematics"] != "linear"
+    return ", ".join(
+        [*named(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
+    )
+
+
+def error_panels(ax, shown, draw, title, swept):
+    """Small multiples of deformation errors.
+
+    Parameters
+    ----------
+    ax : Figure, sequence of Axes or None
+    shown : list
+        What each panel shows.
+    draw : callable
+        Of a panel and what it shows: draws it, and returns its title, ends of lines for their names, and a note.
+    title : str
+        Of the figure.
+    swept : bool
+        Whether titles of panels say what is swept, and take more lines.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_panels,)
+    """
+    columns = min(3, len(shown)) if len(shown) != 4 else 2
+    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
+    place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
+    style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
+    drawn = []
+    for panel, one in zip(flat, shown):
+        words, *found = draw(panel, one)
+        drawn.append(found)
+        panel.set_title(labels.wrapped(words, panel.get_window_extent().width / panel.figure.dpi, 8))
+    under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
+    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
+    if ax is None:
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
+    for panel in axes[:, 0]:
+        panel.set_ylabel("Deformation error [%]")
+    place |= {"top": 0.48 + over, "bottom": 0.4 + under, "down": 0.7 + under + over, "across": 0.06}
+    labels.settle(figure, axes, place)
+    for panel, (ends, said) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        if ends:
+            labels.note(panel, said)
+        else:
+            labels.say(panel, "no errors: " + said.replace("\n", "; "))
+    return flat
+
+
+MOST_LINES = 6
+"""Definitions in one panel; more of them take further rows of panels."""
+
+
+def _errors(panel, here, looks, first):
+    """Draw errors of one beam over mesh size, a look a definition: ends of lines for names, and what a note says."""
+    here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
+    sizes, ends, said, statuses = 1e3 * here.mesh_size.values, [], [], set()
+    for definition, look in looks.items():
+        end, doubts, lost = error_line(panel, sizes, here.sel(definition=definition), definition, look)
+        ends, statuses = ends + end, statuses | doubts
+        for reason, values in lost.items():
+            said.append(f"{definition}, {', '.join(f'{value:g}' for value in values)} mm: {reason}")
+    if statuses:
+        said.insert(0, f"hollow: {', '.join(sorted(statuses))}")
+    if "paper_displacement" in here:
+        printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
+        if (here.force < 0).all():  # printed without sign
+            printed = -printed
+        if np.isfinite(printed).any():
+            panel.plot(sizes, printed, "x", color="0.35", markersize=4.5, label="as printed")
+            said = ["×: as the paper prints", *said] if first else said
+    panel.set_xscale("log")
+    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    panel.minorticks_off()
+    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
+    if ends:
+        panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said)
+
+
+def error_line(panel, x, cell, name, look, asked=...):
+    """Draw the errors of a definition, hollow where their equilibrium is in doubt.
+
+    Parameters
+    ----------
+    panel : matplotlib.axes.Axes
+    x : ndarray, shape (n,)
+    cell : xarray.Dataset
+        With ``deformation_error`` and ``status``, shape (n,).
+    name : str
+    look : dict
+        Of the line.
+    asked : ndarray of bool, optional
+        Where the line goes; a value that is not there is a gap in it.
+
+    Returns
+    -------
+    ends : list of tuple
+        End of the line for its name; none of a line without values.
+    doubts : set of str
+        What is in doubt.
+    lost : dict of str to list of float
+        Where it was asked for and has no error, by the reason.
+    """
+    error, flags = 100 * cell.deformation_error.values, cell.status.values
+    known, ends, lost = np.isfinite(error), [], {}
+    if known.any():
+        panel.plot(x[asked], error[asked], label=name, **look)
+        last = np.flatnonzero(known)[-1]
+        ends = [(x[last], error[last], name, look["color"])]
+    doubtful = known & (flags > 1)
+    if doubtful.any():
+        panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
+                   markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
+    for value, flag in zip(x[~known], flags[~known]):
+        if flag:
+            lost.setdefault("no reference" if flag == 1 else STATUS[flag].replace("_", " "), []).append(value)
+    return ends, {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}, lost
+
+
+def parts_of(present):
+    """Definitions that a beam has, in parts that one panel can show."""
+    asked = labels_of(present, "definition")
+    return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
+
+
+def _of_beam(values, beam):
+    return {name: value.sel(beam=beam) for name, value in values.items()}
+
+
+def by_beam(root, beam, mesh_type, material, load, kinematics):
+    """Data of a figure with a panel a beam, the beams, and the selection."""
+    if beam is not None:
+        choose(root.status != 0, beam=beam)
+        root = root.sel(beam=[beam])
+    present = root.status != 0
+    selection = choose(present, mesh_type=mesh_type, material=material, load=load, kinematics=kinematics)
+    return root.sel(selection), labels_of(present.sel(selection), "beam"), selection
+
+
+# -- deformed networks -------------------------------------------------------------------------------------------------
+
+DEFINITION = ("lattice", "calibrated", "paper")
+"""Whose network is shown: of those solved on most beams the first of these, else the first."""
+
+
+def deformed(tree):
+    """Figures of deformed networks: one for each mesh type, material and load; see `sensitivity`."""
+    status, fields = group(tree, "/").status, group(tree, "fields")
+    names = fields.definition.values.tolist()
+    solved = status.sel(definition=names).isin((1, 2, 4)).any("mesh_size")
+    if "displacement_x" in fields:
+        solved = fields.displacement_x.isel(particle=0).notnull().any("mesh_size")
+    for stem, plot, selection in _each("deformed", plot_deformed, status, SCENE_LABELS):
+        here = solved.sel({name: label for name, label in selection.items() if name in solved.dims})
+        counts = dict(zip(names, here.sum("beam").transpose("definition").values.tolist()))
+        best = [name for name in names if counts[name] == max(counts.values())]
+        definition = next((name for name in DEFINITION if name in best), best[0])
+        yield stem, plot, selection | {"definition": definition}
+
+
+@style.styled
+def plot_deformed(
+    data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, definition=None, kinematics="nonlinear"
+):
+    """Deformed network over the deformed reference, a panel a beam, displacements magnified.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset with the group ``/fields``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as beams; by default a new figure.
+    beam : str, optional
+        One beam in place of all.
+    mesh_type, material, load, definition, kinematics : str, optional
+        Labels of the scenes. One that is not given must leave no choice.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_beams,)
+        One a beam.
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no fields, the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_deformed(tree, mesh_type="structured", material="steel", load="traction", definition="paper")
+    >>> axes[0].figure.get_suptitle()
+    'structured, steel, traction'
+    """
+    fields, root = group(data, "fields", alone=False), group(data, "/")
+    kept = fields.definition.values.tolist()
+    definition = choose((root.status != 0).sel(definition=kept), definition=definition)["definition"]
+    cut, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
+    fields = fields.sel({"definition": definition, "mesh_type": selection["mesh_type"]})
+    if "kinematics" in fields.dims:
+        fields = fields.sel(kinematics=selection["kinematics"])
+    cut = cut.sel(definition=definition)
+    values = shown_swept(fields, root)
+    chosen = {one: selection[one] for one in ("material", "load")}
+    values = {name: value.sel(chosen) for name, value in values.items()}
+    cut = at(cut, values)
+    extents = [_extent(fields.sel(beam=name)) for name in beams]
+    room = style.COLUMN - 0.42 - 0.08
+    heights = [float(np.clip(1.25 * room * high / wide, 0.45, 1.8)) for wide, high in extents]
+    figure, axes = style.panels(
+        ax, nrows=len(beams), figsize=(style.COLUMN, 0.8 + sum(heights) + 0.6 * (len(beams) - 1)), ratios=heights
+    )
+    title = ", ".join(named(selection, "mesh_type", "material", "load"))
+    place = {"left": 0.45, "right": 0.08, "bottom": 0.38, "top": 0.58, "down": 0.6, "title": title}
+    style.arrange(figure, axes, **place)
+    grid, axes = axes, axes[:, 0]
+    for panel, name in zip(axes, beams):
+        _deformed(
+            panel,
+            fields.sel(beam=name),
+            cut.sel(beam=name),
+            selection,
+            ", ".join([labelled_beam(root, name), *swept_words(_of_beam(values, name))]),
+        )
+        panel.apply_aspect()  # its limits
+    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
+    if ax is None:
+        figure.set_size_inches(style.COLUMN, style.size(figure)[1] + over * len(axes))
+    labels.settle(figure, grid, place | {"top": 0.58 + over, "down": 0.6 + over})
+    if figure is not None:
+        width, height = style.size(figure)
+        figure.text(0.05 / width, 1 - 0.2 / height, f"lines: network ({definition}); grey: reference; dashed: at rest",
+                    va="top", fontsize=style.SMALL, color="0.25")  # fmt: skip
+    return axes
+
+
+def _extent(fields):
+    """Width and height of a body at rest."""
+    sides = [fields[f"outline_{axis}"].values for axis in "xy"]
+    found = [np.ptp(side[np.isfinite(side)]) if np.isfinite(side).any() else 0.0 for side in sides]
+    return found if min(found) > 0 else (5.0, 1.0)
+
+
+def _deformed(panel, fields, root, selection, beam):
+    load = {"material": selection["material"], "load": selection["load"]}
+    # Of the meshes that this beam has, the one that this load is asked for on.
+    for known in (fields.displacement_x.sel(load), fields.x.where(root.status != 0), fields.x):
+        places = np.flatnonzero(known.notnull().any("particle").values)
+        if len(places):
+            break
+    fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
+    rest = 1e3 * np.stack([fields.x.values, fields.y.values], axis=1)
+    moved = 1e3 * np.stack([fields.displacement_x.sel(load).values, fields.displacement_y.sel(load).values], axis=1)
+    outline = 1e3 * np.stack([fields.outline_x.values, fields.outline_y.values], axis=1)
+    there = 1e3 * np.stack(
+        [fields.reference_displacement_x.sel(load).values, fields.reference_displacement_y.sel(load).values], axis=1
+    )
+    kept = np.isfinite(outline[:, 0])
+    outline, there = outline[kept], there[kept]
+    shown = there if np.isfinite(there).any() else moved
+    largest = np.nanmax(np.abs(shown), initial=0.0) if np.isfinite(shown).any() else 0.0
+    scale = _round(0.06 * np.ptp(outline[:, 0]) / largest) if largest > 0 and len(outline) else 1
+    lacking = []
+    if np.isfinite(there).any():
+        panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
+    else:
+        lacking.append("no reference")
+    if len(outline):
+        panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)))
+    nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(NO_NODE).values.astype(int)
+    ends = nodes[(nodes != NO_NODE).all(axis=1)]
+    flag = int(root.status.sel(mesh_size=fields.mesh_size.values))
+    status = "not asked for" if flag == 0 else STATUS[flag].replace("_", " ")
+    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
+    text = f"{beam}, mesh {1e3 * float(fields.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
+    if np.isfinite(moved).any():
+        # One line with gaps: thousands of lines take ten times as long.
+        springs = np.full((len(ends), 3, 2), np.nan)
+        springs[:, :2] = (rest + scale * moved)[ends]
+        panel.plot(*springs.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
+        lacking += [status] if flag not in (0, 1) else []
+    else:
+        labels.say(panel, f"no network: {status}" if flag != 1 else "no network stored", bare=False)
+    room = panel.get_window_extent().width / panel.figure.dpi
+    panel.set_title(labels.wrapped(", ".join([text, *lacking]), room, 8))
+    panel.grid(False)
+
+
+NETWORK_LINE = 0.35
+"""Width of the lines of springs [pt]."""
+
+
+def _round(value):
+    """Nearest of 1, 2, 5 times a power of ten below."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)) * power
+
+
+# -- the pressed block -------------------------------------------------------------------------------------------------
+
+ENERGIES = ("area", "delingette")
+BLOCK_SHOWN = ("neo-hooke", "uniform", "paper", "lattice", "patch", "area", "delingette")
+"""Definitions whose pressed faces are shown before others."""
+
+MOST_FACES = 5
+"""Networks in the panel of the pressed face."""
+
+
+def _pressing(names):
+    """The load under which a face is looked at: pressure, else the first that presses a face."""
+    pressed = [name for name in names if name in LOADS and LOADS[name].kind.pressed]
+    return "pressure" if "pressure" in pressed or not pressed else pressed[0]
+
+
+def block(tree):
+    """The figure of a pressed block: its last material and beam; its finest structured mesh, or of its first mesh type.
+
+    See `sensitivity`.
+    """
+    present = group(tree, "/").status != 0
+    present = present.sel(load=[_pressing(labels_of(present, "load"))])
+    types = labels_of(present, "mesh_type")
+    selection = {"mesh_type": "structured" if "structured" in types else types[0]}
+    present = present.sel(mesh_type=[selection["mesh_type"]])
+    for name, place in (("material", -1), ("beam", -1), ("mesh_size", 0)):
+        selection[name] = labels_of(present, name)[place]
+        present = present.sel({name: [selection[name]]})
+    yield "block", plot_block, selection
+
+
+@style.styled
+def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, material=None):
+    """A pressed block: error of one stiffness for three loads, and the shape of the pressed face.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset with the group ``/block``; the first panel needs ``/sensitivity``, too.
+    ax : Figure or sequence of two Axes, optional
+        Where to plot; by default a new figure.
+    beam, mesh_type, material : str, optional
+        Labels of the scene. One that is not given must leave no choice.
+    mesh_size : float, optional
+        Likewise [m].
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (2,)
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no block, the selection leaves a choice, or nothing, or ``ax`` is not two Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_block(tree, beam="200x40", mesh_type="structured", mesh_size=1e-3, material="rubber")
+    >>> [panel.get_title(loc="left") for panel in axes]
+    ['One stiffness for all loads? (small strain)', 'The pressed face (finite strain)']
+    >>> axes[0].figure.get_suptitle()
+    '200x40 mm, structured 1 mm, rubber'
+    """
+    faces, root = group(data, "block", alone=False), group(data, "/")
+    asked = root.status != 0
+    load = _pressing(labels_of(asked, "load"))
+    chosen = choose(asked.sel(load=[load]), beam=beam, mesh_type=mesh_type, mesh_size=mesh_size, material=material)
+    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 3.0))
+    size = 1e3 * chosen["mesh_size"]
+    here = root.sel(chosen)
+    values = last_swept(here.status != 0)
+    words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
+    words += swept_words({name: value.sel(load=load) for name, value in values.items()})
+    place = {"left": 0.45, "right": 0.06, "top": 0.62, "across": 0.55, "title": ", ".join(words)}
+    style.arrange(figure, axes, bottom=0.4, **place)
+    left, right = axes[0]
+    curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
+    here, faces = at(here, values), at(faces.sel(chosen), values)
+    curves = None if curves is None else at(curves, values)
+    drawn = [_stiffness(left, curves, here), _profile(right, faces, here, load)]
+    under = labels.LINE * max(labels.lines_of(said) for _, said, _ in drawn)
+    if ax is None:
+        figure.set_size_inches(style.PAGE, 3.0 + under)
+    labels.settle(figure, axes, {**place, "bottom": 0.4 + under, "across": 0.15})
+    for panel, (ends, said, why) in zip((left, right), drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    if drawn[0][0]:
+        _marks(left, curves, here)
+    return np.array([left, right])
+
+
+def _stiffness(panel, curves, root):
+    """Linear kinematics: the reference's own, so that only the law of stiffness is seen.
+
+    Returns ends of lines for their names, a note, and what to say where no curve is there.
+    """
+    panel.set(xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
+    panel.set_title("One stiffness for all loads? (small strain)", pad=13)
+    if curves is None or "linear" not in curves.kinematics.values:
+        return [], "", "The study has no sensitivity curves in linear kinematics of this mesh and material."
+    curves, said, lines = curves.sel(kinematics="linear"), [], []
+    loads = labels_of(curves.status != 0, "load")
+    for load in loads:
+        curve, reference = curves.sel(load=load), float(root.reference_displacement.sel(load=load))
+        softness = (curve.displacement * curve.stiffness).values  # one number: linear networks give as 1/k
+        softness = softness[np.isfinite(softness)]
+        if not len(softness) or not np.isfinite(reference):
+            said.append(f"{load}: {'not solved' if not len(softness) else 'no reference'}")
+            continue
+        stiffness = np.linspace(np.nanmin(curve.stiffness.values), np.nanmax(curve.stiffness.values), 600)
+        lines.append((load, stiffness, 100 * np.abs(softness[0] / stiffness / reference - 1)))
+    if not lines:
+        return [], "", "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
+    middle, ends = np.sqrt(3) / 2 * _membrane(curves), []
+    low = max(0.7 * middle, min(x.min() for _, x, _ in lines))
+    high = min(1.5 * middle, max(x.max() for _, x, _ in lines))
+    highest = 0.0
+    for number, (load, x, error) in enumerate(lines):
+        look = style.line(number) | {"marker": ""}
+        within = (x >= low) & (x <= high)
+        panel.plot(x[within], error[within], label=load, **look)
+        highest = max(highest, error[within].max(initial=0.0))
+        ends.append((x[within][-1], error[within][-1], load, look["color"]))
+    for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
+        cells = root.sel(definition=definition, kinematics="linear", load=loads)
+        errors = 100 * np.abs(cells.deformation_error.values)
+        known, flags = np.isfinite(errors), cells.status.values
+        lacking = [f"{load} {STATUS[flag].replace('_', ' ') if flag else 'not asked for'}"
+                   for load, flag, there in zip(loads, flags, known) if not there]  # fmt: skip
+        if lacking and (flags != 0).any():
+            said.append(f"{definition}: {', '.join(lacking)}")
+        if known.any():
+            look = style.line(len(lines) + number) | {"marker": ""}
+            worst = errors[known].max()
+            panel.plot([low, high], [worst, worst], label=definition, **look)
+            ends.append((high, worst, f"{definition}, worst: {worst:.2g} %", look["color"]))
+    panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return ends, "\n".join(labels.wrapped(text, room) for text in said), ""
+
+
+def _membrane(curves):
+    """E t of the study's sheet, by which its stiffnesses were chosen [N/m]."""
+    return np.nanmax((curves.stiffness / curves.stiffness_ratio).values, initial=0.0)
+
+
+def _marks(panel, curves, root):
+    """Stiffnesses by closed form and as stated, named above the panel, once it has its limits."""
+    marks, middle = {}, np.sqrt(3) / 2 * _membrane(curves)
+    if "paper" in root.definition.values:
+        stated = root.stiffness.sel(definition="paper").values
+        stated = stated[np.isfinite(stated)]
+        if len(stated):
+            printed = "paper_stiffness" in root and np.isfinite(root.paper_stiffness.values).any()
+            marks[f"{'the paper’s' if printed else 'as stated'}: {stated[0]:.4g}"] = stated[0]
+    if str(root.mesh_type.values) == "structured" and middle > 0:
+        marks[f"√3/2 E t: {middle:.4g}"] = middle
+        # Held sideways, a sheet's modulus is E / (1 - nu^2), and that of a network, whose nu is 1/3, 9/8 E.
+        held = middle / (1 - float(root.material_poisson_ratio) ** 2) / (9 / 8)
+        if abs(held / middle - 1) > 0.02:
+            marks[f"of a held block: {held:.4g}"] = held
+    low, high = panel.get_xlim()
+    shown = [(text, value) for text, value in marks.items() if low < value < high]
+    for _, value in shown:
+        panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1)
+    room = panel.get_window_extent().width / panel.figure.dpi
+    places = labels.spread([room * (value - low) / (high - low) for _, value in shown],
+                           [labels.width(text) + 0.1 for text, _ in shown], 0.0, room)  # fmt: skip
+    for (text, _), place in zip(shown, places):
+        panel.annotate(text, (place / room, 1), xycoords="axes fraction", xytext=(0, 2.5), va="bottom", ha="center",
+                       textcoords="offset points", color="0.25", fontsize=style.SMALL)  # fmt: skip
+
+
+def _profile(panel, block, root, load):
+    """The pressed face, like with like; returned as by `_stiffness`.
+
+    Networks with their full length law over the reference at finite strain, where there are both; else those of linear
+    kinematics over the one of small strain.
+    """
+    x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
+    panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
+    of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])
+    law = own_law(pressed, "reference_face_profile")
+    finite = bool(
+        law
+        and np.isfinite(pressed.reference_face_profile.sel(reference=law).values).any()
+        and of_networks.sel(kinematics=of_networks.kinematics != "linear").any()
+    )
+    kind = law if finite else str(block.reference.values[0])
+    panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)", pad=13)
+    profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
+    if np.isfinite(profile).any():
+        name = f"reference, {kind.replace('-', ' ')}"
+        panel.plot(x, profile, color="0.72", linewidth=3, label=name)
+        ends.append((x[-1], profile[-1], name, "0.35"))
+        highest.append(profile)
+    order = [name for name in BLOCK_SHOWN if name in block.definition.values]
+    order += [name for name in block.definition.values if name not in order]
+    asked = [name for name in order if (root.status.sel(load=load, definition=name) != 0).any()]
+    shown = []
+    for definition in asked:
+        profiles = pressed.face_profile.sel(definition=definition)
+        usual = ("nonlinear",) if finite else ("linear", "nonlinear")
+        solved = [one for one in usual if one in profiles.kinematics.values
+                  and np.isfinite(profiles.sel(kinematics=one).values).any()]  # fmt: skip
+        if solved:
+            shown.append((definition, solved[0], -1e3 * profiles.sel(kinematics=solved[0]).values))
+        else:
+            flags = root.status.sel(load=load, definition=definition)
+            flags = flags.where(flags.kinematics.isin(usual), 0).values
+            words = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])] or ["not asked for"]
+            said.append(f"{definition}: {', '.join(words)}")
+    for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
+        look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
+        panel.plot(x, profile, label=name, **look)
+        ends.append((x[-1], profile[-1], name, look["color"]))
+        highest.append(profile)
+    if not finite and any(kinematics != "linear" for _, kinematics, _ in shown[:MOST_FACES]):
+        said.append("the reference is of small strain, not all networks are: add further_references")
+    if len(shown) > MOST_FACES:
+        said.append(f"in the dataset, too: {', '.join(name for name, _, _ in shown[MOST_FACES:])}")
+    room = panel.get_window_extent().width / panel.figure.dpi
+    text = "\n".join(labels.wrapped(one, room) for one in said)
+    if not shown and not ends:
+        return [], "", "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
+    low, high = min(map(np.nanmin, highest)), max(map(np.nanmax, highest))
+    panel.set_xlim(x.min() - 0.02, x.max() + 0.02)
+    panel.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low) if high > low else high + 1)
+    return ends, text, ""

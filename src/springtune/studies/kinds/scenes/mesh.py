@@ -1,0 +1,66 @@
+"""Stage `mesh`: one VTU file a mesh, with its quality figures in a note beside it."""
+
+import hashlib
+import time
+from pathlib import Path
+
+from springtune.mesh import MESH_TYPES, quality, read_beam_mesh
+
+from . import stored_mesh
+
+
+def run(tasks, spent):
+    """Make the meshes of a bundle that are not there yet.
+
+    Parameters
+    ----------
+    tasks : dict
+        ``folder`` and ``meshes``, each with ``name``, ``key`` and what `make` takes.
+    spent : Spent
+        What tasks cost is added to it.
+    """
+    folder = tasks["folder"]
+    for task in tasks["meshes"]:
+        if stored_mesh.is_stored(folder, task["name"], task["key"], spent.limits):
+            continue
+        begin = time.perf_counter()
+        mesh = spent.attempt(task["name"], lambda task=task: make(task), _hole)
+        known = {"mesh_seconds": time.perf_counter() - begin}
+        if mesh is None:
+            continue
+        if isinstance(mesh, dict):
+            stored_mesh.refuse(folder, task["name"], task["key"], mesh)
+            spent.add(stored_mesh.REFUSED, 0, known["mesh_seconds"])
+            continue
+        known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
+        stored_mesh.write(folder, task["name"], task["key"], mesh, known)
+        spent.add("mesh", len(mesh.points), time.perf_counter() - begin)
+
+
+def lose(tasks, name, why, limits):
+    """Store that a mesh is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    name, why, limits : str
+        Of the mesh; what became of it; the limits.
+    """
+    key = next(task["key"] for task in tasks["meshes"] if task["name"] == name)
+    stored_mesh.refuse(tasks["folder"], name, key, _hole(why) | {"limits": limits})
+
+
+def _hole(why):
+    return {"message": f"mesh: {why}"}
+
+
+def make(source):
+    """Mesh from ``length``, ``height`` and ``mesh_type`` and ``mesh_size``, or ``file`` and its ``unit``."""
+    box = source["length"], source["height"]
+    if "file" in source:
+        content = hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest()
+        if content != source["content"]:
+            raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
+        return read_beam_mesh(source["file"], *box, source["unit"])
+    return MESH_TYPES[source["mesh_type"]](*box, source["mesh_size"])

@@ -1,0 +1,135 @@
+"""What is made of scenes."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from springtune.problem.loads import LOADS
+
+from ...config.kind import Output, distinct
+from ...config.model import swept_value
+from ...config.remembered import once_a_study
+from ...config.shown import shown
+
+if TYPE_CHECKING:
+    from ...config.model import CurveSpec, SceneSpec, Study
+
+SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
+"""Dimensions of which a figure of sensitivity curves shows one label."""
+
+SCENE_LABELS = ("mesh_type", "material", "load")
+"""The same for figures of errors against mesh size, and of deformed networks."""
+
+PLOTS = "studies.kinds.scenes.figures"
+
+COLLECTION = "scenes.pvd"
+"""What ParaView opens."""
+
+TABLE = ("load", "mesh_type", "material")
+"""What a table of the page is about, as in the paper."""
+
+
+def stem(selection: Mapping[str, str], number: int | None = None) -> str:
+    """Stem of a table's file: the paper's number where it has one, else the labels."""
+    return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
+
+
+@once_a_study("scenes", "printed", "further_references")
+def stems(study: "Study") -> list[str]:
+    """Stems of the tables of a study's scenes."""
+    numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
+    chosen = dict.fromkeys((scene.load, scene.mesh.mesh_type, scene.material.name) for scene in study.scenes)
+    found = [stem(dict(zip(TABLE, labels)), numbers.get(labels)) for labels in chosen]
+    found += ["finite_strain"] if study.further_references else []
+    found += ["block"] if pressed(study) else []
+    return found
+
+
+@once_a_study("scenes")
+def pressed(study: "Study") -> bool:
+    """Whether a study has scenes under pressure."""
+    return any(LOADS[scene.load].kind.pressed for scene in study.scenes)
+
+
+def _lack_of_pressure(study: "Study") -> str:
+    return "" if pressed(study) else "shows scenes under pressure and no grid has them; add load 'pressure'"
+
+
+def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]:
+    for item in items:
+        labels = {"beam": item.mesh.beam.name, "mesh_type": item.mesh.mesh_type}
+        yield labels | {"material": item.material.name, "load": item.load}
+
+
+def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
+    """Selections of the figures of sweeps: those under which a parameter has several values, by stem."""
+    found: dict[str, Mapping[str, str]] = {}
+    for name in study.swept:
+        values: dict[tuple[str, ...], set[float]] = {}
+        for scene in study.scenes:
+            place = scene.mesh.mesh_type, scene.material.name, scene.load, scene.kinematics, scene.mesh.beam.name
+            values.setdefault(place, set()).add(swept_value(scene, scene.mesh.beam, name))
+        several = [dict(zip(SCENE_LABELS, place)) for place, members in values.items() if len(members) > 1]
+        found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
+    return found
+
+
+def _too_many(study: "Study") -> str:
+    from springtune.handover.paraview import MOST_PIECES  # here, since it needs numpy
+
+    count = len(shown(study.scenes, study.swept))
+    remedy = "choose fewer scenes, or `springtune export --select ... --to scenes.pvd` in its place"
+    return "" if count <= MOST_PIECES else f"would write {count} files, and at most {MOST_PIECES} are; {remedy}"
+
+
+OUTPUTS = (
+    Output(
+        "sensitivity",
+        "figures of sensitivity curves",
+        figures=lambda study: distinct("sensitivity", SENSITIVITY_LABELS, _cells(study.curves)),
+        plot=f"{PLOTS}:sensitivity",
+        usual=True,
+    ),
+    Output(
+        "size",
+        "figures of errors against mesh size",
+        figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
+        plot=f"{PLOTS}:size",
+        job="scenes",
+        usual=True,
+    ),
+    Output(
+        "deformed",
+        "figures of deformed networks (and the group `/fields` behind them)",
+        figures=lambda study: distinct("deformed", SCENE_LABELS, _cells(study.scenes)),
+        plot=f"{PLOTS}:deformed",
+        job="scenes",
+        usual=True,
+    ),
+    Output(
+        "sweep",
+        "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
+        figures=_sweeps,
+        plot="studies.kinds.scenes.sweeps:sweep",
+        job="scenes",
+        usual=True,
+    ),
+    Output(
+        "paraview",
+        "deformed networks with displacements, their error, and stiffness and force of each spring, as files for "
+        "ParaView (and the group `/fields` behind them)",
+        tables=lambda study: [COLLECTION],
+        write="studies.kinds.scenes.paraview",
+        into="paraview",
+        job="scenes",
+        lack=_too_many,
+    ),
+    Output("tables", "tables as the paper's, on one page", page=True, job="scenes", usual=True),
+    Output(
+        "block",
+        "the figure of a pressed face",
+        figures=lambda study: {"block": {}},
+        plot=f"{PLOTS}:block",
+        job="scenes",
+        lack=_lack_of_pressure,
+    ),
+)

@@ -1,0 +1,100 @@
+"""Stage `reference`: one finite-element solution a unit problem, and one a scene at finite strain.
+
+Where a study has many unit problems, an interpolant answers for all of a kind of load.
+"""
+
+import time
+from functools import partial
+from pathlib import Path
+
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import LOAD_KINDS
+from springtune.problem.materials import Rubber, material_of
+from springtune.reference.small_strain import ReferenceNotConvergedError, solve_unit
+
+from ...runs import store
+from . import stored_interpolant
+
+NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
+OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
+"""Why a material has no reference of the other law."""
+
+
+def run(tasks, spent):
+    """Solve the references of a bundle that are not there yet.
+
+    Parameters
+    ----------
+    tasks : dict
+        ``folder``, ``references``, each with ``key`` and ``problem``, what
+        `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
+        with ``key, beam, material, force, load, law, plane, follower``, where ``load`` is the name of the kind and
+        ``law`` ``"neo-hooke"`` or ``"yeoh"``. There may be ``interpolants``, each with ``key``, ``kind``, by name,
+        ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two ratios of each unit problem that is
+        asked of it, by its own key.
+    spent : Spent
+        What tasks cost is added to it.
+    """
+    for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
+        for path, task in store.missing(tasks["folder"], tasks[section], spent.limits):
+            begin = time.perf_counter()
+            result = spent.attempt(task["key"], partial(solve, task), _hole)
+            if result is None:
+                continue
+            result["seconds"] = time.perf_counter() - begin
+            store.add(path, {task["key"]: result})
+            spent.add(kind, 0, result["seconds"])
+    for task in tasks.get("interpolants", ()):
+        stored_interpolant.make(Path(tasks["folder"]) / f"{task['key']}.h5", task, spent)
+
+
+def lose(tasks, key, why, limits):
+    """Store that a reference is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the reference; what became of it; the limits.
+    """
+    own = {task["key"] for task in (*tasks["references"], *tasks["finite"])}
+    interpolants = [task for task in tasks.get("interpolants", ()) if key in (task["key"], *task["problems"])]
+    # What an interpolant cannot do goes into its own file.
+    for name in [key] if key in own else [task["key"] for task in interpolants]:
+        store.add(Path(tasks["folder"]) / f"{name}.h5", {key: _hole(why) | {store.LIMITS: limits}})
+
+
+def _hole(why):
+    return {"message": why, "seconds": 0.0}
+
+
+def _unit(task):
+    """Result of a unit problem."""
+    aspect_ratio, nu, kind = task["problem"]
+    try:
+        solution = solve_unit(aspect_ratio, nu, LOAD_KINDS[kind])
+    except ReferenceNotConvergedError as error:
+        return {"message": str(error)}
+    names = ("displacement", "mean_displacement", "error_estimate", "rotation", "strain", "x", "y", "displacements")
+    return {name: getattr(solution, name) for name in names} | {"message": ""}
+
+
+def _finite(task):
+    """Result at finite strain."""
+    # Here, since few studies need it.
+    from springtune.reference.finite_strain import FiniteStrainError, IncompressibleError, solve_neo_hooke, solve_yeoh
+
+    beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
+    tested = isinstance(material, Rubber)
+    if tested != (task["law"] == "yeoh"):
+        return {"message": f"material {OF_TESTED if tested else NOT_TESTED}"}
+    try:
+        if tested:
+            solution = solve_yeoh(beam, material, task["force"], kind, task["follower"])
+        else:
+            solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
+    except (FiniteStrainError, IncompressibleError) as error:
+        return {"message": str(error)}
+    names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
+    return {name: getattr(solution, name) for name in names} | {"message": ""}

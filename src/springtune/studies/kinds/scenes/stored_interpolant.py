@@ -1,0 +1,133 @@
+"""Stored interpolants of references: how they are made, and read, for grids and for samples.
+
+The file of one that meets no tolerance has, beside the reason, unit problems that were asked of it, solved one by one.
+"""
+
+import time
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from springtune.problem.loads import LOAD_KINDS
+
+from ...runs import store
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from springtune.reference.interpolant import Interpolant
+
+    from ...runs.task_costs import Spent
+
+    Found = tuple[Interpolant | None, dict[str, dict[str, Any]], float, str]
+
+REFERENCE_TOLERANCE = 1e-4
+"""Largest error estimate of an interpolant that stands for references that are solved by themselves [1]: theirs."""
+
+ANSWERS = ("displacement", "mean_displacement", "rotation", "strain", "error_estimate")
+"""What an interpolant answers for a unit problem."""
+
+
+def make(path: Path, task: "Mapping[str, Any]", spent: "Spent") -> None:
+    """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it.
+
+    Parameters
+    ----------
+    path : Path
+        File of the interpolant.
+    task : dict
+        ``key``, ``kind`` (of load, by name), ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two
+        ratios of each unit problem by a key of its own.
+    spent : Spent
+        What tasks cost is added to it, as ``interpolant``: its units are solves.
+    """
+    if task["key"] not in store.stored(path, spent.limits):
+        begin = time.perf_counter()
+        result = spent.attempt(task["key"], partial(_built, task), hole)
+        if result is None:
+            return
+        result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
+        store.add(path, {task["key"]: result})
+        spent.add("interpolant", result.get("solves", 0), result["seconds"])
+    known = store.stored(path, spent.limits)
+    if "solves" in store.read(path, [task["key"]])[task["key"]]:
+        return
+    missing = [key for key in task["problems"] if key not in known]
+    # Those that share elements follow each other.
+    with store.Keeper(path) as keeper:
+        for key in sorted(missing, key=lambda key: task["problems"][key]):
+            begin = time.perf_counter()
+            aspect_ratio, nu = task["problems"][key]
+            result = spent.attempt(key, partial(_solved, aspect_ratio, nu, task["kind"]), hole)
+            if result is None:
+                continue
+            keeper[key] = result | {"seconds": time.perf_counter() - begin}
+            spent.add("interpolant", 1, time.perf_counter() - begin, 0)
+
+
+def hole(why: str) -> dict[str, Any]:
+    """Result of a reference that there is not."""
+    return {"message": why, "seconds": 0.0}
+
+
+def read(folder: str | Path, key: str) -> "Found":
+    """Interpolant, or what there is in its place.
+
+    Parameters
+    ----------
+    folder : str or Path
+    key : str
+
+    Returns
+    -------
+    Interpolant or None
+    dict of str to dict
+        Without one, unit problems that were solved by themselves, by their keys: what is in `ANSWERS`, ``message`` and
+        ``seconds``, or these two alone.
+    float
+        Seconds that it took for each unit problem that was asked of it.
+    str
+        Why there is none.
+    """
+    path = Path(folder) / f"{key}.h5"
+    state = path.stat() if path.exists() else None
+    return _opened(path, key, (state.st_size, state.st_mtime_ns) if state else None)
+
+
+@lru_cache(maxsize=8)
+def _opened(path: Path, key: str, state: tuple[int, int] | None) -> "Found":
+    """What `read` gives of a file in its state."""
+    arrays = ("aspect_range", "nu_range", "values")
+    results = store.read(path, {key} | (store.stored(path) if state else set()), arrays)
+    known = results.pop(key)
+    if "solves" not in known:
+        return None, results, 0.0, known["message"]
+    from springtune.reference.interpolant import Interpolant  # here: few studies need it
+
+    each = known["seconds"] / max(known["asked"], 1)
+    return Interpolant.from_arrays(LOAD_KINDS[known["kind"]], known), results, each, ""
+
+
+def _built(task: "Mapping[str, Any]") -> dict[str, Any]:
+    """An interpolant, within its own tolerance or within that of references; else why there is none."""
+    # Here, since readers build none.
+    from springtune.reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError
+
+    kind, (aspect_range, nu_range) = LOAD_KINDS[task["kind"]], task["box"]
+    for tolerance in (TOLERANCE, REFERENCE_TOLERANCE):
+        try:
+            return Interpolant.build(kind, aspect_range, nu_range, tolerance).arrays() | {"message": ""}
+        except NotCertifiedError as error:
+            why = str(error)
+    return {"message": why}
+
+
+def _solved(aspect_ratio: float, nu: float, kind: str) -> dict[str, Any]:
+    """Answers of a unit problem that is solved by itself."""
+    from springtune.reference.small_strain import ReferenceNotConvergedError, solve_unit  # here, as above
+
+    try:
+        solution = solve_unit(aspect_ratio, nu, LOAD_KINDS[kind])
+    except ReferenceNotConvergedError as error:
+        return {"message": str(error)}
+    return {name: getattr(solution, name) for name in ANSWERS} | {"message": ""}

@@ -1,0 +1,161 @@
+"""Stored meshes: a VTU file each, and a note beside it with its key, its checksum and what is known of it.
+
+A mesh that cannot be made has no VTU file, and its note says why: it costs its own scenes and no others.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from springtune.mesh import Mesh, read_mesh, write_mesh
+
+from ...runs import checked_json
+from ...runs.damage import DamagedError, set_aside
+from ...runs.records import checksum
+
+REFUSED = "without mesh"
+"""What tasks are counted as that have no mesh."""
+
+
+def files(folder: str | Path, name: str) -> tuple[Path, Path]:
+    """File of a mesh, and that of its notes."""
+    return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.json"
+
+
+def write(folder: str | Path, name: str, key: str, mesh: Mesh, known: dict[str, float]) -> None:
+    """Store a mesh.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+    key : str
+        Of what it is made from.
+    mesh : Mesh
+    known : dict
+        Figures of it.
+    """
+    path, notes = files(folder, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # The notes name the mesh they belong to, so they go first and come last.
+    notes.unlink(missing_ok=True)
+    write_mesh(path, mesh)
+    checked_json.write(notes, {"key": key, "checksum": checksum(path), **known})
+
+
+def refuse(folder: str | Path, name: str, key: str, hole: dict[str, str]) -> None:
+    """Store that a mesh cannot be made.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+    key : str
+        Of what it would be made from.
+    hole : dict
+        ``message``, such as ``"mesh: own.vtu: cells with no area: 1, ..."``, and ``limits`` where it went beyond them.
+    """
+    path, notes = files(folder, name)
+    path.unlink(missing_ok=True)
+    checked_json.write(notes, {"key": key, **hole})
+
+
+def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
+    """Whether a mesh is stored, or that it cannot be made; one that is damaged is set aside.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+    key : str
+        Of what it is to be made from.
+    limits : str
+        Limits that it has now; what went beyond others is not stored.
+
+    Returns
+    -------
+    bool
+    """
+    path, notes = files(folder, name)
+    if not notes.exists():
+        return False
+    try:
+        known = read_notes(folder, name)
+        if known["key"] != key or known.get("limits", limits) != limits:
+            return False
+        if "message" not in known and path.exists():
+            _checked(path, known["checksum"])
+        return "message" in known or path.exists()
+    except DamagedError as error:
+        set_aside(error)
+        return False
+
+
+def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
+    """What is known of a mesh: its ``key`` and ``checksum``, what it took and its quality.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    DamagedError
+        If they are not there, or not what was written.
+    """
+    notes: dict[str, Any] = checked_json.demand(files(folder, name)[1])
+    return notes
+
+
+def refusal(folder: str | Path, name: str) -> dict[str, str]:
+    """Why a mesh could not be made: ``message``, and ``limits`` where it went beyond them; empty where it was.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    DamagedError
+        As `read_notes`.
+    """
+    notes = read_notes(folder, name)
+    return {label: notes[label] for label in ("message", "limits") if label in notes}
+
+
+def read(folder: str | Path, name: str) -> Mesh:
+    """Mesh by its name.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name : str
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    DamagedError
+        If it is not there, or not what was written.
+    """
+    path, _ = files(folder, name)
+    _checked(path, read_notes(folder, name)["checksum"])
+    return read_mesh(path)
+
+
+def _checked(path: Path, wanted: str) -> None:
+    if not path.exists():
+        raise DamagedError(path, "it is missing")
+    if checksum(path) != wanted:
+        raise DamagedError(path, "its checksum is not that of its content")

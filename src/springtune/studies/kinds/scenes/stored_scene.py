@@ -1,0 +1,90 @@
+"""Stored scenes: numbers under one key, whole fields under another, so that either is there without the other."""
+
+import numpy as np
+
+from ...runs.hashing import hash_of
+
+FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
+"""Arrays of all particles and springs, and their types."""
+
+PACKED = "fields"
+"""What they are stored as: one array, since three take as long to write as the scene to solve."""
+
+
+def calibrated_key(key: str, stiffness: float | None) -> str:
+    """Key of a calibrated scene.
+
+    Parameters
+    ----------
+    key : str
+        Of all that it depends on besides.
+    stiffness : float or None
+        What was calibrated [N/m]; None where there is nothing.
+
+    Returns
+    -------
+    str
+    """
+    return hash_of(key, stiffness)
+
+
+def fields_key(key: str) -> str:
+    """Key of the fields of a scene.
+
+    Parameters
+    ----------
+    key : str
+        Of its numbers.
+
+    Returns
+    -------
+    str
+    """
+    return hash_of(key, "fields")
+
+
+def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Fields of a result as they are stored; nothing where it has none.
+
+    Parameters
+    ----------
+    result : dict
+        With `FIELD_ARRAYS`, if it was solved.
+
+    Returns
+    -------
+    dict
+    """
+    if not FIELD_ARRAYS.keys() <= result.keys():
+        return {}
+    arrays = [result[name].astype(kind).ravel() for name, kind in FIELD_ARRAYS.items()]
+    lengths = np.array([len(array) for array in arrays])
+    return {PACKED: np.concatenate([array.view("u1") for array in (lengths, *arrays)])}
+
+
+def unpacked(stored: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Fields of what is stored: `packed`, undone.
+
+    Parameters
+    ----------
+    stored : dict
+
+    Returns
+    -------
+    dict
+        ``displacements`` of the particles, shape (n_points, 2), ``spring_stiffnesses`` and ``spring_forces``.
+
+    Examples
+    --------
+    >>> fields = {"displacements": np.ones((2, 2)), "spring_stiffnesses": np.ones(3), "spring_forces": np.zeros(3)}
+    >>> {name: array.shape for name, array in unpacked(packed(fields)).items()}
+    {'displacements': (2, 2), 'spring_stiffnesses': (3,), 'spring_forces': (3,)}
+    """
+    if PACKED not in stored:
+        return {}
+    head = 8 * len(FIELD_ARRAYS)
+    lengths = stored[PACKED][:head].view("i8")
+    sizes = [length * np.dtype(kind).itemsize for length, kind in zip(lengths, FIELD_ARRAYS.values())]
+    parts = np.split(stored[PACKED][head:], np.cumsum(sizes)[:-1])
+    found = {name: part.view(kind) for part, (name, kind) in zip(parts, FIELD_ARRAYS.items())}
+    return found | {"displacements": found["displacements"].reshape(-1, 2)}

@@ -1,0 +1,527 @@
+"""Figures of shapes: errors of their quantities over particles and seconds, and their deformed networks."""
+
+import math
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
+
+from springtune.safe_io.escapes import no_mathematics
+
+from ...output import labels, style
+from ...output.dataset import NO_NODE, STATUS
+from ...output.selection import choose, group
+from .outputs import DEFORMED, ERRORS, figures
+
+NETWORK_COLUMNS = 3
+"""Networks side by side."""
+
+MOST_NETWORKS = 6
+"""Networks that are drawn where none are chosen."""
+
+FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
+"""Definitions that are drawn before others."""
+
+FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
+"""Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""
+
+LEAST_SHOWN = 1e-3
+"""Smallest error of the overview [%]: what is below stands there."""
+
+MOST_SHOWN_ERROR = 100.0
+"""Largest error of the overview [%]: what is beyond stands there."""
+
+
+def shapes(tree):
+    """Figures of shapes: all quantities; and of each shape and load its errors, and its networks.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+
+    Yields
+    ------
+    tuple
+        Stem, function that plots, and selection.
+    """
+    data = group(tree, "shapes")
+    asked = (data.status != 0).any([name for name in data.status.dims if name not in ("shape", "load")])
+    pairs = [
+        {"shape": shape, "load": load}
+        for shape in data["shape"].values.tolist()
+        for load in data["load"].values.tolist()
+        if bool(asked.sel(shape=shape, load=load))
+    ]
+    plots = {ERRORS: plot_shape_errors, DEFORMED: plot_shape}
+    for stem, selection in figures(pairs).items():
+        plot = next((plots[name] for name in plots if stem.startswith(name)), plot_shapes)
+        yield stem, plot, selection
+
+
+# -- errors ------------------------------------------------------------------------------------------------------------
+
+
+@style.styled
+def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, kinematics=None):
+    """Error of each quantity of a shape over particles and over seconds: a line a definition.
+
+    Errors are against the reference, or where there is none, against the expected value. Hollow markers are of networks
+    that are not stable, and of those that deform beyond what the reference is good for.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/shapes``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: two Axes a quantity; by default a new figure.
+    shape, load, material, kinematics : str, optional
+        Labels of the scenes; of materials and kinematics the first ones without. Others that are not given must leave
+        no choice.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_quantities, 2)
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no shapes, the selection leaves a choice, or nothing, or ``ax`` is not as many Axes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_shape_errors(tree, shape="cook")
+    >>> axes[0, 0].get_title(loc="left"), axes[0, 1].get_xlabel()
+    ('tip: displacement y, tip', 'Seconds, springs and solve')
+    """
+    cut, selection = _cut(data, shape, load, material, kinematics)
+    names = _quantities(cut)
+    rows = max(1, len(names))
+    tall = max(2.25, 0.72 + 0.16 * len(_definitions(cut)))  # a line of names for each
+    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows), sharey=False)
+    title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
+    if not all(_points(cut, name, one)[3].all() for name in names for one in _definitions(cut)):
+        title += "; hollow: unstable, or beyond the linear reference"
+    place = {"left": 0.6, "right": 0.08, "bottom": 0.42, "top": 0.52, "across": 0.2, "down": 0.72, "title": title}
+    style.arrange(figure, axes, **place)
+    looks = {name: style.line(i) for i, name in enumerate(_definitions(cut))}
+    for panels, name in zip(axes, names):
+        _errors_of(panels, cut, name, looks)
+    if not names:
+        for panel in axes.flat:
+            labels.say(panel, "No quantity was asked for.")
+    labels.settle(figure, axes, place)
+    for panels, name in zip(axes, names):
+        ends = _ends(cut, name, looks)
+        for panel, found in zip(panels, ends):
+            labels.name_lines(panel, found)
+    return axes
+
+
+def _cut(data, shape, load, material, kinematics):
+    """The cells of a shape under a load, of one material and kinematics, and their labels."""
+    data = group(data, "shapes")
+    present = data.status != 0
+    chosen = choose(present, shape=shape, load=load)
+    here = present.sel(chosen)
+    for name, label in (("material", material), ("kinematics", kinematics)):
+        there = here.any([one for one in here.dims if one != name])
+        chosen[name] = label or str(there[name].values[int(np.argmax(there.values))])
+    chosen = choose(present, **chosen)
+    return data.sel(chosen), chosen
+
+
+def _quantities(cut):
+    return [name for name in cut.quantity.values.tolist() if str(cut.quantity_kind.sel(quantity=name).item())]
+
+
+def _definitions(cut):
+    there = (cut.status != 0).any([name for name in cut.status.dims if name != "definition"])
+    return [name for name, asked in zip(cut.definition.values.tolist(), there.values) if asked]
+
+
+def described(cut, name):
+    """What a quantity is, in words."""
+    one = cut.sel(quantity=name)
+    kind, component, of = (str(one[f"quantity_{part}"].item()) for part in ("kind", "component", "of"))
+    if kind == "area":
+        return "growth of the area"
+    if kind == "energy":
+        return "strain energy"
+    return f"{kind} {component}, {of}"
+
+
+def _points(cut, name, definition):
+    """Particles, seconds, sizes of errors [%], and whether each counts, of a line, by particles."""
+    against = _against(cut, name)
+    line = cut.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
+    seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
+    counted = (line.status.values == STATUS.index("solved")) & (int(cut.reference_applies.item()) != 0)
+    found = [line.particles.values, seconds, 100 * np.abs(line[against].values), counted]
+    order = np.argsort(found[0], kind="stable")
+    kept = [values[order] for values in found]
+    there = np.isfinite(kept[0]) & np.isfinite(kept[2]) & (kept[2] > 0)
+    return [values[there] for values in kept]
+
+
+def _against(cut, name):
+    """Variable that holds the errors of a quantity: those against the reference, if there is one."""
+    there = np.isfinite(float(cut.reference_value.sel(quantity=name)))
+    return "error" if there else "expected_error"
+
+
+def _errors_of(panels, cut, name, looks):
+    """Lines of a quantity over particles, and over seconds."""
+    one, drawn = cut.sel(quantity=name), False
+    estimate = 100 * float(one.reference_error_estimate)
+    difference = 100 * abs(float(one.reference_expected_error))
+    for definition, look in looks.items():
+        particles, seconds, errors, counted = _points(cut, name, definition)
+        for panel, along in zip(panels, (particles, seconds)):
+            panel.plot(along, errors, label=definition, **look)
+            hollow = look | {"linestyle": "", "markerfacecolor": "white"}
+            panel.plot(along[~counted], errors[~counted], **hollow)
+        drawn |= bool(len(errors))
+    for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
+        against = "error" if _against(cut, name) == "error" else "difference to expected"
+        panel.set(xlabel=words, ylabel=f"|{against[0].upper()}{against[1:]}| [%]")
+        if not drawn:
+            labels.say(panel, _why(cut))
+            continue
+        panel.set(xscale="log", yscale="log")
+        if estimate > 0:
+            low = panel.get_ylim()[0]
+            if estimate > low:
+                panel.axhspan(low, estimate, color="0.92", zorder=0)
+                panel.set_ylim(low, None)
+        style.plain(panel, "x", "y")
+    panels[0].set_title(f"{name}: {described(cut, name)}")
+    said = []
+    if difference > 0:
+        said.append(f"{difference:.2g} % from expected")
+    if estimate > 0:
+        said.append(f"known to {estimate:.1g} %")
+    panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL)
+
+
+def _ends(cut, name, looks):
+    """Where lines end in both panels, with their names and colours."""
+    found = [], []
+    for definition, look in looks.items():
+        particles, seconds, errors, _ = _points(cut, name, definition)
+        for ends, along in zip(found, (particles, seconds)):
+            if len(errors):
+                ends.append((along[-1], errors[-1], definition, look["color"]))
+    return found
+
+
+def _why(cut):
+    """Why there is no error."""
+    flags = np.unique(cut.status.values[cut.status.values != 0])
+    states = ", ".join(STATUS[flag].replace("_", " ") for flag in flags) or "not asked for"
+    message = next((text for text in cut.message.values.ravel().tolist() if text), "")
+    if message:
+        return f"No error: {states}. {message[:160]}"
+    return f"No error: {states}; there is neither a reference nor an expected value."
+
+
+# -- all quantities ----------------------------------------------------------------------------------------------------
+
+
+@style.styled
+def plot_shapes(data, ax=None, *, material=None, kinematics=None):
+    """Size of the error of each quantity of all shapes on their finest mesh: a row a quantity, a marker a definition.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+        A study's dataset, or its group ``/shapes``.
+    ax : Axes or Figure, optional
+        Where to plot; by default a new figure.
+    material, kinematics : str, optional
+        Labels of the scenes; of each shape and load the first ones without.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no shapes.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_shapes(tree)
+    >>> axes.get_xlabel()
+    '|Error| on the finest mesh [%]'
+    """
+    whole = group(data, "shapes")
+    rows = _rows(whole, material, kinematics)
+    definitions = [name for name in whole.definition.values.tolist() if any(name in row["errors"] for row in rows)]
+    looks = {name: style.line(i) | {"linestyle": ""} for i, name in enumerate(definitions)}
+    tall = 1.2 + 0.24 * max(len(rows), 3) + 0.14 * -(-(len(definitions) + 1) // 5)
+    figure, axes = style.panels(ax, figsize=(style.PAGE, tall))
+    panel = axes[0, 0]
+    left = 0.15 + max((labels.width(row["name"]) for row in rows), default=0.5)
+    nowhere = [name for name in whole.definition.values.tolist() if rows and all(name in _lost(row) for row in rows)]
+    lacking = [[name for name in _lost(row) if name not in nowhere] for row in rows]
+    holes = [f"without {', '.join(lost)}" for lost in lacking if lost]
+    right = 0.1 + max(map(labels.width, holes), default=0.0)
+    place = {
+        "left": left,
+        "right": min(right, 2.0),
+        "bottom": 0.42 + 0.16 * bool(nowhere),
+        "top": 0.36 + 0.145 * -(-(len(definitions) + 1) // 5),
+    }
+    style.arrange(figure, axes, **place)
+    if not any(row["errors"] for row in rows):
+        labels.say(panel, "No quantity has an error: see status and message.")
+        return panel
+    panel.set(xscale="log", xlabel="|Error| on the finest mesh [%]", ylim=(len(rows) - 0.5, -0.5))
+    for name, look in looks.items():
+        shown = [(row["errors"][name], place) for place, row in enumerate(rows) if name in row["errors"]]
+        x, y = np.transpose(shown)
+        panel.plot(np.clip(x, LEAST_SHOWN, MOST_SHOWN_ERROR), y, label=name, **look | {"markersize": 4.2})
+    for number, row in enumerate(rows):
+        if np.isfinite(row["reference"]):
+            x = np.clip(row["reference"], LEAST_SHOWN, MOST_SHOWN_ERROR)
+            panel.plot([x], [number], "|", color="0.5", markersize=9, zorder=1)
+        if lacking[number]:
+            text = labels.wrapped(f"without {', '.join(lacking[number])}", 1.9)
+            panel.annotate(text, (1, number), xycoords=("axes fraction", "data"), xytext=(3, 0), va="center",
+                           textcoords="offset points", fontsize=style.SMALL, color="0.4")  # fmt: skip
+    if nowhere:
+        labels.note(panel, f"nowhere solved: {', '.join(nowhere)}")
+    panel.set_yticks(range(len(rows)), [no_mathematics(row["name"]) for row in rows])
+    panel.tick_params(axis="y", length=0)
+    style.plain(panel, "x")
+    handles, names = panel.get_legend_handles_labels()
+    if any(np.isfinite(row["reference"]) for row in rows):
+        handles.append(panel.plot([], [], "|", color="0.5", markersize=9, linestyle="")[0])
+        names.append("reference to expected")
+    # Above the legend.
+    panel.set_title("Quantities of shapes", pad=6 + 10.5 * -(-len(names) // 5))
+    panel.legend(handles, names, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, columnspacing=1.2,
+                 handletextpad=0.2, borderaxespad=0.1)  # fmt: skip
+    return panel
+
+
+def _rows(whole, material, kinematics):
+    """Quantities with the errors of definitions on the finest mesh that has one [%]."""
+    found = []
+    for shape in whole["shape"].values.tolist():
+        for load in whole["load"].values.tolist():
+            if not bool((whole.status.sel(shape=shape, load=load) != 0).any()):
+                continue
+            try:
+                cut, _ = _cut(whole, shape, load, material, kinematics)
+            except ValueError:  # not of this material or kinematics
+                continue
+            for name in _quantities(cut):
+                errors = {}
+                for definition in _definitions(cut):
+                    particles, _, sizes, counted = _points(cut, name, definition)
+                    finest = np.nanmax(cut.particles.values, initial=0.0)
+                    if len(sizes) and counted[-1] and particles[-1] == finest:
+                        errors[definition] = sizes[-1]
+                reference = 100 * abs(float(cut.reference_expected_error.sel(quantity=name)))
+                several = int((whole.status.sel(shape=shape) != 0).any(_others(whole, "load")).sum()) > 1
+                where = f"{shape} {load}" if several else shape
+                row = {"name": f"{where}: {name}", "errors": errors, "asked": _definitions(cut)}
+                found.append(row | {"reference": reference or np.nan})
+    return found
+
+
+def _lost(row):
+    """Definitions that were asked for and have no error that counts on the finest mesh."""
+    return [name for name in row["asked"] if name not in row["errors"]]
+
+
+def _others(whole, name):
+    return [one for one in whole.status.dims if one not in (name, "shape")]
+
+
+# -- networks ----------------------------------------------------------------------------------------------------------
+
+
+@style.styled
+def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
+    """Deformed networks of a shape, springs coloured by their force, over the outline of the reference: one a panel.
+
+    Displacements are magnified. Springs whose law is part of an energy are coloured by what they carry alone.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset with the group ``/shape_fields``.
+    ax : Figure or sequence of Axes, optional
+        Where to plot: as many Axes as definitions; by default a new figure.
+    shape, load : str, optional
+        Labels of the scenes. One that is not given must leave no choice.
+    definition : str or list of str, optional
+        Definitions in the place of a few, of which those that have an answer come first.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n_definitions,)
+
+    Raises
+    ------
+    ValueError
+        If the dataset has no networks of shapes, the selection leaves a choice, or nothing, or ``ax`` is not as many
+        Axes as definitions.
+
+    Examples
+    --------
+    >>> import springtune as st  # tree = st.open("results/mine")
+    >>> axes = st.plot_shape(tree, shape="cook", definition="area")
+    >>> axes[0].get_title(loc="left")
+    'area'
+    """
+    fields, cells = group(data, "shape_fields", alone=False), group(data, "shapes")
+    names = list(zip(fields.shape_name.values.tolist(), fields.load_name.values.tolist()))
+    here = [i for i, one in enumerate(names) if shape in (None, one[0]) and load in (None, one[1])]
+    if len(here) != 1:
+        known = "; ".join(", ".join(one) for one in names)
+        what = "choose one shape and load" if here else "nothing has this shape and load; there is"
+        raise ValueError(f"{what}: {known}")
+    case = fields.isel(case=here[0])
+    labels_of = {name: str(case[f"{name}_name"].item()) for name in ("shape", "load", "material", "kinematics")}
+    mesh = {"mesh_type": str(case.mesh_type_name.item()), "mesh_size": float(case.case_mesh_size)}
+    cut = cells.sel(labels_of | mesh)
+    asked = _definitions(cut)
+    wanted = _few(cut, asked) if definition is None else [definition] if isinstance(definition, str) else definition
+    missing = [name for name in wanted if name not in asked]
+    if missing:
+        raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
+    width, height = _extent(case)
+    columns = min(NETWORK_COLUMNS, len(wanted))
+    page = style.COLUMN if columns == 1 else style.PAGE
+    room = (page - 0.5 - 0.25 * columns) / columns
+    tall = float(np.clip(room * height / width * 1.12, 0.8, 3.2))
+    figure, axes, flat, _ = style.multiples(ax, len(wanted), columns, tall + 0.3)
+    rows = axes.shape[0]
+    if ax is None:
+        figure.set_size_inches(page, 0.5 + 0.75 + (tall + 0.3) * rows)
+    scale = _scale(case, cut, wanted, max(width, height))
+    size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
+    said = [*labels_of.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
+    lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
+    said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
+    title = labels.wrapped(", ".join(said), page - 0.2, 8.5)
+    left = 0.45 + 0.07 * max(0, len(f"{1e3 * max(width, height):.0f}") - 2)
+    place = {"left": left, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
+    place |= {"down": 0.3, "across": 0.1, "title": title}
+    style.arrange(figure, axes, **place)
+    largest = _largest_force(case, wanted)
+    drawn = [_network(panel, case, cut, name, scale, largest) for panel, name in zip(flat, wanted)]
+    for number, panel in enumerate(flat):
+        panel.set(aspect="equal", adjustable="datalim")
+        panel.set_title(panel.get_title("left") or wanted[number])
+        panel.grid(False)
+        if number % columns:
+            panel.tick_params(labelleft=False)
+        else:
+            panel.set_ylabel("y [mm]")
+        if number + columns >= len(wanted):
+            panel.set_xlabel("x [mm]")
+        else:
+            panel.tick_params(labelbottom=False)
+    lines = next((one for one in drawn if one is not None), None)
+    if figure is not None:
+        _bar(figure, lines, case)
+    return flat
+
+
+def _few(cut, asked):
+    """Definitions to draw, in their order: those that have an answer before others, and `FIRST` before the rest."""
+    solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
+    order = sorted(asked, key=lambda name: (not solved[name], name not in FIRST))
+    return [name for name in asked if name in order[:MOST_NETWORKS]]
+
+
+def _extent(case):
+    """Width and height of a body at rest."""
+    sides = []
+    for axis in "xy":
+        values = np.concatenate([case[axis].values, case[f"outline_{axis}"].values])
+        sides.append(np.ptp(values[np.isfinite(values)]) if np.isfinite(values).any() else 1.0)
+    return sides if min(sides) > 0 else (1.0, 1.0)
+
+
+def _scale(case, cut, wanted, extent):
+    """Factor on displacements: the largest is about a twelfth of the body."""
+    sizes = [np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)]
+    if not np.isfinite(sizes[0]).any():
+        moved = case.sel(definition=[name for name in wanted if name in case.definition.values])
+        sizes = [np.hypot(moved.displacement_x.values, moved.displacement_y.values)]
+    largest = np.nanmax(sizes[0], initial=0.0) if np.isfinite(sizes[0]).any() else 0.0
+    if not largest > 0:
+        return 1.0
+    factor = 0.08 * extent / largest
+    power = 10.0 ** math.floor(math.log10(factor))
+    return 1.0 if 0.4 < factor < 2 else max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)) * power
+
+
+def _largest_force(case, wanted):
+    """Force at the ends of the colours [N]: three in a hundred springs are beyond."""
+    forces = case.spring_force.sel(definition=[name for name in wanted if name in case.definition.values]).values
+    forces = np.abs(forces[np.isfinite(forces)])
+    return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
+
+
+def _network(panel, case, cut, name, scale, largest):
+    """Draw one network; its lines, or nothing where there is none."""
+    one = case.sel(definition=name) if name in case.definition.values else None
+    drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
+    outline = np.stack([case.outline_x.values, case.outline_y.values], axis=1)
+    there = np.stack([case.reference_displacement_x.values, case.reference_displacement_y.values], axis=1)
+    for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
+        places = np.flatnonzero(case.outline_round.values == number)
+        closed = np.append(places, places[:1])
+        panel.plot(*1e3 * outline[closed].T, color="0.6", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
+        if drawn:
+            panel.plot(*1e3 * (outline + scale * there)[closed].T, color="black", linewidth=0.9, zorder=3)
+    flag = int(cut.status.sel(definition=name))
+    lines = None
+    if drawn:
+        rest = np.stack([case.x.values, case.y.values], axis=1)
+        moved = np.stack([one.displacement_x.values, one.displacement_y.values], axis=1)
+        nodes = case.spring_nodes.transpose("spring", "spring_end").fillna(NO_NODE).values.astype(int)
+        kept = (nodes != NO_NODE).all(axis=1)
+        springs, forces = nodes[kept], one.spring_force.values[kept]
+        width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
+        lines = LineCollection(
+            1e3 * (rest + scale * moved)[springs],
+            array=forces,
+            cmap=FORCES,
+            clim=(-largest, largest),
+            linewidths=width,
+            zorder=2,
+        )
+        panel.add_collection(lines)
+        panel.autoscale()
+        if not np.abs(forces).max() > 0:
+            panel.set_title(f"{name}: forces in an energy")
+    if flag != STATUS.index("solved"):
+        message = str(cut.message.sel(definition=name).item())
+        text = f"{STATUS[flag].replace('_', ' ')}: {message[:120]}" if lines is None else STATUS[flag]
+        labels.say(panel, text, bare=False)
+    return lines
+
+
+def _bar(figure, lines, case):
+    """Scale of the colours, and what lines are, below all panels."""
+    width, height = style.size(figure)
+    if lines is not None:
+        place = figure.add_axes((0.45 / width, 0.36 / height, min(3.0, 0.45 * width) / width, 0.08 / height))
+        bar = figure.colorbar(lines, cax=place, orientation="horizontal", extend="both")
+        bar.set_label("Spring force [N], tension positive", fontsize=style.SMALL)
+        bar.formatter.set_powerlimits((-2, 4))  # long numbers would run into each other
+        bar.update_ticks()
+        bar.outline.set_linewidth(0.5)
+    there = np.isfinite(case.reference_displacement_x.values).any()
+    text = "black: outline of the reference, displaced\ndashed: at rest" if there else "no reference"
+    figure.text(1 - 0.1 / width, 0.4 / height, text, ha="right", va="center", fontsize=style.SMALL, color="0.25")

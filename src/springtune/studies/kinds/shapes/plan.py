@@ -1,0 +1,227 @@
+"""Stages of shapes: what their jobs are to do, and the keys of what they store."""
+
+import hashlib
+from collections import defaultdict
+from functools import lru_cache
+from pathlib import Path
+
+from ...config.kind import Stage
+from ...runs.hashing import hash_of
+from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
+from .names import OWN_FILE
+from .outputs import DRAWING
+
+MOST_DRAWN = 1500
+"""Particles, about, of the largest mesh that is drawn where a coarser one is there."""
+
+FILE_PARTICLES = 2000.0
+"""Particles of a mesh from a file, for costs, before it is read."""
+
+
+def mesh_name(one):
+    """Stem of the files of a scene's mesh, and of what is solved on it."""
+    return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
+
+
+def particles(part, one):
+    """Number of particles of a scene's mesh, about."""
+    shape = part.shape[one.shape]
+    return FILE_PARTICLES if shape.file else shape.area / (0.866 * one.mesh_size**2)
+
+
+# -- keys --------------------------------------------------------------------------------------------------------------
+
+
+def _source(shape):
+    """What the geometry of a shape is made from."""
+    from .task_values import geometry  # here, as below: studies of beams read the stages as well
+
+    described = geometry(shape)
+    if not shape.file:
+        return described
+    state = Path(shape.file).stat()
+    content = _content(shape.file, state.st_size, state.st_mtime_ns)
+    return described | {"file": shape.file, "unit": shape.unit, "content": content}
+
+
+@lru_cache(maxsize=256)
+def _content(file, size, time):
+    """Hash of a file; each of its scenes asks."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def _parameters(source):
+    """What of it results depend on: not on where a file is, but on its ending, which says its format."""
+    return source | {"file": Path(source["file"]).suffix} if "file" in source else source
+
+
+def mesh_source(part, one):
+    """What a scene's mesh is made from."""
+    source = _source(part.shape[one.shape])
+    if "file" in source:
+        return source
+    refined = {name: share * one.mesh_size for name, share in part.refined[one.shape].items()}
+    return source | {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "refined": refined}
+
+
+def mesh_key(part, one):
+    """Key of a scene's mesh."""
+    return hash_of(
+        _parameters(mesh_source(part, one)), stage_key("studies.kinds.shapes.mesh"), _reader(part.shape[one.shape])
+    )
+
+
+def _reader(shape):
+    """What reads the mesh file of a shape, the library behind it included; nothing where it has none."""
+    return mesh_type_key(OWN_FILE) if shape.file else ""
+
+
+def _case(part, shape, material, name):
+    """What a shape of its materials under a load is, but for its geometry; no density where nothing weighs."""
+    from .task_values import load
+
+    case = part.shape[shape].loads[name]
+    weighs = any(case.gravity)
+    materials = {key: material_key(one, weighs) for key, one in part.materials_of(shape, material).items()}
+    return {"thickness": part.shape[shape].thickness, "load": load(case), "materials": materials}
+
+
+def reference_task(part, shape, material, name):
+    """Task of a reference."""
+    task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
+    code = stage_key("studies.kinds.shapes.reference"), _reader(part.shape[shape])
+    key = hash_of(task | {"shape": _parameters(task["shape"])}, code)
+    return {"key": key} | task
+
+
+def scene_task(part, one, kept=()):
+    """Task of a scene."""
+    task = _case(part, one.shape, one.material, one.load)
+    task |= {"definition": one.definition, "kinematics": one.kinematics}
+    # Scenes of shapes have no reference at finite strain.
+    code = stage_key("studies.kinds.shapes.solve", without=("reference.finite_strain",)), definition_key(one.definition)
+    key = hash_of(mesh_key(part, one), task, code)
+    return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
+
+
+def draws(study):
+    """Whether a study's dataset has the networks that are drawn."""
+    return DRAWING in study.outputs
+
+
+def shown(part):
+    """Scenes whose networks are drawn.
+
+    Of each shape and load those of the finest mesh that is not too large to be drawn, of the first material and
+    kinematics.
+    """
+    cases = defaultdict(list)
+    for one in part.scenes:
+        cases[one.shape, one.load].append(one)
+    found = set()
+    for scenes in cases.values():
+        few = [one for one in scenes if particles(part, one) <= MOST_DRAWN]
+        mesh = min(few, key=_size) if few else max(scenes, key=_size)
+        alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
+        found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
+    return found
+
+
+def _size(one):
+    return one.mesh_size
+
+
+def by_mesh(part):
+    """Scenes by the name of their mesh."""
+    found = defaultdict(list)
+    for one in part.scenes:
+        found[mesh_name(one)].append(one)
+    return found
+
+
+# -- stages ------------------------------------------------------------------------------------------------------------
+
+
+def _mesh_members(study, costs):
+    """Meshes with their scenes, and what all of that costs."""
+    part = study.parts["shapes"]
+    members = {}
+    for name, scenes in by_mesh(part).items() if part else ():
+        count = particles(part, scenes[0])
+        seconds = costs.of("shape_mesh", count)
+        seconds += sum(costs.of("shape_scene", count) + costs.of(one.definition, count) for one in scenes)
+        members[name] = seconds, scenes
+    return members
+
+
+def _meshes(study, folder, members):
+    part = study.parts["shapes"]
+    return {
+        "folder": str(folder / "shape_meshes"),
+        "meshes": [
+            {"name": mesh_name(one), "key": mesh_key(part, one), "source": mesh_source(part, one)}
+            for one, *_ in members
+        ],
+    }
+
+
+def _mesh_products(content):
+    return [Path(content["folder"]) / f"{mesh['name']}.h5" for mesh in content["meshes"]]
+
+
+def _reference_members(study, costs):
+    part = study.parts["shapes"]
+    return {"/".join(one): (costs.of("shape_reference"), one) for one in (part.referred if part else ())}
+
+
+def _references(study, folder, members):
+    tasks = [reference_task(study.parts["shapes"], *one) for one in members]
+    return {
+        "folder": str(folder / "shape_references"),
+        "references": list({task["key"]: task for task in tasks}.values()),
+    }
+
+
+def _reference_products(content):
+    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["references"]]
+
+
+def _solve(study, folder, members):
+    part = study.parts["shapes"]
+    kept = shown(part) if draws(study) else ()
+    families = [
+        {
+            "name": mesh_name(scenes[0]),
+            "mesh": mesh_key(part, scenes[0]),
+            "shape": _parameters(_source(part.shape[scenes[0].shape])),
+            "scenes": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
+        }
+        for scenes in members
+    ]
+    return {"folder": str(folder / "shape_solutions"), "meshes": str(folder / "shape_meshes"), "families": families}
+
+
+def _solve_products(content):
+    return [Path(content["folder"]) / f"{family['name']}.h5" for family in content["families"]]
+
+
+STAGES = (
+    Stage(
+        "shape_reference",
+        "studies.kinds.shapes.reference",
+        "Solving the references of shapes",
+        _references,
+        _reference_products,
+        _reference_members,
+    ),
+    Stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_products, _mesh_members),
+    Stage(
+        "shape_solve",
+        "studies.kinds.shapes.solve",
+        "Solving the networks of shapes",
+        _solve,
+        _solve_products,
+        like="shape_mesh",
+        same=("shape_mesh",),
+    ),
+)

@@ -1,0 +1,122 @@
+"""Stage `shape_reference`: one finite-element solution each shape, material and load, on the shape itself."""
+
+import time
+from functools import partial
+
+import numpy as np
+
+from springtune.reference.shapes import solve_each
+
+from ...runs import store
+from .mesh import make
+from .task_values import ONE_LOAD, by_key, materials_of, quantity_key, shape_of
+
+ALONG = 24
+"""Points along a side of an outline that is drawn."""
+
+
+def run(tasks, spent):
+    """Solve the references of a bundle that are not there yet.
+
+    Parameters
+    ----------
+    tasks : dict
+        ``folder`` and ``references``, each with ``key``, ``shape`` (what `mesh.make` takes),
+        ``thickness``, ``load`` and ``materials``, see `task_values`.
+    spent : Spent
+        What tasks cost is added to it.
+    """
+    for path, task in store.missing(tasks["folder"], tasks["references"], spent.limits):
+        begin = time.perf_counter()
+        result = spent.attempt(task["key"], partial(_solved, task), _hole)
+        if result is None:
+            continue
+        result["seconds"] = time.perf_counter() - begin
+        store.add(path, {task["key"]: result})
+        spent.add("shape_reference", 0, result["seconds"])
+
+
+def lose(tasks, key, why, limits):
+    """Store that a reference is beyond its limits.
+
+    Parameters
+    ----------
+    tasks : dict
+        As of `run`.
+    key, why, limits : str
+        Of the reference; what became of it; the limits.
+    """
+    store.lose(tasks["folder"], key, _hole(why), limits)
+
+
+def _hole(why):
+    return {"message": why, "seconds": 0.0}
+
+
+def _solved(task):
+    grouped = make(task["shape"]) if "file" in task["shape"] else None
+    shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
+    case = shape.loads[ONE_LOAD]
+    found, lacking = solve_each(shape, case, materials, grouped)
+    if not found:
+        return _hole("; ".join(dict.fromkeys(lacking.values())))
+    values, estimates = {}, {}
+    for one in found:
+        values |= by_key(one.values, case)
+        estimates |= by_key(one.error_estimates, case)
+    rounds = _rounds(shape, grouped)
+    points = np.concatenate(rounds)
+    return {
+        "message": "",
+        "values": values,
+        "error_estimates": estimates,
+        "lacking": {quantity_key(one): lacking[one.name] for one in case.quantities if one.name in lacking},
+        "unknowns": max(int(one.unknowns) for one in found),
+        "energy": float(found[0].energy),
+        "rotation": float(found[0].rotation),
+        "strain": float(found[0].strain),
+        "outline_points": points,
+        "outline_displacements": found[0].at(points),
+        "outline_lengths": np.array([len(one) for one in rounds]),
+    }
+
+
+def _rounds(shape, grouped):
+    """Points around the outline and around each hole [m], a closed round each."""
+    if grouped is None:
+        outlines = [one.sides for one in shape.rounds if one.inner is None or one.outer is None]
+        return [np.array([side.at(i / ALONG) for side in sides for i in range(ALONG)]) for sides in outlines]
+    mesh = grouped.mesh
+    edges = mesh.edges[mesh.on_outline]
+    return [mesh.points[one] for one in rounds_of(edges)]
+
+
+def rounds_of(edges):
+    """Closed rounds of points that edges join, each point of two of them.
+
+    Parameters
+    ----------
+    edges : ndarray of int, shape (n, 2)
+
+    Returns
+    -------
+    list of ndarray of int
+    """
+    beside = {}
+    for one, other in edges.tolist():
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    found = []
+    while beside:
+        start = here = next(iter(beside))
+        one = [here]
+        while beside[here]:
+            there = beside[here].pop()
+            beside[there].remove(here)
+            if there == start:
+                break
+            one.append(there)
+            here = there
+        beside = {point: others for point, others in beside.items() if others}
+        found.append(np.array(one))
+    return found

@@ -1,0 +1,383 @@
+"""Sections of a study that describe shapes, and how their values are read."""
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+from springtune import units
+
+from ...config.fields import (
+    DefinitionName,
+    FileName,
+    Flag,
+    Kinematics,
+    Length,
+    Lengths,
+    MaterialName,
+    Named,
+    OneOrMore,
+    Ratio,
+    Scalar,
+    Text,
+    one_of,
+)
+from ...config.messages import refuse, show
+from ...config.sections import Section
+from .names import ALONG_AXES, KINDS_OF_QUANTITY, OUTLINED, STRESSES
+
+BEYOND_MEASURE = 1e30
+"""Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
+
+
+class Signed(Scalar):
+    """Annotation of a quantity of either sign, or zero, which needs no unit.
+
+    Parameters
+    ----------
+    kind : str
+        Key of `springtune.units.QUANTITY_KINDS`.
+    """
+
+    def __init__(self, kind: str) -> None:
+        example = units.QUANTITY_KINDS[kind].example
+        words = f"{'an' if kind[0] in 'ae' else 'a'} {kind} such as '{example}'"
+        super().__init__(lambda text: _signed(text, kind), {"type": ["string", "number"], "examples": [example]}, words)
+
+
+def _signed(text: str, kind: str) -> float:
+    if text.strip() in ("0", "0.0", "-0"):
+        return 0.0
+    try:
+        value = units.parse(text, kind)
+    except units.UnitError as error:
+        raise refuse(str(error)) from None
+    if not abs(value) < BEYOND_MEASURE:
+        raise refuse(f"{show(text)} is beyond all measure; give one such as '{units.QUANTITY_KINDS[kind].example}'")
+    return value + 0.0
+
+
+class Vector:
+    """Annotation of two quantities, along x and along y.
+
+    Parameters
+    ----------
+    kind : str
+        Key of `springtune.units.QUANTITY_KINDS`.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.item = Signed(kind)
+        example = units.QUANTITY_KINDS[kind].example
+        pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
+        self.words = f"{kind}s along x and y, such as [{pair}]"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"type": "array", "items": dict(self.item.schema), "minItems": 2, "maxItems": 2}
+
+    def _read(self, value: object) -> tuple[float, float]:
+        if not isinstance(value, list) or len(value) != 2:
+            raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
+        x, y = (self.item._read(one) for one in value)
+        return x, y
+
+
+class Words:
+    """Annotation of what is expected where the items of a list or mapping do not tell.
+
+    Parameters
+    ----------
+    words : str
+    """
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+
+Place = Annotated[tuple[float, float], Vector("length")]
+ForceVector = Annotated[tuple[float, float], Vector("force")]
+Gravity = Annotated[tuple[float, float], Vector("acceleration")]
+Displacement = Annotated[float, Signed("length")]
+PressureValue = Annotated[float, Signed("stress")]
+GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
+PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
+PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
+ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape")]
+LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
+MadeType = Annotated[str, one_of("mesh type", OUTLINED)]
+Axis = Annotated[str, one_of("component", ALONG_AXES)]
+StressComponent = Annotated[str, one_of("component", STRESSES)]
+Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value with its unit")]
+
+
+def _or_text(*texts: str) -> Any:
+    """What the schema says of a section in the place of which a text may stand."""
+
+    def extend(schema: dict[str, Any]) -> None:
+        section = dict(schema)
+        schema.clear()
+        short = {"enum": list(texts)} if texts else {"type": "string"}
+        schema |= {"anyOf": [short, section], "description": section.pop("description", "")}
+
+    return extend
+
+
+class SegmentConfig(Section):
+    """A side of an outline, from its corner to that of the next one."""
+
+    start: Place = Field(alias="from", description="Its corner.")
+    centre: Place | None = Field(
+        None,
+        description="Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse "
+        "with its axes along x and y where its ends are not equally far from it. It is straight without.",
+    )
+    group: GroupName | None = Field(None, description="Group that it belongs to, for supports, loads and quantities.")
+
+
+SIDE_WORDS = Words("a list of sections; see below")
+
+
+class CircleConfig(Section):
+    """A circle."""
+
+    centre: Place = Field(description="Centre.")
+    radius: Length = Field(description="Radius.")
+
+
+class HoleConfig(Section):
+    """A hole, or what fills it: a circle, or an outline."""
+
+    circle: CircleConfig | None = Field(None, description="Where it is round.")
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
+        None, description="Where it is not: a round of sides, in either sense."
+    )
+    group: GroupName | None = Field(
+        None, description="Group that the circle belongs to; sides of an outline have their own."
+    )
+    part: PartName | None = Field(
+        None, description="Part of the body that fills it, of a material under `parts`; nothing fills it without."
+    )
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if (self.circle is None) == (self.outline is None):
+            what = "neither a circle nor an outline" if self.circle is None else "both a circle and an outline"
+            raise refuse(f"{what}; give one, such as circle: {{centre: [24 mm, 22 mm], radius: 5 mm}}")
+        if self.group and self.outline is not None:
+            raise refuse("an outline's sides have groups of their own; give it to each, or leave it out", "group")
+        return self
+
+
+class SupportConfig(Section):
+    """Displacements that a group, or a point, is given; `fixed` stands for none along both axes."""
+
+    model_config = {"json_schema_extra": _or_text("fixed")}
+
+    x: Displacement | None = Field(None, description="Along x; free without.")
+    y: Displacement | None = Field(None, description="Along y; free without.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fixed(cls, value: object) -> object:
+        if isinstance(value, str):
+            if value != "fixed":
+                raise refuse(f"{show(value)} is no support; give fixed, or displacements such as {{y: 0 mm}}")
+            return {"x": "0", "y": "0"}
+        return value
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if self.x is None and self.y is None:
+            raise refuse("holds nothing; give fixed, or displacements such as {y: 0 mm}, or remove it")
+        return self
+
+
+class PressureConfig(Section):
+    """A pressure on a group, positive towards the body; a stress alone stands for one that keeps its direction."""
+
+    model_config = {"json_schema_extra": _or_text()}
+
+    pressure: PressureValue = Field(description="Pressure.")
+    follower: Flag = Field(
+        "false",
+        validate_default=True,
+        description="Whether it turns and grows with the sides, in nonlinear kinematics.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _alone(cls, value: object) -> object:
+        return {"pressure": value} if isinstance(value, str) else value
+
+
+class QuantityConfig(Section):
+    """A quantity of interest: one of `displacement`, `stress`, `reaction`, or the text `area` or `energy`."""
+
+    model_config = {"json_schema_extra": _or_text("area", "energy")}
+
+    displacement: Axis | None = Field(
+        None, description="Displacement along it: `at` a point, or the mean one `of` a group of sides, by length."
+    )
+    stress: StressComponent | None = Field(None, description="Stress `at` a point, recovered from the cells around it.")
+    reaction: Axis | None = Field(None, description="Force of the supports `of` a group along it.")
+    area: Flag | None = Field(None, description="Growth of the area of the body; `area` alone says so.")
+    energy: Flag | None = Field(None, description="Strain energy; `energy` alone says so.")
+    at: PointName | None = Field(None, description="Point.")
+    of: GroupName | None = Field(None, description="Group of sides.")
+    expected: Anything | None = Field(
+        None, description="Value that others give, with its unit: the dataset has errors against it, too."
+    )
+    source: Text | None = Field(None, description="Who gives it.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _alone(cls, value: object) -> object:
+        if isinstance(value, str):
+            if value not in ("area", "energy"):
+                example = "{displacement: y, at: tip}"
+                raise refuse(f"{show(value)} is no quantity; give area or energy, or what it is of, such as {example}")
+            return {value: "true"}
+        return value
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = [name for name in KINDS_OF_QUANTITY if getattr(self, name)]
+        if len(given) != 1:
+            what = f"{' and '.join(given)} at once" if given else "no quantity"
+            raise refuse(f"{what}; give one of {', '.join(KINDS_OF_QUANTITY)}, such as {{displacement: y, at: tip}}")
+        kind = KINDS_OF_QUANTITY[given[0]]
+        places = [name for name in ("at", "of") if getattr(self, name) is not None]
+        if len(places) > 1:
+            raise refuse("both a point and a group; give 'at' or 'of'", "of")
+        if not places and kind.places:
+            raise refuse(f"a {given[0]} of nothing; give {kind.example}", given[0])
+        for name in places:
+            if name not in kind.places:
+                raise refuse(f"a {given[0]} has no '{name}'; give {kind.example}", name)
+        if self.source and self.expected is None:
+            raise refuse("a source of no value; give 'expected', too, or remove it", "source")
+        if self.expected is not None:
+            try:
+                _signed(self.expected, kind.unit_kind)
+            except Exception as error:
+                raise refuse(str(error), "expected") from None
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Key of `springtune.studies.kinds.shapes.names.KINDS_OF_QUANTITY`."""
+        return next(name for name in KINDS_OF_QUANTITY if getattr(self, name))
+
+    @property
+    def component(self) -> str:
+        """Of the displacement, stress or reaction; empty for others."""
+        found = getattr(self, self.kind)
+        return found if isinstance(found, str) else ""
+
+    @property
+    def expected_value(self) -> float | None:
+        """In SI units."""
+        return None if self.expected is None else _signed(self.expected, KINDS_OF_QUANTITY[self.kind].unit_kind)
+
+
+class ShapeLoadConfig(Section):
+    """What is done to a shape, and what is asked of it."""
+
+    supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)] = Field(
+        description="What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."
+    )
+    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = Field(
+        {}, description="Forces along x and y, by group or point: of a group the total one, spread evenly by length."
+    )
+    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = Field(
+        {}, description="Pressures, by group; positive towards the body."
+    )
+    gravity: Gravity = Field(
+        ["0", "0"],
+        validate_default=True,
+        description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities.",
+    )
+    quantities: Annotated[dict[str, QuantityConfig], Named("quantity")] = Field(
+        description="Quantities of interest, by name; the first one stands for all where one is wanted."
+    )
+
+
+class ShapeConfig(Section):
+    """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
+
+    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
+        None, description="Round of its sides, counter-clockwise."
+    )
+    holes: list[HoleConfig] = Field([], description="Holes, and parts of other materials.")
+    file: FileName | None = Field(
+        None,
+        description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
+        "study's folder; its groups are the shape's.",
+    )
+    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
+    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
+        {}, description="Named points of an outline or inside of it: particles of every mesh."
+    )
+    refined: Annotated[dict[str, Ratio], Words("numbers above 0, by group, point or part")] = Field(
+        {},
+        description="Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as "
+        "`{hole: 0.25}`; from there on it grows.",
+    )
+    parts: Annotated[dict[str, MaterialName], Words("names of materials, by part")] = Field(
+        {}, description="Materials of the parts, by name; the rest is of the grid's material."
+    )
+    loads: Annotated[dict[str, ShapeLoadConfig], Named("load")] = Field(description="Loads, by name.")
+
+    @model_validator(mode="after")
+    def _one_geometry(self) -> Self:
+        if (self.outline is None) == (self.file is None):
+            what = "neither 'outline' nor 'file'" if self.file is None else "both 'outline' and 'file'"
+            raise refuse(f"{what}; give the sides of the body, or a mesh file")
+        for name in ("holes", "points", "refined") if self.file is not None else ():
+            if getattr(self, name):
+                raise refuse(f"a mesh file has its own {name}; remove them here", name)
+        if self.file is None and "unit" in self.model_fields_set:
+            raise refuse("is of the coordinates in a mesh file, and there is none; remove it", "unit")
+        return self
+
+
+class ShapeGridConfig(Section):
+    """A product of parameters: every combination of the values listed is a scene of a shape.
+
+    A single value stands for a list of one. A scene that two grids ask for is solved once.
+    """
+
+    shape: Annotated[list[ShapeName], OneOrMore()] = Field(description="Shapes, by name.")
+    mesh_size: Lengths | None = Field(
+        None, description="Lengths of an edge; not of shapes from files, whose mesh is that of the file."
+    )
+    mesh_type: Annotated[list[MadeType], OneOrMore()] | None = Field(
+        None,
+        description="`free`: " + OUTLINED["free"] + ", which it is without. Shapes from files have the type `file`.",
+    )
+    material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
+    load: Annotated[list[LoadName], OneOrMore()] | None = Field(
+        None, description="Loads of the shapes, by name; all of each shape without."
+    )
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness on triangles and need no reference."
+    )
+    kinematics: Annotated[list[Kinematics], OneOrMore()] = Field(
+        "nonlinear",
+        validate_default=True,
+        description="Whether springs keep their length law or their tangent at rest.",
+    )
+    reference: Flag = Field(
+        "true",
+        validate_default=True,
+        description="Whether there is a converged reference; else errors are those against `expected` values alone.",
+    )
+
+
+NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None
+NAMED_GRIDS = Annotated[dict[str, ShapeGridConfig], Named("grid", for_files=False)] | None
+"""What a study has under ``shapes`` and ``shape_grids``."""

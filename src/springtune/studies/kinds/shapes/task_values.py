@@ -1,0 +1,164 @@
+"""Shapes, loads and materials as tasks hold them: plain dicts of what results depend on, without labels."""
+
+import warnings
+from dataclasses import asdict, replace
+from math import isfinite
+from typing import Any
+
+from springtune.problem.geometry import AssumptionWarning
+from springtune.problem.materials import AnyMaterial, material_of
+from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+
+UNNAMED, ONE_LOAD = "shape", "load"
+"""Names of a shape and of its load in tasks."""
+
+
+def quantity_key(quantity: Quantity) -> str:
+    """What a quantity is, whatever a study calls it.
+
+    Parameters
+    ----------
+    quantity : Quantity
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> quantity_key(Quantity("tip", "displacement", "end", "y", expected=1e-3))
+    'displacement y end'
+    """
+    return " ".join(filter(None, (quantity.kind, quantity.component, quantity.of)))
+
+
+def geometry(shape: Shape) -> dict[str, Any]:
+    """What meshes of a shape depend on: its sides and points; of a file nothing that is in it.
+
+    Parameters
+    ----------
+    shape : Shape
+
+    Returns
+    -------
+    dict
+        ``outline``, ``holes`` and ``points``.
+    """
+    return {
+        "outline": [asdict(side) for side in shape.outline],
+        "holes": [asdict(hole) for hole in shape.holes],
+        "points": {name: list(point) for name, point in shape.points.items()},
+    }
+
+
+def load(case: LoadCase) -> dict[str, Any]:
+    """What results under a load depend on.
+
+    Parameters
+    ----------
+    case : LoadCase
+
+    Returns
+    -------
+    dict
+    """
+    quantities = {quantity_key(one): one for one in case.quantities}
+    plain = [
+        replace(one, name=f"q{number}", expected=None, source="")
+        for number, (_, one) in enumerate(sorted(quantities.items()))
+    ]
+    return asdict(replace(case, name=ONE_LOAD, quantities=tuple(plain)))
+
+
+def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
+    """Shape of what `geometry` gives.
+
+    Parameters
+    ----------
+    described : dict
+    thickness : float, optional
+        [m]
+    case : dict, optional
+        What `load` gives.
+
+    Returns
+    -------
+    Shape
+        With the load `ONE_LOAD`, where there is one.
+    """
+    holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
+    points = {name: _pair(point) for name, point in described["points"].items()}
+    loads = {} if case is None else {ONE_LOAD: load_of(case)}
+    file = described.get("file", "")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
+        return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
+
+
+def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
+    """Values of quantities by their `quantity_key`; those that are no finite numbers are left out.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        By the quantities' names in tasks.
+    case : LoadCase
+        As in tasks.
+
+    Returns
+    -------
+    dict of str to float
+    """
+    found = {quantity_key(one): float(values[one.name]) for one in case.quantities if one.name in values}
+    return {key: value for key, value in found.items() if isfinite(value)}
+
+
+def named(message: str, shape: Shape, case: LoadCase) -> str:
+    """A message of a task with the names that a study has.
+
+    Parameters
+    ----------
+    message : str
+    shape : Shape
+    case : LoadCase
+        One of its loads.
+
+    Returns
+    -------
+    str
+    """
+    names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{ONE_LOAD}'": f"load '{case.name}'"}
+    order = sorted({quantity_key(one) for one in case.quantities})
+    names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}
+    for plain, name in names.items():
+        message = message.replace(plain, name)
+    return message
+
+
+def load_of(described: dict[str, Any]) -> LoadCase:
+    """Load of what `load` gives."""
+    return LoadCase(
+        described["name"],
+        tuple(Support(**one) for one in described["supports"]),
+        tuple(Traction(one["group"], _pair(one["force"])) for one in described["tractions"]),
+        tuple(Pressure(**one) for one in described["pressures"]),
+        _pair(described["gravity"]),
+        tuple(Quantity(**one) for one in described["quantities"]),
+    )
+
+
+def _segments(sides: list[dict[str, Any]]) -> tuple[Segment, ...]:
+    return tuple(
+        Segment(_pair(side["start"]), None if side["centre"] is None else _pair(side["centre"]), side["group"])
+        for side in sides
+    )
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    x, y = values
+    return x, y
+
+
+def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, AnyMaterial]:
+    """Materials by part, of what `springtune.studies.runs.keys.material_key` gives of each."""
+    return {part: material_of(one) for part, one in described.items()}

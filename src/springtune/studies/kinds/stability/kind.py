@@ -1,0 +1,150 @@
+"""Experiments on numerical stability: a study's section ``stability``."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from springtune.mesh import MESH_TYPES
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import Material
+
+from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
+from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
+from ...config.kind import Kind
+from ...config.sections import Section
+from .names import AXES, EXPERIMENTS, ONCE
+from .outputs import OUTPUTS
+from .plan import STAGES
+
+ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
+
+
+class StabilityConfig(Section):
+    """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
+
+    beam: BeamName = Field(description="Beam.")
+    material: MaterialName = Field(description="Material, with a density.")
+    force: Force = Field(description="Traction on the right end.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
+        "experiment is not about definitions."
+    )
+    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type of triangles.")
+    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
+        description="Lengths of an edge; most experiments take the coarsest."
+    )
+    experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
+        list(EXPERIMENTS),
+        validate_default=False,
+        description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
+    )
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment on numerical stability, see `springtune.studies.kinds.stability.experiments`.
+
+    Attributes
+    ----------
+    name : str
+        Key of `springtune.studies.kinds.stability.names.EXPERIMENTS`.
+    beam : Beam
+    material : Material
+        With a density.
+    force : float
+        Traction [N].
+    definition : str
+        Key of `springtune.springs.DEFINITIONS`.
+    mesh_type : str
+    mesh_sizes : tuple of float
+        Lengths of an edge [m], ascending.
+    """
+
+    name: str
+    beam: Beam
+    material: Material
+    force: float
+    definition: str
+    mesh_type: str
+    mesh_sizes: tuple[float, ...]
+
+
+def _check(config, problems):
+    if not config.stability:
+        return
+    section = config.stability
+    check_known(problems, ("stability", "beam"), "beam", section.beam, config.beams)
+    check_beam_material(problems, ("stability", "material"), section.material, config)
+    check_density(config, section.material, ("stability", "material"), problems)
+    check_for_triangles(section.definition, ("stability", "definition"), problems)
+    made = [name for name, one in MESH_TYPES.items() if one.corners == 3]
+    if section.mesh_type not in made:
+        message = f"'{section.mesh_type}' is no mesh type of triangles that is made; choose of {', '.join(made)}"
+        problems.add(("stability", "mesh_type"), message)
+    if section.beam in config.beams:
+        beam = config.beams[section.beam]
+        check_particles(problems, ("stability", "mesh_size"), section.mesh_size, beam.length, beam.height)
+        side = min(config.beams[section.beam].length, config.beams[section.beam].height)
+        if max(section.mesh_size) > 0.3 * side:
+            message = f"{1e3 * max(section.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
+            problems.add(("stability", "mesh_size"), message)
+
+
+def _expand(config, declared):
+    """Experiments: one a definition, or one in all."""
+    section = config.stability
+    if not section:
+        return ()
+    return tuple(
+        Experiment(
+            name,
+            declared.beams[section.beam],
+            declared.materials[section.material],
+            section.force,
+            definition,
+            section.mesh_type,
+            tuple(sorted(section.mesh_size)),
+        )
+        for name in EXPERIMENTS
+        if name in section.experiment
+        for definition in (section.definition[:1] if name in ONCE else section.definition)
+    )
+
+
+def _axes(experiments):
+    shared = {
+        "definition": {one.definition for one in experiments},
+        "mesh_size": {size for one in experiments for size in one.mesh_sizes},
+    }
+    return shared | AXES | {"experiment": tuple(dict.fromkeys(one.name for one in experiments))}
+
+
+KIND = Kind(
+    "stability",
+    study_fields={
+        "stability": (
+            StabilityConfig | None,
+            Field(None, description="Experiments on numerical stability; they make the group `/stability`."),
+        )
+    },
+    check=_check,
+    expand=_expand,
+    axes=_axes,
+    stages=STAGES,
+    outputs=OUTPUTS,
+    division="division",
+    costs={
+        "limits": (10.0, 0.0),
+        "maps": (8.0, 0.0),
+        "drift": (9.0, 0.0),
+        "rest": (2.0, 0.0),
+        "sizes": (3.0, 0.0),
+        "strains": (2.0, 0.0),
+        "buckling": (5.0, 0.0),
+        "slivers": (0.1, 0.0),
+        "contrast": (0.1, 0.0),
+        "poisson": (0.3, 0.0),
+        "perturbation": (0.5, 0.0),
+    },
+)

@@ -1,0 +1,153 @@
+"""A server of one dataset's page, for the machine that it runs on."""
+
+import errno
+import mimetypes
+import os
+import secrets
+import sys
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from .page import page
+
+HOST = "127.0.0.1"
+
+SERVED = {"figures": (".pdf", ".png"), "tables": (".csv", ".html", ".md")}
+"""Folders beside a dataset, and the endings of those of their files that are served."""
+
+ALONE = ("paper.pdf", "report.zip")
+"""Files beside a dataset that are served."""
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' data: blob:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""What a page from here may load: nothing but pictures from here."""
+
+
+class Server(ThreadingHTTPServer):
+    """Server of a page, its dataset, and of the figures and tables beside it; of nothing else, and to nobody else.
+
+    It listens on the loopback address, answers requests for it by that name alone (a page of somebody else that gives
+    its own name this address is refused), and every path begins with a token that is drawn anew.
+
+    Parameters
+    ----------
+    dataset : str or Path
+        NetCDF file, or its folder.
+    port : int
+        0 chooses a free one.
+
+    Attributes
+    ----------
+    address : str
+        Of the page.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        As of `springtune.studies.output.browse.page.page`.
+    OSError
+        If the port is not to be had, with what to do about it.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, dataset: str | os.PathLike[str], port: int = 0) -> None:
+        path = Path(dataset)
+        path = path / "dataset.nc" if path.is_dir() else path
+        self.served = _served(path)
+        self.text = page(
+            path, [name for name in self.served if name in ALONE or not name.endswith((".csv", ".nc", ".pdf"))]
+        ).encode()
+        self.token = secrets.token_urlsafe(24)
+        try:
+            super().__init__((HOST, port), Handler)
+        except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise
+            why = "is in use" if error.errno == errno.EADDRINUSE else "is not for everybody"
+            raise OSError(f"--port: {port} {why}; give another one, or none for one that is free") from None
+        self.hosts = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
+        self.address = f"http://{HOST}:{self.server_port}/{self.token}/"
+
+    def server_bind(self) -> None:
+        """Bind without asking who one is by name, which may ask a network."""
+        self.socket.bind(self.server_address)
+        self.server_address = self.socket.getsockname()
+        self.server_name, self.server_port = HOST, int(self.server_address[1])
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Keep quiet about a browser that went away in the middle of a file; it reloads, or has seen enough."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
+class Handler(BaseHTTPRequestHandler):
+    """Answers a request."""
+
+    server: Server
+    server_version, sys_version = "springtune", ""
+
+    def do_GET(self) -> None:
+        """Send the page, or one of the files that are served."""
+        if self.headers.get("Host") not in self.server.hosts:
+            self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
+            return
+        token, slash, name = unquote(urlsplit(self.path).path).removeprefix("/").partition("/")
+        if not slash or not secrets.compare_digest(token.encode(), self.server.token.encode()):
+            self._refuse(HTTPStatus.NOT_FOUND)
+        elif name in ("", "index.html"):
+            self._send(self.server.text, "text/html; charset=utf-8")
+        elif name in self.server.served:  # names known from the beginning: no path is put together from a request
+            try:
+                content = self.server.served[name].read_bytes()
+            except OSError:
+                self._refuse(HTTPStatus.NOT_FOUND)
+                return
+            kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+            self._send(content, f"{kind}; charset=utf-8" if kind.startswith("text/") else kind)
+        else:
+            self._refuse(HTTPStatus.NOT_FOUND)
+
+    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
+        self.send_response(status)
+        for name, value in {
+            "Content-Type": kind,
+            "Content-Length": str(len(content)),
+            "Cache-Control": "no-store",
+            "Content-Security-Policy": POLICY,
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Referrer-Policy": "no-referrer",
+            "X-Content-Type-Options": "nosniff",
+        }.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(content)
+
+    def _refuse(self, status: HTTPStatus) -> None:
+        self._send(f"{status.value} {status.phrase}\n".encode(), "text/plain; charset=utf-8", status)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Keep quiet: the address holds the token."""
+
+
+def _served(dataset: Path) -> dict[str, Path]:
+    """Files by the names under which they are served."""
+    found = {"dataset.nc": dataset}
+    for folder, endings in SERVED.items():
+        for path in sorted((dataset.parent / folder).glob("*")):
+            if path.suffix in endings and _is_own(path):
+                found[f"{folder}/{path.name}"] = path
+    for name in ALONE:
+        if _is_own(dataset.parent / name):
+            found[name] = dataset.parent / name
+    return found
+
+
+def _is_own(path: Path) -> bool:
+    """Whether it is a file, and no link to one elsewhere."""
+    return path.is_file() and not path.is_symlink()

@@ -1,0 +1,347 @@
+"""The dataset of a study: dense labelled arrays, their units, and what is missing and why."""
+
+import os
+import shutil
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.parameters import SWEPT
+from springtune.problem.status import Status
+from springtune.safe_io.atomic import replacing
+
+STATUS = tuple(map(str, Status))
+"""Meanings of the flags of `status`; a flag's value is its place here."""
+
+Label = str | float
+"""Of a cell along a dimension: a text, or a number such as a mesh size [m]."""
+
+DIMENSIONS: dict[str, str | tuple[str, str]] = {
+    "beam": "beam, length x height in mm",
+    "mesh_type": "mesh type",
+    "mesh_size": ("asked length of an edge", "m"),
+    "material": "material",
+    "load": "load",
+    "definition": "definition of the spring stiffness",
+    "kinematics": "kinematics of the network",
+    **SWEPT,
+}
+"""Dimensions that groups share: what they are, and their unit if they have one."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of a dataset: its variables over dimensions.
+
+    Attributes
+    ----------
+    name : str
+        Path in the file, ``"/"`` for the root.
+    variables : dict of str to tuple
+        By name: dimensions, units, long name, and what a cell without a value holds.
+    dimensions : dict of str to str or tuple
+        Of dimensions that other groups do not have: what they are, and their unit if they have one.
+    flags : dict of str to tuple
+        Meanings of flags by the last word of a variable's name, besides those of ``status``.
+    further : dict of str to dict
+        Attributes of variables besides units and long name, by name.
+    """
+
+    name: str
+    variables: dict[str, tuple[tuple[str, ...], str, str, float | str | np.number[Any]]]
+    dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    further: dict[str, dict[str, object]] = field(default_factory=dict)
+
+    def empty(self, axes: Mapping[str, Sequence[Label]], names: Collection[str] | None = None) -> xr.Dataset:
+        """Dataset whose cells hold nothing yet.
+
+        Parameters
+        ----------
+        axes : dict of str to tuple
+            Labels of each dimension.
+        names : collection of str, optional
+            Variables to make; all of them without.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
+        chosen = {name: row for name, row in self.variables.items() if names is None or name in names}
+        data, used = {}, set()
+        for name, (dimensions, units, long_name, nothing) in chosen.items():
+            shape = [len(axes[dimension]) for dimension in dimensions]
+            meanings = ({"status": STATUS} | self.flags).get(name.rpartition("_")[2])
+            dtype = "int8" if meanings else object if isinstance(nothing, str) else None
+            values = np.full(shape, nothing, dtype=dtype)
+            attributes: dict[str, object] = {"long_name": long_name, "units": units}
+            if meanings:
+                flags = np.arange(len(meanings), dtype="int8")
+                attributes |= {"flag_values": flags, "flag_meanings": " ".join(meanings)}
+            # As it is: looking for dates among millions of texts costs more than the texts.
+            data[name] = xr.Variable(dimensions, values, attributes | self.further.get(name, {}), fastpath=True)
+            used |= set(dimensions)
+        described = DIMENSIONS | self.dimensions
+        coordinates = {}
+        for dimension in (name for name in described if name in used):
+            words = described[dimension]
+            long_name, units = words if isinstance(words, tuple) else (words, "1")
+            values = np.array(axes[dimension])
+            if values.dtype.kind == "U":
+                values = values.astype(object)
+            coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
+        return xr.Dataset(data, coordinates)
+
+    def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
+        """Group whose variables have further dimensions.
+
+        Parameters
+        ----------
+        further : dict of str to sequence of str
+            Dimensions that a variable gets, by its name: after those that groups share, before its own.
+        without : collection of str
+            Variables that are left out.
+
+        Returns
+        -------
+        Group
+        """
+        variables = {}
+        for name, (dimensions, units, long_name, nothing) in self.variables.items():
+            shared = [one for one in dimensions if one in DIMENSIONS]
+            own = [one for one in dimensions if one not in DIMENSIONS]
+            if name not in without:
+                variables[name] = (*shared, *further.get(name, ()), *own), units, long_name, nothing
+        return replace(self, variables=variables)
+
+
+class Filler:
+    """Writes single cells of a dataset by label.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        That is written into.
+    """
+
+    def __init__(self, data: xr.Dataset) -> None:
+        self.data = data
+        # Looking an array up costs more than writing a cell of it.
+        self._arrays = {name: ([str(one) for one in array.dims], array.values) for name, array in data.items()}
+        self._places = {
+            str(name): {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords
+        }
+        self._texts: dict[object, object] = {}
+
+    def put(self, values: Mapping[str, object], **labels: Label) -> None:
+        """Write values of variables by name into the cells of these labels."""
+        for name, value in values.items():
+            dimensions, array = self._arrays[name]
+            array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
+
+    def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
+        """Write values of many cells, as `put` does those of one, a variable at a time.
+
+        Parameters
+        ----------
+        values : sequence of dict
+            Of each cell, by the names of variables; not all cells need have all of them.
+        labels : sequence of dict
+            Of each cell, each with the same dimensions.
+        """
+        places = {
+            dimension: np.array([known[one[dimension]] for one in labels])
+            for dimension, known in self._places.items()
+            if labels and dimension in labels[0]
+        }
+        for name in dict.fromkeys(name for one in values for name in one):
+            dimensions, array = self._arrays[name]
+            cells = [number for number, one in enumerate(values) if name in one]
+            found: list[Any] = [values[number][name] for number in cells]
+            if array.dtype == object:  # texts that are alike are one text
+                found = [self._texts.setdefault(one, one) for one in found]
+            place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
+            array[place] = np.array(found, dtype=array.dtype)
+
+    def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
+        """Write rows, or tables, that may be shorter than the dimensions after those of the labels."""
+        for name, row in values.items():
+            dimensions, array = self._arrays[name]
+            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
+            array[place][tuple(map(slice, np.shape(row)))] = row
+
+
+def most_requested(root: xr.Dataset, dimension: str) -> str:
+    """Label of a dimension that most scenes of a dataset's root are of."""
+    requested = root.status != 0
+    counts = requested.sum([name for name in requested.dims if name != dimension])
+    return str(counts[dimension].values[int(counts.values.argmax())])
+
+
+NO_NODE = np.int32(-1)
+"""Of UGRID's connectivities, where a mesh has fewer springs or cells than another one, or a cell fewer corners."""
+
+UGRID: dict[str, dict[str, object]] = {
+    "mesh": {
+        "cf_role": "mesh_topology",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "x y",
+        "edge_node_connectivity": "spring_nodes",
+        "face_node_connectivity": "cell_nodes",
+        "node_dimension": "particle",
+        "edge_dimension": "spring",
+        "face_dimension": "cell",
+    },
+    "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
+    "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
+}
+"""Attributes of unstructured meshes by the conventions UGRID-1.0, see `Group.further`."""
+
+OF_PARTICLES: dict[str, object] = {"mesh": "mesh", "location": "node"}
+OF_SPRINGS: dict[str, object] = {"mesh": "mesh", "location": "edge"}
+"""Attributes of what such a mesh has of each particle, or of each spring."""
+
+CHUNK = 2**18
+"""Bytes of a chunk of a compressed array [B], at most: what reading one cell of it reads."""
+
+UNCOMPRESSED = 2**13
+"""Bytes up to which an array is stored as it is [B]: compression would save less than it costs to look up."""
+
+
+MOSTLY = 0.75
+"""Share of the cells of a large array of texts from which on those without a text take no room."""
+
+TEXTS = 128
+"""Cells of a chunk of such an array: few, so that few have a text in some cells only."""
+
+
+def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
+    """Write a dataset; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    groups : dict of str to xarray.Dataset
+        Dataset of each group, ``"/"`` for the root.
+    attributes : dict of str to str
+        Attributes of the root.
+
+    Raises
+    ------
+    OSError
+        If there is no room for it, or no permission; nothing is left of it then, and a file of before stays.
+    """
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = dict(attributes)
+    # What groups share with the root is written there alone.
+    own = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    runs = {group: _runs(data) for group, data in own.items()}
+    for group, data in own.items():
+        own[group] = data.drop_vars([name for names in runs[group][1:] for name in names])
+    first = xr.DataTree.from_dict(own)
+    encoding = {group: {name: _encoding(data, name) for name in data.variables} for group, data in own.items()}
+    path = Path(path)
+    try:
+        with replacing(path, synced=True) as unfinished, _small_cache():
+            first.to_netcdf(unfinished, engine="netcdf4", encoding=encoding)
+            for group, (_, *others) in runs.items():
+                for names in others:
+                    _append(unfinished, group, tree[group].to_dataset(), names)
+    except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
+        free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
+        reason = getattr(error, "strerror", None) or error
+        raise OSError(
+            f"{path}: cannot be written ({reason}; {free:.0f} MB are free there); make room, or see to permissions and "
+            "limits, and run the study again: what is solved is stored, and only this file is made anew"
+        ) from None
+
+
+@contextmanager
+def _small_cache() -> Iterator[None]:
+    """Context in which netCDF's library keeps four chunks of each variable, not 64 MB: each is written once."""
+    import netCDF4
+
+    before = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(4 * CHUNK)
+    try:
+        yield
+    finally:
+        netCDF4.set_chunk_cache(*before)
+
+
+def _runs(data: xr.Dataset) -> list[list[Hashable]]:
+    """Variables of a group in order, by what writes them: those up to the first texts that are mostly holes, ..."""
+    runs: list[list[Hashable]] = [[]]
+    apart = False
+    for name, array in data.data_vars.items():
+        before, apart = apart, _mostly_holes(array)
+        if apart or before:
+            runs.append([])
+        runs[-1].append(name)
+    return runs
+
+
+def _mostly_holes(array: xr.DataArray) -> bool:
+    """Whether an array holds texts in few of many cells."""
+    if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
+        return False
+    return float(np.mean(array.values == "")) > MOSTLY
+
+
+def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: Sequence[Hashable]) -> None:
+    """Write further variables into a group of a file: texts that are mostly holes, or what stands between such."""
+    if not _mostly_holes(data[names[0]]):
+        between = xr.Dataset({name: data.variables[name] for name in names})
+        encoding = {name: _encoding(data, name) for name in names}
+        between.to_netcdf(path, mode="a", group=group, engine="netcdf4", encoding=encoding)
+        return
+    # Not netCDF's own library: HDF5 would then have to write into a file to read texts that were never stored.
+    import h5netcdf
+    import h5py
+
+    (name,) = names
+    array = data[name]
+    chunk = _block(array.shape)
+    with h5netcdf.File(path, "a") as file:
+        at = f"{group.rstrip('/')}/{name}"
+        variable = file.create_variable(at, array.dims, h5py.string_dtype(), chunks=chunk)
+        variable.attrs.update(array.attrs)
+        # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
+        for place in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
+            cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(place, chunk))
+            variable[cells] = array.values[cells]
+
+
+def _block(shape: Sequence[int]) -> tuple[int, ...]:
+    """Shape of a chunk of texts: about as long in all dimensions, since grids differ in any of them."""
+    block = [1] * len(shape)
+    while np.prod(block) < TEXTS and block != list(shape):
+        _, number = min((block[n], -n) for n, length in enumerate(shape) if block[n] < length)
+        block[-number] = min(2 * block[-number], shape[-number])
+    return tuple(block)
+
+
+def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
+    """How a variable is stored."""
+    array = data[name]
+    # CF: coordinates have no holes, and so no value that stands for one.
+    found: dict[str, object] = {"_FillValue": None} if name in data.coords else {}
+    if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
+        found = {"_FillValue": NO_NODE}
+    if array.dtype == object or array.nbytes <= UNCOMPRESSED:
+        return found
+    return found | {"zlib": True, "complevel": 4, "chunksizes": _chunk(array.shape, array.dtype.itemsize)}
+
+
+def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
+    """Shape of a chunk: whole last dimensions, and of those before as much as there is room for."""
+    chunk, room = [], CHUNK // itemsize
+    for length in reversed(shape):
+        chunk.append(max(1, min(length, room)))
+        room //= chunk[-1]
+    return tuple(reversed(chunk))

@@ -1,0 +1,648 @@
+"""A dataset in other forms: a long table of one group, or the whole tree for a store of chunks."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.quantities import nearest
+from springtune.safe_io.atomic import UNFINISHED, check_folder, replacing, write_bytes, write_text, writer
+from springtune.units import QUANTITY_KINDS, UnitError, parse
+
+from . import reading
+from .selection import at, shown_swept
+from .text import label_text
+
+EXTRA = "install what is missing with `pip install springtune[export]`"
+
+
+class RequestError(ValueError):
+    """What is asked for is not in the dataset, or of no format: the request is wrong, not the dataset."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a long table.
+
+    Attributes
+    ----------
+    name : str
+        Of the variable or dimension.
+    units : str
+        ``"1"`` where it has none.
+    long_name : str
+    values : ndarray, shape (n_rows,)
+    """
+
+    name: str
+    units: str
+    long_name: str
+    values: np.ndarray
+
+    @property
+    def title(self) -> str:
+        """Name with its unit, where it has one."""
+        return self.name if self.units in ("", "1") else f"{self.name} [{self.units}]"
+
+
+def table(
+    tree: xr.DataTree,
+    group: str = "/",
+    variables: Sequence[str] = (),
+    selection: Mapping[str, Sequence[str]] | None = None,
+) -> list[Column]:
+    """Long table of a group: one row a cell that was asked for, one column a dimension or variable.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+    group : str, optional
+        Its name; the root without.
+    variables : sequence of str, optional
+        Names of variables; without, all whose dimensions the cells have.
+    selection : mapping of str to sequence of str, optional
+        Labels to keep by dimension, numbers in SI units or with a unit.
+
+    Returns
+    -------
+    list of Column
+        Dimensions first, then the coordinates that the cells have besides, such as the parameters of samples, then
+        variables; flags as words. Cells are those of `status`, where there is one, and rows those that are requested;
+        elsewhere the cells of the variables chosen, and rows those that have a value.
+
+    Raises
+    ------
+    ValueError
+        If there is no such group, variable, dimension or label; the message says what there is.
+
+    Examples
+    --------
+    >>> columns = table(tree, "/", ["deformation_error"], {"beam": ["200x40"], "mesh_size": ["0.005"]})
+    >>> [column.title for column in columns][:4]
+    ['beam', 'mesh_type', 'mesh_size', 'material']
+    >>> len(columns[0].values)
+    48
+    >>> table(tree, "curves")
+    Traceback (most recent call last):
+    springtune.studies.output.export.RequestError: group 'curves': there is none; known: /, benchmark, block, ...
+    """
+    data = _group(tree, group)
+    if not data.data_vars:
+        raise RequestError(f"group '{group}': it has no variables; give one of {', '.join(tree.children)}")
+    data = _selected(data, selection or {})
+    for name in variables:
+        if name not in data.variables or name in data.dims:
+            known = nearest(name, sorted(str(known) for known in data.variables if known not in data.dims))
+            raise RequestError(f"variable '{name}': group '{group}' has none of that name; {known}")
+    status = data.get("status")
+    if variables:
+        chosen = [data[name] for name in variables]
+        dimensions = _ordered(data, {str(name) for array in chosen for name in array.dims})
+    else:
+        widest = status if status is not None else max(data.data_vars.values(), key=lambda array: array.ndim)
+        dimensions = _ordered(data, set(map(str, widest.dims)))
+        chosen = [array for array in data.data_vars.values() if set(array.dims) <= set(dimensions)]
+    places = np.nonzero(_asked(data, status, chosen, dimensions)) if dimensions else ()
+    columns = []
+    for name, place in zip(dimensions, places):
+        labels = data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[name]))
+        columns.append(_column(name, labels, labels.values[place]))
+    rows = dict(zip(dimensions, places))
+    named = {array.name for array in chosen} | set(data.dims)
+    besides = [array for name, array in data.coords.items() if name not in named and set(array.dims) <= set(dimensions)]
+    for array in (*besides, *chosen):
+        values = array.values[tuple(rows[str(name)] for name in array.dims)]
+        columns.append(_column(str(array.name), array, np.broadcast_to(values, len(places[0]) if places else 1)))
+    return columns
+
+
+def _group(tree: xr.DataTree, name: str) -> xr.Dataset:
+    names = {"/": tree} | {node.path[1:]: node for node in tree.subtree if node.path != "/"}
+    wanted = name.strip("/") or "/"
+    if wanted not in names:
+        raise RequestError(f"group '{name}': there is none; {nearest(wanted, ['/', *sorted(set(names) - {'/'})])}")
+    return names[wanted].to_dataset()
+
+
+def _selected(data: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> xr.Dataset:
+    for name, labels in selection.items():
+        if name not in data.dims:
+            raise RequestError(f"--select {name}: no dimension of that name; {nearest(name, map(str, data.dims))}")
+        coordinate = data[name]
+        data = data.isel({name: [_place(name, coordinate, label) for label in labels]})
+    return data
+
+
+def _place(name: str, coordinate: xr.DataArray, label: str) -> int:
+    """Place of a label along its dimension."""
+    known = coordinate.values
+    if known.dtype.kind in "OU":
+        found = np.flatnonzero(known.astype(str) == label)
+        listed = nearest(label, map(str, known))
+    else:
+        found = np.flatnonzero(np.isclose(known, _number(name, coordinate, label), rtol=1e-9, atol=0.0))
+        unit = coordinate.attrs.get("units", "1")
+        listed = f"known: {', '.join(f'{value:g}' for value in known)}" + ("" if unit == "1" else f" {unit}")
+    if not len(found):
+        raise RequestError(f"--select {name}={label}: no such label; {listed}")
+    return int(found[0])
+
+
+def _number(name: str, coordinate: xr.DataArray, label: str) -> float:
+    """Number of a label that may carry a unit."""
+    try:
+        return float(label)
+    except ValueError:
+        pass
+    kinds = [kind.name for kind in QUANTITY_KINDS.values() if kind.unit == coordinate.attrs.get("units")]
+    try:
+        return parse(label, kinds[0]) if kinds else float("nan")
+    except UnitError as error:
+        raise RequestError(f"--select {name}: {error}") from None
+
+
+def _ordered(data: xr.Dataset, names: set[str]) -> list[str]:
+    """Dimensions in the order of the array that has most of them."""
+    arrays = sorted(data.data_vars.values(), key=lambda array: -len(names & set(array.dims)))
+    found = dict.fromkeys(str(name) for array in arrays for name in array.dims if name in names)
+    return list(found)
+
+
+def _asked(
+    data: xr.Dataset, status: xr.DataArray | None, chosen: Sequence[xr.DataArray], dimensions: Sequence[str]
+) -> np.ndarray:
+    """Whether each cell has a row, shape of the dimensions."""
+    shape = [data.sizes[name] for name in dimensions]
+
+    def spread(array: xr.DataArray) -> np.ndarray:
+        kept = array.transpose(*(name for name in dimensions if name in array.dims))
+        places = tuple(slice(None) if name in array.dims else np.newaxis for name in dimensions)
+        return np.broadcast_to(kept.values[places], shape)
+
+    if status is not None and set(status.dims) == set(dimensions):
+        return spread(status) != 0
+    # A number of all cells of a mesh, say, is no reason for a row: those with most dimensions are.
+    most = max((array.ndim for array in chosen), default=0)
+    asked = np.zeros(shape, dtype=bool)
+    for array in (one for one in chosen if one.ndim == most):
+        values = spread(array)
+        asked |= values.astype(str) != "" if values.dtype.kind in "OU" else ~np.isnan(values)
+    if status is not None and set(status.dims) <= set(dimensions):
+        asked &= spread(status) != 0
+    return asked
+
+
+def _column(name: str, array: xr.DataArray, values: np.ndarray) -> Column:
+    meanings = array.attrs.get("flag_meanings")
+    if meanings:
+        words = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), meanings.split()))
+        values = np.array([words.get(value, "") for value in values.tolist()], dtype=object)
+    return Column(name, str(array.attrs.get("units", "1")), str(array.attrs.get("long_name", "")), values)
+
+
+# -- files -------------------------------------------------------------------------------------------------------------
+
+
+def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
+    """Write a long table as CSV, units in the names of the columns, numbers with all their digits.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : sequence of Column
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([column.title for column in columns])
+    # NaN is the one number that is not itself.
+    lists = [["" if value != value else value for value in column.values.tolist()] for column in columns]
+    writer.writerows(zip(*lists))
+    write_text(Path(path), text.getvalue())
+
+
+def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[str, object]) -> None:
+    """Write a long table as Parquet, units and long names with its columns and the dataset's attributes with the table.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : sequence of Column
+    attributes : mapping of str to object
+
+    Raises
+    ------
+    ValueError
+        If what writes it is not installed.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet
+    except ImportError:
+        raise ValueError(f"{path}: Parquet needs pyarrow; {EXTRA}") from None
+    arrays = [pa.array(column.values.tolist(), from_pandas=True) for column in columns]
+    fields = [
+        pa.field(column.name, array.type, metadata={"units": column.units, "long_name": column.long_name})
+        for column, array in zip(columns, arrays)
+    ]
+    schema = pa.schema(fields, metadata={str(name): str(value) for name, value in attributes.items()})
+    sink = pa.BufferOutputStream()
+    pyarrow.parquet.write_table(pa.Table.from_arrays(arrays, schema=schema), sink)
+    write_bytes(Path(path), sink.getvalue().to_pybytes())
+
+
+def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
+    """Write a whole dataset as a Zarr store, a folder; it appears whole or not at all, in the place of one of before.
+
+    Parameters
+    ----------
+    path : str or Path
+    tree : xarray.DataTree
+
+    Raises
+    ------
+    ValueError
+        If what writes it is not installed.
+    """
+    try:
+        import zarr  # noqa: F401
+    except ImportError:
+        raise ValueError(f"{path}: Zarr needs zarr; {EXTRA}") from None
+    path = Path(path)
+    unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (writer(), "before"))
+    tree = tree.load()
+    for node in tree.subtree:
+        for variable in node.variables.values():
+            variable.encoding = {}  # HDF5's
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what of Zarr may still change
+            tree.to_zarr(unfinished, zarr_format=2, consolidated=True, mode="w")
+        if path.exists():  # no folder takes the place of another one at once
+            os.replace(path, before)
+        os.replace(unfinished, path)
+    except BaseException:
+        if before.exists() and not path.exists():
+            os.replace(before, path)
+        raise
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        shutil.rmtree(before, ignore_errors=True)
+
+
+EXPORTS = (".csv", ".parquet", ".zarr", ".nc", ".vtu", ".pvd")
+"""Endings of the names of files to export to."""
+
+
+def export(
+    tree: xr.DataTree,
+    path: str | os.PathLike[str],
+    group: str = "/",
+    variables: Sequence[str] = (),
+    selection: Mapping[str, Sequence[str]] | None = None,
+    force: bool = False,
+) -> str:
+    """Write a dataset in the format that the ending of a file says.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+    path : str or Path
+        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh, ``.vtu`` one
+        scene of it for ParaView, and ``.pvd`` a collection of all that are chosen; of shapes those of the group
+        `shape_fields`.
+    group, variables, selection
+        As of `table`; a Zarr store has the whole tree.
+    force : bool, optional
+        Whether what is there may be replaced.
+
+    Returns
+    -------
+    str
+        What was written.
+
+    Raises
+    ------
+    ValueError
+        As of `table`, and if the format is unknown, the file is there, its folder is not, or what writes it is not
+        installed.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in EXPORTS:
+        raise RequestError(f"{path}: '{ending}' is no format to export to; give a file ending in {', '.join(EXPORTS)}")
+    check_folder(path)
+    if path.exists() and not force:
+        raise ValueError(f"{path}: is there already; give another name, or --force to replace it")
+    if ending == ".nc":
+        return _mesh(tree, path, group, variables, selection or {})
+    if ending in (".vtu", ".pvd"):
+        if group.strip("/") not in ("", "fields", NETWORKS_OF_SHAPES) or variables:
+            raise RequestError(
+                f"{path}: ParaView gets the group 'fields', or --group {NETWORKS_OF_SHAPES}; leave --group and "
+                "--variables out"
+            )
+        alone = not group.strip("/") and "fields" not in tree.children and NETWORKS_OF_SHAPES in tree.children
+        if alone or group.strip("/") == NETWORKS_OF_SHAPES:
+            return _shapes_for_paraview(tree, path, selection or {})
+        return _paraview(tree, path, selection or {})
+    if ending == ".zarr":
+        if group.strip("/") or variables or selection:
+            raise RequestError(
+                f"{path}: Zarr takes the whole dataset; leave --group, --variables and --select out, or export a table"
+            )
+        if path.exists() and not any((path / name).exists() for name in (".zgroup", "zarr.json")):
+            raise ValueError(f"{path}: is there and no Zarr store; give another name")
+        write_zarr(path, tree)
+        return f"{path}: the whole dataset, {len(list(tree.subtree))} groups"
+    columns = table(tree, group, variables, selection)
+    if ending == ".csv":
+        write_csv(path, columns)
+    else:
+        attributes: dict[str, object] = {
+            str(name): value for name, value in tree.attrs.items() if isinstance(value, str)
+        }
+        write_parquet(path, columns, attributes | {"springtune_group": "/" + group.strip("/")})
+    return f"{path}: {len(columns[0].values) if columns else 0} rows, {len(columns)} columns of group '{group}'"
+
+
+def _mesh(
+    tree: xr.DataTree, path: Path, group: str, variables: Sequence[str], selection: Mapping[str, Sequence[str]]
+) -> str:
+    """Write one network of the group of fields."""
+    if group.strip("/") != "fields" or variables:
+        raise ValueError(
+            f"{path}: NetCDF takes one network with its fields; give --group fields and such as "
+            "--select beam=200x40,mesh_type=free, or export a table"
+        )
+    fields, labels = _group(tree, group), {}
+    for name, given in selection.items():
+        chosen = _selected(fields, {name: given})[name].values.tolist()
+        if len(chosen) > 1:
+            raise RequestError(f"--select {name}: {len(chosen)} labels; give one, or export a table")
+        labels[name] = chosen[0]
+    found = reading.field(tree, **labels)
+    with replacing(path) as unfinished:
+        found.to_netcdf(unfinished, engine="netcdf4")
+    sizes = found.sizes
+    return f"{path}: {sizes['particle']} particles, {sizes['spring']} springs, {sizes['cell']} cells, as UGRID has them"
+
+
+def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
+    """Write scenes of the group of fields as files for ParaView."""
+    from springtune.handover.paraview import MOST_PIECES
+
+    if "fields" not in tree.children:
+        raise ValueError(reading.without_fields(tree))
+    scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
+    if not scenes:
+        raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")
+    files = _SceneFiles(tree)
+    if path.suffix.lower() == ".vtu":
+        if len(scenes) > 1:
+            several = {name: len({labels[name] for labels in scenes}) for name in scenes[0]}
+            choose = ", ".join(name for name, count in several.items() if count > 1)
+            raise ValueError(
+                f"{path}: {len(scenes)} scenes, and a .vtu file has one; --select one {choose}, or give a name ending "
+                "in .pvd for all of them"
+            )
+        files.write(path, scenes[0])
+        return f"{path}: {files.named(scenes[0])}"
+    if len(scenes) > MOST_PIECES:
+        raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
+    write_scenes(tree, path, scenes)
+    return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
+
+
+def write_scenes(
+    tree: xr.DataTree, path: Path, scenes: Sequence[Mapping[str, str | float]] | None = None
+) -> list[Path]:
+    """Write scenes of the group of fields as a collection for ParaView.
+
+    Parameters
+    ----------
+    tree : xarray.DataTree
+        With the group `fields`.
+    path : Path
+        Ending in ``.pvd``; files of its scenes are in a folder of its name without that.
+    scenes : sequence of dict, optional
+        Labels of each; all that have fields without.
+
+    Returns
+    -------
+    list of Path
+        What was written, the collection first.
+    """
+    from springtune.handover.paraview import pieces_of, series
+
+    files = _SceneFiles(tree)
+    with series(path) as add:
+        for number, labels in enumerate(_scenes_of(tree["fields"].to_dataset()) if scenes is None else scenes):
+            add(float(number), partial(files.write, labels=labels), files.named(labels, "_").replace(" ", ""))
+    return pieces_of(path)
+
+
+MESH = ("beam", "mesh_type", "mesh_size")
+"""Dimensions whose labels make a mesh."""
+
+NUMBERS = {
+    "displacement": "displacement_of_the_load",
+    "reference_displacement": "reference_displacement_of_the_load",
+    "deformation_error": "deformation_error",
+}
+"""Numbers of a scene that go with its fields, and their names there; what is swept goes by its own, but for forces,
+which the springs have, too."""
+
+
+def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
+    """Labels of the scenes that have fields, in the order of a dataset."""
+    order = (*MESH, "material", "load", "definition", "kinematics")
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
+    names = [*(name for name in order if name in solved.dims), *(name for name in solved.dims if name not in order)]
+    solved = solved.transpose(*names)
+    for place in np.argwhere(solved.values):
+        yield {str(name): solved[name].values[one].item() for name, one in zip(names, place)}
+
+
+class _SceneFiles:
+    """Writes scenes of the group of fields: particles and their displacements, springs as lines, cells."""
+
+    def __init__(self, tree: xr.DataTree) -> None:
+        self.tree, root = tree, tree.to_dataset()
+        # Of what a study sweeps, the values whose fields it keeps.
+        swept = shown_swept(tree["fields"].to_dataset(), root)
+        names = [name for name in NUMBERS if name in root]
+        self.numbers = at(root[names], swept)[names].assign(swept).load()
+        self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
+
+    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+        """A scene of some labels in words."""
+        units = {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels}
+        return between.join(label_text(name, label, units[name]) for name, label in labels.items())
+
+    def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
+        """Write the scene of some labels."""
+        from springtune.handover.paraview import write_vtu
+
+        mesh = {name: label for name, label in labels.items() if name in MESH}
+        if mesh != self.mesh:
+            self.mesh, self.network = mesh, reading.field(self.tree, **mesh)
+        found = self.network
+        found = found.sel({name: label for name, label in labels.items() if name not in MESH and name in found.dims})
+        corners = found[reading.CELL_NODES].transpose("cell", ...).values
+        cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
+        for count in (3, 4):
+            cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+
+        def vectors(names: str) -> np.ndarray:
+            return np.stack([found[names.format(axis)].values for axis in "xy"], axis=1)
+
+        of_particles = {"displacement": vectors("displacement_{}")}
+        if "particle_reference_x" in found:
+            expected = vectors("particle_reference_{}")
+            if np.isfinite(expected).all():
+                error = of_particles["displacement"] - expected
+                of_particles |= {"reference_displacement": expected, "error": error}
+        named = {"stiffness": "stiffness", "force": "spring_force"}
+        of_springs = {name: {2: found[stored].values} for name, stored in named.items() if stored in found}
+        numbers = {}
+        for name, array in self.numbers.items():
+            here = array.sel({dim: label for dim, label in labels.items() if dim in array.dims})
+            if here.ndim == 0 and np.isfinite(here):
+                name = "force_of_the_load" if name == "force" else str(name)
+                numbers[NUMBERS.get(name, name)] = float(here)
+        said = {name: self.tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels)
+        units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
+        comment = json.dumps(said | {"units": units}, indent=1)
+        write_vtu(path, vectors("{}"), cells, of_particles, of_springs, numbers, comment)
+
+
+# -- networks of shapes ------------------------------------------------------------------------------------------------
+
+NETWORKS_OF_SHAPES = "shape_fields"
+"""Group of the networks of shapes."""
+
+CASE_LABELS = {"shape": "shape_name", "load": "load_name"}
+"""What may be selected of the cases of networks of shapes, besides definitions, by their variables."""
+
+
+def _shapes_for_paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
+    """Write networks of shapes as files for ParaView."""
+    from springtune.handover.paraview import MOST_PIECES, series
+
+    fields = _group(tree, NETWORKS_OF_SHAPES).load()
+    scenes = _shape_scenes(fields, selection)
+    if not scenes:
+        raise ValueError(
+            f"the group '/{NETWORKS_OF_SHAPES}' has no solved network of such labels; give others to --select"
+        )
+    if path.suffix.lower() == ".vtu":
+        if len(scenes) > 1:
+            several = [name for name in (*CASE_LABELS, "definition") if len({one[name] for one in scenes}) > 1]
+            raise ValueError(
+                f"{path}: {len(scenes)} networks, and a .vtu file has one; --select one {', '.join(several)}, or give "
+                "a name ending in .pvd for all of them"
+            )
+        _write_shape(tree, fields, path, scenes[0])
+        return f"{path}: {', '.join(scenes[0].values())}"
+    if len(scenes) > MOST_PIECES:
+        raise ValueError(f"{path}: {len(scenes)} networks, and at most {MOST_PIECES} are written; --select some")
+    with series(path) as add:
+        for number, labels in enumerate(scenes):
+            add(float(number), partial(_write_shape, tree, fields, labels=labels), "_".join(labels.values()))
+    return f"{path}: {len(scenes)} networks of shapes, in the folder {path.with_suffix('')}"
+
+
+def _shape_scenes(fields: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
+    """Labels of the networks of shapes that are there and selected, in the order of the dataset."""
+    known = {name: fields[stored].values.astype(str).tolist() for name, stored in CASE_LABELS.items()}
+    known["definition"] = fields["definition"].values.astype(str).tolist()
+    for name, wanted in selection.items():
+        if name not in known:
+            raise RequestError(f"--select {name}: networks of shapes are told apart by {', '.join(known)}")
+        for label in wanted:
+            if label not in known[name]:
+                there = nearest(label, dict.fromkeys(known[name]))
+                raise RequestError(f"--select {name}={label}: no such label; {there}")
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull().transpose("case", "definition").values
+    found = [
+        {"shape": known["shape"][case], "load": known["load"][case], "definition": known["definition"][definition]}
+        for case, definition in np.argwhere(solved).tolist()
+    ]
+    return [one for one in found if all(one[name] in wanted for name, wanted in selection.items())]
+
+
+def _write_shape(tree: xr.DataTree, fields: xr.Dataset, path: Path, labels: Mapping[str, str]) -> None:
+    """Write a network of a shape: particles and their displacements, springs as lines, cells."""
+    from springtune.handover.paraview import write_vtu
+
+    chosen = np.logical_and.reduce([fields[stored].values == labels[name] for name, stored in CASE_LABELS.items()])
+    one = fields.isel(case=int(np.argmax(chosen))).sel(definition=labels["definition"])
+    there = np.isfinite(one.x.values)
+    points, moved = (
+        np.stack([one[name.format(axis)].values[there] for axis in "xy"], axis=1).astype(float)
+        for name in ("{}", "displacement_{}")
+    )
+    # What is none was -1, and is NaN as it is read.
+    springs, corners = (
+        one[name].fillna(-1).values.astype(np.int64) for name in (reading.SPRING_NODES, reading.CELL_NODES)
+    )
+    present = springs[:, 0] >= 0
+    cells = {2: springs[present]}
+    for count in (3, 4):
+        cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
+    about = {name: str(one[f"{name}_name"].values) for name in ("material", "kinematics", "mesh_type")}
+    size = float(one.case_mesh_size)
+    numbers, scenes = {"mesh_size": size}, tree["shapes"].to_dataset()
+    here = scenes.sel({**labels, **about}).sel(mesh_size=size, method="nearest")
+    for quantity in here["quantity"].values.tolist():
+        for name in ("value", "reference_value", "error"):
+            number = float(here[name].sel(quantity=quantity)) if name in here else np.nan
+            if np.isfinite(number):
+                numbers[f"{name}_of_{quantity}"] = number
+    said = {name: tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels) | about
+    units = {"points": "m", "displacement": "m", "force": "N", "mesh_size": "m", "value": "SI", "error": "1"}
+    comment = json.dumps(said | {"units": units}, indent=1)
+    forces = {"force": {2: one.spring_force.values[present].astype(float)}}
+    write_vtu(path, points, cells, {"displacement": moved}, forces, numbers, comment)
+
+
+def selected(text: Sequence[str]) -> dict[str, list[str]]:
+    """Labels by dimension, of texts such as ``beam=200x40,load=traction``.
+
+    Parameters
+    ----------
+    text : sequence of str
+        Several labels of a dimension are several pairs.
+
+    Returns
+    -------
+    dict of str to list of str
+
+    Raises
+    ------
+    ValueError
+        If a pair has no ``=``.
+
+    Examples
+    --------
+    >>> selected(["beam=200x40,mesh_size=5 mm", "beam=100x20"])
+    {'beam': ['200x40', '100x20'], 'mesh_size': ['5 mm']}
+    """
+    found: dict[str, list[str]] = {}
+    for pair in (pair.strip() for one in text for pair in one.split(",")):
+        name, equals, label = pair.partition("=")
+        if not (name and equals and label):
+            raise RequestError(f"--select: '{pair}' is no dimension=label; give such as beam=200x40,mesh_size=5 mm")
+        found.setdefault(name.strip(), []).append(label.strip())
+    return found

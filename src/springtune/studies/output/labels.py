@@ -1,0 +1,239 @@
+"""Texts in figures: names at the ends of lines, notes below panels, and words where there is nothing to draw."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.font_manager import FontProperties, findfont, get_font
+
+from .style import POINTS, SMALL, arrange
+
+DARKER = 0.75
+"""Share of the light of a line's colour that its name keeps, to be read on white."""
+
+LINE = 1.22 * SMALL / POINTS
+"""Height of a line of small text [inch]."""
+
+
+@cache
+def width(text: str, size: float = SMALL) -> float:
+    """Width of the longest line of a text in the style's font [inch].
+
+    Parameters
+    ----------
+    text : str
+    size : float
+        [pt]
+
+    Returns
+    -------
+    float
+    """
+    font = get_font(findfont(FontProperties()))
+    font.set_size(size, POINTS)
+    found = 0.0
+    for line in text.split("\n"):
+        font.set_text(line, 0.0)
+        found = max(found, font.get_width_height()[0] / 64 / POINTS)
+    return found
+
+
+POWERS = {0: "", 3: "10³ ", 6: "10⁶ ", 9: "10⁹ "}
+"""How powers of ten are written before a unit."""
+
+
+def power_of_ten(largest: float) -> tuple[float, str]:
+    """What the values of an axis are divided by, and how that is written before their unit: 1e6 and ``"10⁶ "``."""
+    power = max([power for power in POWERS if largest >= 10 * 10.0**power], default=0)
+    return 10.0**power, POWERS[power]
+
+
+def wrapped(text: str, room: float, size: float = SMALL) -> str:
+    """A text in lines that are no wider than a room [inch], cut at spaces."""
+    lines = [""]
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and width(longer, size) > room:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return "\n".join(lines)
+
+
+def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: float) -> np.ndarray:
+    """Places next to those wanted at which no two of some things overlap.
+
+    The sum of the squared moves is the smallest there is for their order (pools of adjacent violators), before all are
+    moved between the ends.
+
+    Parameters
+    ----------
+    wanted : sequence of float
+        Places of their middles.
+    sizes : sequence of float
+        Of each, along the same axis.
+    low, high : float
+        Ends of what there is; where they do not fit they stand out evenly at both.
+
+    Returns
+    -------
+    ndarray of float, in the order given
+    """
+    if not len(wanted):
+        return np.zeros(0)
+    order = np.argsort(wanted, kind="stable")
+    extent = np.asarray(sizes, dtype=float)[order]
+    offsets = np.concatenate([[0.0], np.cumsum(0.5 * (extent[1:] + extent[:-1]))])
+    pools: list[list[float]] = []
+    for value in np.asarray(wanted, dtype=float)[order] - offsets:
+        pools.append([value, 1.0])
+        while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
+            value, count = pools.pop()
+            pools[-1] = [(pools[-1][0] * pools[-1][1] + value * count) / (pools[-1][1] + count), pools[-1][1] + count]
+    level = np.concatenate([np.full(int(count), value) for value, count in pools])
+    first, last = low + 0.5 * extent[0], high - 0.5 * extent[-1] - offsets[-1]
+    level = np.clip(level, first, last) if first <= last else np.full(len(level), 0.5 * (first + last))
+    found = np.empty(len(level))
+    found[order] = level + offsets
+    return found
+
+
+def name_lines(panel: Axes, ends: Iterable[tuple[float, float, str, str]], share: float = 0.6) -> None:
+    """Names of lines to the right of their ends, no two on each other, within the panel, which is widened for them.
+
+    Call it when the panel has its place and its limits.
+
+    Parameters
+    ----------
+    panel : matplotlib.axes.Axes
+    ends : iterable of tuple
+        Of each line where it ends, x and y, its name, and its colour.
+    share : float
+        Largest share of the panel's width for names; longer ones take several lines.
+    """
+    lines = [end for end in ends if np.isfinite(end[0]) and np.isfinite(end[1])]
+    if not lines:
+        return
+    box, dpi = panel.get_window_extent(), panel.figure.dpi
+    room, height = box.width / dpi, box.height / dpi
+    texts = [wrapped(text, share * room - 0.14) for _, _, text, _ in lines]
+    taken = min(max(map(width, texts)) + 0.14, 0.75 * room) / room
+    axis, limits = panel.xaxis.get_transform(), np.array(panel.get_xlim(), dtype=float)
+    low, high = axis.transform(limits)
+    left, right = axis.inverted().transform(np.array([low, low + (high - low) / (1 - taken)]))
+    panel.set_xlim(left, right)
+    ticks = {minor: panel.get_xticks(minor=minor) for minor in (False, True)}
+    for minor, places in ticks.items():  # none below the names
+        panel.set_xticks(places[(places >= limits.min()) & (places <= limits.max())], minor=minor)
+    panel.spines["bottom"].set_bounds(*limits)
+    panel.xaxis.label.set_x(max(0.5 * (1 - taken), 0.5 * width(panel.get_xlabel(), 8) / room - 0.2 / room))
+    panel.get_ylim()  # limits that are not settled yet
+    here = panel.transAxes.inverted().transform(panel.transData.transform([end[:2] for end in lines]))
+    here = np.clip(here, 0, 1)
+    sizes = [LINE * (1 + text.count("\n")) / height for text in texts]
+    places = spread(here[:, 1], sizes, 0.0, 1.0)
+    begin = 1 - taken + 0.1 / room
+    leaders = [[at, (begin - 0.02 / room, place)] for at, place in zip(here, places)]
+    colours = [end[3] for end in lines]
+    panel.add_collection(
+        LineCollection(leaders, colors=colours, linewidths=0.4, transform=panel.transAxes, zorder=1), autolim=False
+    )
+    for text, place, colour in zip(texts, places, colours):
+        dark = tuple(DARKER * np.array(to_rgb(colour)))
+        panel.text(begin, place, text, transform=panel.transAxes, fontsize=SMALL, color=dark, va="center",
+                   linespacing=1.1)  # fmt: skip
+
+
+def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
+    """Names of curves that are one line to the eye: lists, in order.
+
+    Parameters
+    ----------
+    curves : dict of str to ndarray
+        As drawn: logarithms where the axis is logarithmic.
+    within : float
+        Largest difference.
+    """
+    groups: list[list[str]] = []
+    for name, values in curves.items():
+        for group in groups:
+            other = curves[group[0]]
+            if (np.isnan(values) == np.isnan(other)).all() and not (np.abs(values - other) > within).any():
+                group.append(name)
+                break
+        else:
+            groups.append([name])
+    return groups
+
+
+TITLE_LINE = 0.13
+"""Height of a line of a panel's title [inch]."""
+
+
+def room_left(panel: Axes) -> float:
+    """Width that a panel's axis on the left takes with the texts of its ticks and its label [inch].
+
+    Call it when the panel has its limits.
+    """
+    found = 0.04 + (0.16 if panel.get_ylabel() else 0.0)
+    if not panel.yaxis.get_tick_params().get("labelleft", True):
+        return found + 0.06
+    low, high = sorted(panel.get_ylim())
+    texts = []
+    for minor, formatter in ((False, panel.yaxis.get_major_formatter()), (True, panel.yaxis.get_minor_formatter())):
+        places = [place for place in panel.get_yticks(minor=minor) if low <= place <= high]
+        texts += formatter.format_ticks(places)
+    # Powers of ten are set by matplotlib's own mathematics.
+    return found + 0.11 + max((0.28 if "$" in text else width(text) for text in texts), default=0.0)
+
+
+def settle(figure: Figure | SubFigure | None, axes: np.ndarray, place: Mapping[str, Any]) -> None:
+    """Place panels as `springtune.studies.output.style.arrange` does, with room for the texts on their left.
+
+    Parameters
+    ----------
+    figure : Figure, SubFigure or None
+    axes : (nrows, ncols) ndarray of Axes
+    place : dict
+        What `arrange` is told; ``across`` is what there is between columns besides those texts.
+    """
+    left = max(room_left(panel) for panel in axes[:, 0])
+    between = max((room_left(panel) for panel in axes[:, 1:].flat if panel.get_visible()), default=0.0)
+    arrange(figure, axes, **{**place, "left": left, "across": place.get("across", 0.0) + between})
+
+
+def say(panel: Axes, text: str, bare: bool = True) -> None:
+    """Words in the middle of a panel that has nothing to show: what is missing, and why.
+
+    Parameters
+    ----------
+    panel : matplotlib.axes.Axes
+    text : str
+    bare : bool
+        Whether the panel loses the texts of its ticks, which say nothing without anything drawn.
+    """
+    room = panel.get_window_extent().width / panel.figure.dpi
+    panel.text(
+        0.5, 0.5, wrapped(text, 0.9 * room, 8), transform=panel.transAxes, ha="center", va="center", fontsize=8,
+        color="0.25",
+    )  # fmt: skip
+    if bare:
+        panel.tick_params(which="both", length=0, labelbottom=False, labelleft=False)
+        panel.grid(False)
+
+
+def note(panel: Axes, text: str, below: float = 0.38) -> None:
+    """Small text below a panel's label, in lines as `wrapped` makes them; `below` is its distance [inch]."""
+    if text:
+        panel.annotate(text, (0, 0), xycoords="axes fraction", xytext=(0, -POINTS * below), va="top", ha="left",
+                       textcoords="offset points", fontsize=SMALL, color="0.25")  # fmt: skip
+
+
+def lines_of(text: str) -> int:
+    """Number of lines of a text; none of an empty one."""
+    return 1 + text.count("\n") if text else 0

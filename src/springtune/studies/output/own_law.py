@@ -1,0 +1,54 @@
+"""References at finite strain of each material's own law: of one with a uniaxial test Yeoh's, else neo-Hooke's."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..config.model import FINITE_STRAIN_REFERENCE, TESTED_REFERENCE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE)
+"""Labels of references in plane stress of a material's own law: which of them counts first."""
+
+
+def of_own_law(finite: "xr.Dataset") -> "xr.Dataset | None":
+    """A group of references at finite strain, with those in plane stress of each material's own law.
+
+    Parameters
+    ----------
+    finite : xarray.Dataset
+        With ``reference`` among its dimensions, and ``reference_displacement``.
+
+    Returns
+    -------
+    xarray.Dataset or None
+        Without that dimension; None where there is no such reference.
+    """
+    neo_hooke, tested = (
+        finite.sel(reference=kind, drop=True) if kind in finite.reference.values else None
+        for kind in (FINITE_STRAIN_REFERENCE, TESTED_REFERENCE)
+    )
+    if neo_hooke is None or tested is None:
+        return tested if neo_hooke is None else neo_hooke
+    # A material has one of the two; where neither is there, each says why.
+    there = tested.reference_displacement.notnull()
+    if not there.any():
+        return neo_hooke
+    found = neo_hooke.copy()
+    for name, array in tested.items():
+        own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
+        found[name] = array.where(own, neo_hooke[name])
+    return found
+
+
+def own_law(cell: "xr.Dataset", name: str) -> str | None:
+    """Label of the reference in plane stress of one material's own law, by a variable of references; None without.
+
+    Where no such reference is there, though it was asked for, the label is that of one that was.
+    """
+    kinds = [kind for kind in OWN_LAWS if kind in cell.reference.values]
+    there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
+    return next(iter(there or kinds[::-1]), None)

@@ -1,0 +1,98 @@
+"""What a study's outputs show of a dataset: figures in PNG and PDF files, and tables."""
+
+import gc
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+from springtune.registry import imported
+from springtune.safe_io import atomic
+
+from ..config.kind import outputs
+from ..runs import records
+from .reading import lazily
+
+if TYPE_CHECKING:
+    from ..config.kind import Output
+
+MANY_PANELS = 16
+"""Panels of a figure beyond which what it leaves behind is given back before the next one is drawn."""
+
+
+def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
+    """Draw the figures of outputs into ``folder/figures``, and write their tables and other files into their folders.
+
+    Parameters
+    ----------
+    dataset : str or Path
+    folder : str or Path
+    *names : str
+        Keys of `springtune.studies.kinds.outputs`.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+    """
+    made: list[Path] = []
+    figures = Path(folder) / "figures"
+    # Arrays are read when something is shown of them: most are not.
+    with lazily(dataset) as tree:
+        for output in (outputs()[name] for name in names):
+            if output.plot:
+                made += _draw(output, tree, figures)
+            into = Path(folder) / output.into
+            if output.page:
+                from . import page  # here: few jobs write the page
+
+                made += [into / name for name in page.write(tree, into)]
+            elif output.write:
+                made += [into / name for name in imported(output.write).write(tree, into)]
+    return made
+
+
+def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
+    """Make outputs and write the record of it.
+
+    Parameters
+    ----------
+    dataset, folder, *names
+        As of `run`.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
+    """
+    read = records.checksum(dataset)
+    records.write(record, digest, run(dataset, folder, *names), read=read)
+
+
+def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
+    # Here, since what only writes tables does without.
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    from .canvas import png_and_pdf
+
+    for stem, plot, selection in imported(output.plot)(tree):
+        figure = np.ravel(plot(tree, **selection))[0].figure
+        for ending, content in png_and_pdf(figure).items():
+            atomic.write_bytes(folder / f"{stem}.{ending}", content)
+            yield folder / f"{stem}.{ending}"
+        plt.close(figure)
+        panels = len(figure.axes)
+        del figure
+        if panels > MANY_PANELS:
+            gc.collect()
+
+
+if __name__ == "__main__":
+    import os
+
+    os.environ["MPLBACKEND"] = "Agg"
+    # What small figures leave behind is less than looking for it costs; large ones are looked for one by one.
+    gc.disable()
+    main(*sys.argv[1:])

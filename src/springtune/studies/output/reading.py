@@ -1,0 +1,353 @@
+"""Opening the dataset of a study."""
+
+import math
+import os
+import signal
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from springtune.safe_io.inputs import BeyondBound, bounded, check_alone
+
+if TYPE_CHECKING:
+    import h5py
+    import xarray
+
+    from .dataset import Label
+
+SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
+"""Connectivities of `/fields`."""
+
+REMEDY = "give the dataset.nc of a study, or run the study again"
+
+MOST_HELD = 1e9
+"""Bytes that opening a dataset may take, and all that it says it holds, whatever the size of its file."""
+
+DEFLATED = 30.0
+"""How often its size a larger file may hold [1]; datasets of mostly holes are smaller than `MOST_HELD`."""
+
+BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
+"""What the name of an array begins with that is a dimension without labels, and never read."""
+
+OPENED_WITHIN = 4
+"""Seconds of the processor after which a file that is not open yet is taken to be damaged."""
+
+LONGEST_REASON = 200
+"""Most characters of an error that are shown."""
+
+
+def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
+    """Open the dataset of a study.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``results/<study>/dataset.nc``, or its folder.
+
+    Returns
+    -------
+    xarray.DataTree
+        Read from the file when needed; close it, or open it in a ``with`` statement.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is not the dataset of a study.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> with st.open("results/mine") as tree:
+    ...     sorted(tree.children), dict(tree.sizes)
+    (['benchmark', 'block', 'effects', 'fields', 'laying', 'moduli', 'refinement', 'samples', 'sensitivity',
+    'shape_fields', 'shapes', 'sobol', 'stability'], {'beam': 2, 'mesh_type': 2, 'mesh_size': 3, 'material': 2,
+    'load': 3, 'definition': 2, 'kinematics': 2})
+    >>> st.open("results/nothing")
+    Traceback (most recent call last):
+    FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc
+    """
+    path = Path(path)
+    file = path / "dataset.nc" if path.is_dir() else path
+    if not file.is_file():
+        raise FileNotFoundError(
+            f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
+        )
+    check_links(file)
+    from .lazy import opened
+
+    try:
+        with bounded(MOST_HELD):
+            tree = opened(file, most_of(file))
+    except Exception as error:  # of a damaged file the libraries raise whatever they trip over
+        raise ValueError(f"{file}: cannot be read ({_said(error)}); {REMEDY}") from None
+    if "springtune_version" not in tree.attrs:
+        tree.close()
+        raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
+    return tree
+
+
+@contextmanager
+def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
+    """Context of a dataset of which small arrays are in memory, and of large ones is read what is asked of them.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+    from .lazy import LARGE_ARRAY
+
+    with open(path) as tree:
+        for node in tree.subtree:
+            for array in node.variables.values():
+                if array.nbytes <= LARGE_ARRAY:
+                    array.load()
+        yield tree
+
+
+def check_opens(path: str | os.PathLike[str]) -> None:
+    """Refuse a file on which the library of netCDF ends a process or never comes to an end: a child opens it first.
+
+    Commands can afford to know that; `open` cannot, in a process with threads and data of its user. Nothing is checked
+    where processes cannot be forked.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    ValueError
+    """
+    if not hasattr(os, "fork"):
+        return
+    import resource
+
+    import xarray  # noqa: F401  # once, not in the child and again here
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of numpy's threads, which a child that opens a file does not need
+        child = os.fork()
+    if not child:
+        try:
+            used = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime)
+            resource.setrlimit(resource.RLIMIT_CPU, (used + OPENED_WITHIN, used + OPENED_WITHIN))
+            open(path)
+        finally:
+            os._exit(0)
+    status = os.waitpid(child, 0)[1]
+    if os.WIFSIGNALED(status):
+        name = signal.Signals(os.WTERMSIG(status)).name
+        raise ValueError(f"{path}: is damaged (the library of netCDF ends by {name} on it); {REMEDY}")
+
+
+def check_links(path: Path) -> None:
+    """Refuse a file on which the library of netCDF would end this process, or never end, or look into other files.
+
+    So it does on some whose head is damaged, and where another program has changed the attributes by which arrays and
+    dimensions know each other. HDF5's own library says so in some milliseconds.
+
+    Parameters
+    ----------
+    path : Path
+        A dataset.
+
+    Raises
+    ------
+    ValueError
+        If it is such a file, its data are in another one, or it says that it holds more than it can.
+    """
+    import h5py
+
+    found: list[str] = []
+    held = 0
+
+    def look(name: bytes) -> None:
+        nonlocal held
+        one = h5py.h5o.open(file.id, name)
+        if not isinstance(one, h5py.h5d.DatasetID):
+            return
+        if not h5py.Dataset(one).attrs.get("NAME", b"").startswith(BARE_DIMENSION):
+            held += _held(one)
+        rank = one.rank
+        for attribute, kind, shape in (
+            (b"DIMENSION_LIST", h5py.h5t.VLEN, (rank,)),
+            (b"_Netcdf4Coordinates", h5py.h5t.INTEGER, (rank,)),
+            (b"_Netcdf4Dimid", h5py.h5t.INTEGER, ()),
+            (b"CLASS", h5py.h5t.STRING, ()),
+        ):
+            if h5py.h5a.exists(one, attribute):
+                held_there = h5py.h5a.open(one, attribute)
+                if held_there.get_type().get_class() != kind or held_there.shape != shape:
+                    found.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
+
+    try:
+        with guarded(path), bounded(MOST_HELD):
+            check_alone(path)
+            with h5py.File(path) as file:
+                h5py.h5o.visit(file.id, look)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({_said(error)}); {REMEDY}") from None
+    if found:
+        raise ValueError(
+            f"{path}: is damaged, or changed by another program ({found[0]} is none of netCDF's); {REMEDY}"
+        )
+    if held > most_of(path):
+        said = f"it says that it holds {held / 1e9:.3g} GB in {path.stat().st_size / 1e6:.3g} MB"
+        raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
+
+
+def _held(one: "h5py.h5d.DatasetID") -> int:
+    """Bytes of an array, or of a part of it that is read at once where that is more."""
+    import h5py
+
+    stored = one.get_create_plist()
+    chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
+    return max(math.prod(one.shape), math.prod(chunk)) * int(one.get_type().get_size())
+
+
+def most_of(path: Path) -> float:
+    """Bytes that the content of a file may take in memory."""
+    return max(MOST_HELD, DEFLATED * path.stat().st_size)
+
+
+@contextmanager
+def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Context in which a dataset that is not as springtune writes it is refused, whatever is tripped over.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its file.
+
+    Raises
+    ------
+    ValueError
+        In place of errors that tell of code, not of the file; those for people pass as they are.
+
+    Examples
+    --------
+    >>> with guarded("dataset.nc"):
+    ...     {}["status"]
+    Traceback (most recent call last):
+    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); run the study again
+    """
+    try:
+        yield
+    except (AttributeError, ArithmeticError, LookupError, MemoryError, RuntimeError, TypeError) as error:
+        raise ValueError(
+            f"{path}: is damaged, or not as springtune writes it ({_said(error)}); run the study again"
+        ) from error
+
+
+def _said(error: Exception) -> str:
+    for_people = isinstance(error, OSError | ValueError | BeyondBound)
+    text = str(error) if for_people else f"{type(error).__name__}: {error}"
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST_REASON else f"{text[: LONGEST_REASON - 3]}..."
+
+
+def without_fields(data: "xarray.DataTree") -> str:
+    """Why a dataset has no networks of beams, and the remedy."""
+    said = "the dataset has no group '/fields'"
+    if data.variables:
+        return f"{said}; add 'deformed' or 'paraview' to the outputs of the study, and run it"
+    shown = " 'shape_fields' has those of shapes:" if "shape_fields" in data.children else ""
+    return f"{said}, nor has its study beams;{shown} take a group as it is, one of {', '.join(data.children)}"
+
+
+def field(data: "xarray.DataTree", **labels: "Label") -> "xarray.Dataset":
+    """Network of one beam and mesh type with its whole fields: an unstructured mesh by the conventions UGRID-1.0.
+
+    Parameters
+    ----------
+    data : xarray.DataTree
+        A study's dataset with the group ``/fields``.
+    **labels : str or float
+        Label by dimension: ``beam``, ``mesh_type`` and ``mesh_size`` [m] where there are several; and of ``material``,
+        ``load``, ``definition`` and ``kinematics`` those that shall not stay dimensions. Of what a study sweeps, such
+        as ``force`` [N], fields are of one value for each beam, mesh type, material and load: a coordinate of what is
+        returned; another one is refused.
+
+    Returns
+    -------
+    xarray.Dataset
+        In memory, dimensions ``particle``, ``spring`` and ``cell`` as long as the mesh has of each: positions ``x``,
+        ``y`` [m], ``spring_nodes`` and ``cell_nodes`` (particles from 0, -1 where a cell has fewer corners than
+        others), the network's displacements [m], each spring's ``stiffness`` [N/m] and axial
+        ``spring_force`` [N], and the reference's outline.
+
+    Raises
+    ------
+    ValueError
+        If there are no fields, the labels leave a choice of meshes, or a label is not there.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> network = st.field(tree, beam="200x40", mesh_type="free", mesh_size=5e-3, load="traction")
+    >>> network.spring_nodes.values.tolist(), network.mesh.attrs["edge_node_connectivity"]
+    ([[0, 1], [1, 2], [2, 3]], 'spring_nodes')
+    >>> network.displacement_x.dims
+    ('definition', 'material', 'particle')
+
+    It may be written, and opened by what knows such meshes:
+
+    >>> network.to_netcdf("network.nc")
+    """
+    if not hasattr(data, "children"):
+        raise ValueError(f"data: {type(data).__name__} is no dataset; give what springtune.open returns")
+    if "fields" not in data.children:
+        raise ValueError(without_fields(data))
+    with guarded("the group '/fields'"):
+        return _field(data, labels)
+
+
+def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Dataset":
+    import numpy as np
+
+    from springtune.problem.parameters import SWEPT
+
+    from .selection import OF_FIELDS, choose, group
+
+    fields = group(data, "fields")
+    # Of what is swept, fields are of one value each; the values of the scenes are no coordinates of theirs.
+    swept = [name for name in SWEPT if f"{OF_FIELDS}{name}" in fields]
+    asked = {name: labels.pop(name) for name in swept if name in labels}
+    fields = fields.drop_vars(swept, errors="ignore")
+    if SPRING_NODES not in fields:
+        raise ValueError(
+            f"group '/fields' has no '{SPRING_NODES}': it was made by an older springtune; run the study again"
+        )
+    meshes = ("beam", "mesh_type", "mesh_size")
+    for name, label in labels.items():
+        if name not in fields.dims or name not in fields.coords:
+            known = ", ".join(str(one) for one in fields.dims if one in fields.coords)
+            raise ValueError(f"there is no dimension '{name}' to choose of; known: {known}")
+        if name not in meshes and label not in fields[name].values.tolist():
+            raise ValueError(
+                f"nothing has {name} {label!r}; there is {', '.join(map(repr, fields[name].values.tolist()))}"
+            )
+    chosen = choose(fields.x.notnull().any("particle"), **{name: labels.get(name) for name in meshes})
+    found = fields.sel(labels | chosen).load()
+    for name in swept:
+        kept = found[f"{OF_FIELDS}{name}"]
+        known = np.unique(kept.values[np.isfinite(kept.values)]).tolist()
+        if name in asked and known != [asked[name]]:
+            listed = ", ".join(map(repr, known)) or "none"
+            raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
+        found = found.assign_coords({name: kept}).drop_vars(f"{OF_FIELDS}{name}")
+    for name, dimension in (("x", "particle"), (SPRING_NODES, "spring"), (CELL_NODES, "cell")):
+        there = found[name].notnull().values.reshape(found.sizes[dimension], -1).any(axis=1)
+        found = found.isel({dimension: np.flatnonzero(there)})
+    corners = found[CELL_NODES].notnull().any("cell").values
+    found = found.isel(cell_corner=np.flatnonzero(corners))
+    for name in (SPRING_NODES, CELL_NODES):
+        connectivity = found[name].fillna(-1).astype("int32")
+        connectivity.encoding = {"_FillValue": np.int32(-1), "dtype": "int32"}
+        found[name] = connectivity.assign_attrs(fields[name].attrs)
+    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    return found

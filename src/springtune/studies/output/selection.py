@@ -1,0 +1,239 @@
+"""What of a dataset a figure shows: its group, and the labels that it selects."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.geometry import beam_label
+from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
+
+if TYPE_CHECKING:
+    from .dataset import Label
+
+
+def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.Dataset:
+    """Dataset of a group: ``data`` itself unless it is a tree.
+
+    Parameters
+    ----------
+    data : xarray.DataTree or xarray.Dataset
+    name : str
+        Such as ``"sensitivity"``; ``"/"`` is the root.
+    alone : bool
+        Whether the group is enough for what is plotted.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    ValueError
+        If the tree has no such group, or there is no tree and the group is not enough.
+    """
+    if not isinstance(data, xr.DataTree):
+        if not alone:
+            raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
+        return data
+    if name == "/":
+        if not data.variables:
+            raise ValueError(
+                f"the dataset has no scenes of beams; it has {_listed(f'/{one}' for one in data.children)}"
+            )
+        return data.to_dataset()
+    if name not in data.children:
+        raise ValueError(f"the dataset has no group '/{name}'; it has {_listed(f'/{one}' for one in data.children)}")
+    return data[name].to_dataset()
+
+
+def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
+    """Labels that a figure is of: those given, and those that leave no choice.
+
+    Parameters
+    ----------
+    present : xarray.DataArray of bool
+        Cells that the study has.
+    **selection
+        Label by dimension; None where none is given.
+
+    Returns
+    -------
+    dict
+        Label by dimension, in the order given; dimensions that ``present`` does not have are left out.
+
+    Raises
+    ------
+    ValueError
+        If a label is not there, or if none is given and several are there.
+    """
+    chosen = {name: label for name, label in selection.items() if name in present.dims}
+    labels = {name: present[name].values.tolist() for name in chosen}
+    there = present.values
+    for given in (True, False):
+        for name, label in chosen.items():
+            if (selection[name] is not None) is not given:
+                continue
+            axis = present.dims.index(name)
+            places = np.flatnonzero(there.any(axis=tuple(one for one in range(there.ndim) if one != axis)))
+            found = [labels[name][place] for place in places]
+            if given and label not in found:
+                raise ValueError(f"nothing has {name} {label!r}; there is {_listed(found)}")
+            if not found:
+                raise ValueError("nothing to plot: the dataset has no cell of the selection")
+            if not given and len(found) > 1:
+                raise ValueError(f"choose one {name}: {_listed(found)}")
+            chosen[name] = label if given else found[0]
+            # Of the other labels nothing is left, so that later dimensions are seen under this one.
+            kept = np.arange(there.shape[axis]) == labels[name].index(chosen[name])
+            there = there & np.expand_dims(kept, tuple(one for one in range(there.ndim) if one != axis))
+    return chosen
+
+
+def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray]:
+    """Of what a study sweeps, the last values that each beam, material and load has.
+
+    A figure that shows no sweep shows these: the largest force, under it the largest thickness, and so on.
+
+    Parameters
+    ----------
+    present : xarray.DataArray of bool
+        Cells that the study has.
+    along : str, optional
+        Dimension that is shown: values under which it has most labels are taken before others; where it has one label
+        under each, each label has values of its own.
+
+    Returns
+    -------
+    dict of str to xarray.DataArray
+        Value of each dimension that is swept, over ``beam, material, load`` as far as these are dimensions, and over
+        `along` where its labels have values of their own; nothing where nothing is swept. `at` takes it.
+    """
+    names = [str(name) for name in present.dims if name in SWEPT and name != along]
+    if not names:
+        return {}
+    kept: list[str] = [name for name in ("beam", "material", "load") if name in present.dims]
+    there = present.any([name for name in present.dims if name not in (*kept, *names, along)])
+    if along in there.dims:
+        counts = there.sum(along)
+        together = int(counts.max()) == 1 and int((there.any(names).sum(along)).max()) > 1
+        kept += [along] if together else []
+        there = there if together else (counts > 0) & (counts == counts.max(names))
+    there = there.transpose(*kept, *names)
+    # What is shown rather than others comes last.
+    ranks = {name: [shown_order(name, value) for value in there[name].values.tolist()] for name in names}
+    there = there.isel({name: np.argsort(rank, kind="stable") for name, rank in ranks.items()})
+    shape = there.shape[len(kept) :]
+    flat = there.values.reshape(*there.shape[: len(kept)], -1)
+    places = np.unravel_index(flat.shape[-1] - 1 - flat[..., ::-1].argmax(axis=-1), shape)
+    coordinates = {name: there[name].values for name in kept}
+    return {name: xr.DataArray(there[name].values[place], coordinates, kept) for name, place in zip(names, places)}
+
+
+OF_FIELDS = "shown_"
+"""First letters of the variables of the group of fields that say of which values of what is swept the fields are."""
+
+
+def unswept(root: xr.Dataset) -> xr.Dataset:
+    """Root of a dataset without what the study sweeps: each beam, material and load at its last values.
+
+    Parameters
+    ----------
+    root : xarray.Dataset
+
+    Returns
+    -------
+    xarray.Dataset
+        As of a study that sweeps nothing; see `last_swept`.
+    """
+    return at(root, last_swept(root.status != 0))
+
+
+def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Of what a study sweeps, the values that its whole fields are of.
+
+    Parameters
+    ----------
+    fields : xarray.Dataset
+        Group of fields.
+    root : xarray.Dataset
+
+    Returns
+    -------
+    dict of str to xarray.DataArray
+        As `last_swept`, over ``beam, mesh_type, material, load`` as far as these are dimensions.
+    """
+    names = [name for name in SWEPT if name in root.dims and f"{OF_FIELDS}{name}" in fields]
+    coordinates = [name for name in root.dims if name in SWEPT]
+    # Nothing is kept of what has no value: any will do.
+    values = {name: fields[f"{OF_FIELDS}{name}"].fillna(root[name].values[0]) for name in names}
+    return {name: value.drop_vars(coordinates, errors="ignore") for name, value in values.items()}
+
+
+def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
+    """Dataset at values of what is swept, each beam, material and load at its own.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    values : dict of str to xarray.DataArray
+        As `last_swept` gives them.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without these dimensions; a force that was one is a variable, as where nothing is swept.
+    """
+    chosen = {name: value for name, value in values.items() if name in data.dims}
+    if not chosen:
+        return data
+    found = data.sel(chosen)
+    own = {
+        name: (("material",) if name.startswith("material") else ("beam",))
+        for name in OF_BODIES.values()
+        if name in found
+    }
+    for name, dimensions in own.items():  # what belongs to a body is the same under all loads, but for what is swept
+        others = [one for one in found[name].dims if one not in dimensions]
+        found[name] = found[name].isel(dict.fromkeys(others, -1), drop=True) if others else found[name]
+    return found.reset_coords([name for name in chosen if name in found.coords])
+
+
+def labels_of(present: xr.DataArray, name: str) -> list[Label]:
+    """Labels of a dimension that have any cell present: list, in the dataset's order."""
+    there = present.any([dimension for dimension in present.dims if dimension != name])
+    return there[name].values[there.values].tolist()
+
+
+def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label]]:
+    """Labels of every cell present over some dimensions: list of dicts, the last name fastest."""
+    there = present.any([dimension for dimension in present.dims if dimension not in names]).transpose(*names)
+    labels = [there[name].values.tolist() for name in names]
+    return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
+
+
+def _listed(labels: Iterable[object]) -> str:
+    return ", ".join(repr(label) for label in labels) or "nothing"
+
+
+def labelled_beam(data: xr.Dataset, name: str) -> str:
+    """A beam's name with what it measures, see `springtune.problem.geometry.beam_label`.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Root of a dataset, or of that beam; the name alone where it does not say how long a beam is.
+    name : str
+
+    Returns
+    -------
+    str
+    """
+    if "beam_length" not in data:
+        return str(name)
+    found = data[["beam_length", "beam_height"]]
+    found = found.sel(beam=name) if "beam" in found.dims else found
+    return beam_label(str(name), float(found.beam_length), float(found.beam_height))

@@ -1,0 +1,361 @@
+"""What became of a study, in a few lines at the end of its run: solved, not solved and why, worst errors, where it is.
+
+`text` is written beside the dataset by the stage `collect`; Snakemake's process reads that and adds what it knows of
+the run (`ending`, `broken`), without xarray.
+"""
+
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from springtune.problem.status import Status
+from springtune.safe_io.escapes import shown
+
+from ..runs import checked_json, rerun
+from ..runs.damage import ASIDE
+from ..runs.plan import Plan
+from ..runs.workload import clock, computed, results_of
+from .own_law import of_own_law
+from .text import aligned, label_text, without_numbers
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..config.model import Study
+
+FILE = "summary.txt"
+"""File beside the dataset."""
+
+NAMED = 3
+"""So many cells are named of those that share a status; more if fewer than two would be left out."""
+
+WORST = 8
+"""So many definitions are told with their worst error."""
+
+HOLES = "Not everything is solved"
+"""Beginning of the last line, where that is so."""
+
+SCENES = "/"
+"""Group of the scenes."""
+
+
+FINITE = "/finite_strain"
+"""Group of references at finite strain, which networks of nonlinear kinematics are compared with."""
+
+
+REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
+"""What a group has whose scenes are compared with references of small strain."""
+
+
+def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
+    """What became of a study's cells.
+
+    Parameters
+    ----------
+    groups : dict of str to xarray.Dataset
+        Groups of its dataset by name.
+    title : str
+        Title of the study.
+
+    Returns
+    -------
+    str
+        Lines: counts, worst errors, and what is not solved by its labels and with its reason.
+    """
+    states = [state for name, data in groups.items() for state in _states(name, data)]
+    rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
+    lines = [title, "", aligned(rows, left=2, right=(1,))]
+    lines += _worst(groups[SCENES], groups.get(FINITE)) if SCENES in groups else ()
+    for name, data in groups.items():
+        if REFERRED <= set(data):
+            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
+    holes = [(what, found, lost) for what, found, lost in states if lost]
+    for what, found, lost in holes:
+        for status, cells in lost.items():
+            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {sum(found.values())}", *_named(cells)]
+    if holes:
+        told = "; ".join(
+            f"{sum(map(len, lost.values()))} of {sum(found.values())} {what}" for what, found, lost in holes
+        )
+        lines += ["", f"{HOLES}: {told}. dataset.nc names each, and why: `status`, `message`."]
+    return "\n".join(lines) + "\n"
+
+
+Cells = list[tuple[str, str]]
+"""Labels and message of each cell."""
+
+
+def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
+    """What each status of a group is of, how many cells have which flag, and those that are not solved."""
+    for variable in data.data_vars.values():
+        label = str(variable.name)
+        message = label.removesuffix("status") + "message"
+        if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
+            continue
+        flags = variable.values
+        found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
+        lost: dict[Status, Cells] = {
+            status: [
+                (_labels(data, variable.dims, place), str(data[message].values[tuple(place)]))
+                for place in np.argwhere(flags == status)
+            ]
+            for status, number in found.items()
+            if number and status != Status.SOLVED
+        }
+        part = label.removesuffix("status").strip("_").replace("_", " ")
+        what = "scenes" if name == SCENES else ", ".join(filter(None, (name.strip("/"), part)))
+        yield what, {status: number for status, number in found.items() if number}, lost
+
+
+def _words(status: Status) -> str:
+    return str(status).replace("_", " ")
+
+
+def _parts(found: Mapping[Status, int]) -> str:
+    return ", ".join(f"{number} {_words(status)}" for status, number in found.items())
+
+
+def _labels(data: "xr.Dataset", dims: Sequence[object], place: Iterable[int]) -> str:
+    """Labels of a cell, as a reader writes them."""
+    return ", ".join(_label(data[dim], number) for dim, number in zip(dims, place))
+
+
+def _label(axis: "xr.DataArray", number: int) -> str:
+    return label_text(str(axis.name), axis.values[number], str(axis.attrs.get("units", "1")))
+
+
+def _named(cells: Cells) -> Iterator[str]:
+    """Some of the cells with their reasons, of each reason one at first, and how many there are besides."""
+    reasons: dict[str, Cells] = {}
+    for cell in cells:
+        reasons.setdefault(without_numbers(cell[1]), []).append(cell)
+    order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
+    told = order if len(order) <= NAMED + 1 else order[:NAMED]
+    for labels, message in told:
+        yield f"  {shown(': '.join(filter(None, (labels, message))))}"
+    if len(told) < len(order):
+        yield f"  and {len(order) - len(told)} more"
+
+
+def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":
+    """Errors of networks of nonlinear kinematics against finite strain, NaN for others; None without a reference."""
+    finite = None if finite is None else of_own_law(finite)
+    if finite is None:
+        return None
+    return finite.deformation_error.where(root.kinematics != "linear").transpose(*root.deformation_error.dims)
+
+
+def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
+    """The largest error of each definition among the scenes that are solved and whose reference applies."""
+    counted, errors = (root.status == Status.SOLVED) & (root.reference_applies == 1), root.deformation_error
+    at_finite_strain = _at_finite_strain(root, finite)
+    if at_finite_strain is not None:  # never a nonlinear network against small strain
+        linear = root.kinematics == "linear"
+        errors = errors.where(linear, at_finite_strain)
+        counted = counted & linear | (root.status == Status.SOLVED) & at_finite_strain.notnull()
+    places = np.argwhere(counted.transpose(*errors.dims).values & np.isfinite(errors.values))
+    values, axis = errors.values[tuple(places.T)], errors.dims.index("definition")
+    found = []
+    for number in np.unique(places[:, axis]).tolist():
+        own = np.flatnonzero(places[:, axis] == number)
+        worst = own[np.argmax(abs(values[own]))]
+        others = [dim for dim in errors.dims if dim != "definition"]
+        where = _labels(root, others, np.delete(places[worst], axis).tolist())
+        found.append((float(values[worst]), _label(root.definition, number), where))
+    found.sort(key=lambda row: -abs(row[0]))
+    if found:
+        number = int(counted.sum())
+        scenes = "the one scene that has one" if number == 1 else f"the {number} scenes that have one"
+        head = "worst deformation error, (network - reference) / |reference|, of each definition"
+        yield from ("", f"{head}, of {scenes}; tension is positive")
+        if at_finite_strain is not None:
+            yield "  nonlinear networks against finite strain, linear ones against small strain"
+        yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
+    if len(found) > WORST:
+        yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
+
+
+def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
+    """References that are missing or do not apply, each with the scenes that have no error of their own for it."""
+    requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
+    for scenes, what in (
+        (requested & ~there, "without a reference, and so without an error"),
+        (
+            root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0),
+            "beyond small strain, so the error is not the network's alone",
+        ),
+    ):
+        if not scenes.any():
+            continue
+        few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
+        few = few.transpose(*root.reference_message.dims)
+        messages = root.reference_message.values
+        cells = [(_labels(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
+        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
+
+
+def ending(study: "Study", plan: Plan, since: float) -> str:
+    """What to say at the end of a run that finished.
+
+    Parameters
+    ----------
+    study : Study
+    plan : Plan
+        Of its stages.
+    since : float
+        When the run began, seconds since the epoch.
+
+    Returns
+    -------
+    str
+        The stored text, what was computed by this run, what it took and where the results are.
+    """
+    new, took = _computed(study, plan, since), clock(time.time() - since)
+    rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
+    aside = [path for path in plan.folder.rglob(f"*{ASIDE}") if path.stat().st_ctime >= since]
+    if aside:
+        rows.insert(1, ["damaged", f"{len(aside)} set aside and made again: {', '.join(map(str, aside[:NAMED]))}"])
+    return f"\n{_stored(study, plan)}\n{aligned(rows, 0)}\n"
+
+
+def broken(study: "Study", plan: Plan, since: float) -> str:
+    """What to say at the end of a run of which a job failed.
+
+    Parameters
+    ----------
+    study, plan, since
+        As of `ending`.
+
+    Returns
+    -------
+    str
+    """
+    _, logs = _undone(plan, since)
+    lines = [f"{study.name} is not complete: a job failed or was stopped."]
+    for path in logs:
+        lines += [f"  {_last(path)}", f"    its log: {path}"]
+    lines += ["What is computed is kept: the same command takes up where this one stopped."]
+    return "\n" + "\n".join(lines) + "\n"
+
+
+def beside(study: "Study", plan: Plan, since: float) -> str:
+    """What to say of a study that was run besides, for the paper.
+
+    Parameters
+    ----------
+    study, plan, since
+        As of `ending`.
+
+    Returns
+    -------
+    str
+        A line on what was computed, and of what is not made the logs.
+    """
+    undone, logs = _undone(plan, since)
+    lines = [f"new in {study.name}: {_computed(study, plan, since)}"]
+    lines += [f"  not complete: {', '.join(undone)}"] if undone else []
+    return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
+
+
+def _last(log: Path) -> str:
+    """What a job said last: why it failed."""
+    said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
+    if said:
+        return said[-1].strip()
+    room = os.statvfs(log.parent)
+    full = room.f_blocks and not room.f_bavail
+    return "it could say nothing: the disk is full; make room" if full else "it said nothing"
+
+
+def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
+    """Bundles that are not done, and logs of jobs that this run began and that made nothing."""
+    folder = plan.folder
+    undone = [name for name in plan.jobs if not plan.record(name).exists()]
+    missing = set(undone)
+    if not (folder / "dataset.nc").exists():
+        missing.add("collect")
+    after = [path.stem for path in sorted((folder / "logs").glob("present_*.log"))] + ["browse", "paper"]
+    # A job after the stages has written its benchmark when it has made all that it is to make.
+    missing |= {name for name in after if _time(folder / "benchmarks" / f"{name}.tsv") < since}
+    logs = [folder / "logs" / f"{name}.log" for name in [*undone, *sorted(missing - set(undone))]]
+    return undone, [path for path in logs if _time(path) >= since]
+
+
+def reminder(folder: Path) -> str:
+    """What to say of a study of which everything is made already.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are.
+
+    Returns
+    -------
+    str
+        Lines; none where there is no summary.
+    """
+    try:
+        lines = (folder / FILE).read_text().splitlines()
+    except OSError:
+        return ""
+    last = [lines[-1], f"{folder / FILE} has the reasons."] if lines[-1].startswith(HOLES) else []
+    return "\n".join([*last, _places(folder)]) + "\n"
+
+
+def _time(path: Path) -> float:
+    """When a file was last changed; minus infinity where there is none."""
+    return path.stat().st_mtime if path.exists() else float("-inf")
+
+
+def _done(record: Path) -> float:
+    """When a job last made something; minus infinity where it did not.
+
+    A file that is made again for another job leaves the time of its own job's record as it was.
+    """
+    made = (checked_json.read(record, products=dict) or {"products": {}})["products"].values()
+    return max([_time(record), *(state[1] / 1e9 for state in made if state)])
+
+
+def _stored(study: "Study", plan: Plan) -> str:
+    """The text beside the dataset, if it is of what the stages made."""
+    path = plan.folder / FILE
+    if not path.exists():
+        return f"{study.title}\n\nThere is no dataset yet.\n"
+    if any(_time(plan.record(name)) > _time(path) for name in plan.jobs):
+        return f"{study.title}\n\nThe dataset is older than these results.\n"
+    return path.read_text()
+
+
+def _computed(study: "Study", plan: Plan, since: float) -> str:
+    """What a run computed, stage by stage, what it made again, and what was there before."""
+    new: dict[str, int] = {}
+    asked: dict[str, int] = {}
+    for name, job in plan.jobs.items():
+        record, stage = plan.record(name), job.stage.name
+        number = computed(record)
+        if number is not None:
+            asked[stage] = asked.get(stage, 0) + len(results_of(job.content))
+            new[stage] = new.get(stage, 0) + (number if _done(record) >= since else 0)
+    told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
+    if told:
+        return ", ".join(told) + ("" if new == asked else "; the others were stored before")
+    ran = {name: job for name, job in rerun.jobs(study, plan).items() if _done(job.record) >= since}
+    if not ran:
+        return "nothing: all results were stored before"
+    files = [path for job in ran.values() for path in (job.record, *map(Path, job.products))]
+    count = sum(_time(path) >= since for path in files)
+    return f"{count} files made again by {', '.join(ran)}; all that is computed was stored before"
+
+
+def _places(folder: Path) -> str:
+    """Results that are there, those first that are looked at first."""
+    files = ("paper.pdf", "index.html", "dataset.nc", "tables/index.html")
+    names = [name for name in files if (folder / name).exists()]
+    names += [f"{name}/" for name in ("figures", "tables", "paraview", "meshes") if (folder / name).is_dir()]
+    if "tables/index.html" in names:
+        names.remove("tables/")
+    return f"{folder}: {', '.join(names)}"

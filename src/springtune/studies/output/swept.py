@@ -1,0 +1,84 @@
+"""Parameters that one study sweeps and another one states once: dimensions of both, so that scenes can be matched."""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from springtune.problem.parameters import STATED, SWEPT, UNCHANGED
+
+from .alignment import SAME_NUMBER
+from .flags import nothing
+
+
+def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
+    """Datasets that have a dimension for each parameter that any of them sweeps.
+
+    Parameters
+    ----------
+    trees : sequence of xarray.DataTree
+
+    Returns
+    -------
+    list of xarray.DataTree
+        The same where nothing is missing; else in memory, each cell at the label that its study states.
+    """
+    made = [*trees]
+    for name in SWEPT:
+        sweeping = [tree for tree in trees if name in tree.dims]
+        if not sweeping:
+            continue
+        # No study need have all groups: what a parameter matters to is asked of all.
+        over = {
+            (node.path, str(variable))
+            for tree in sweeping
+            for node in tree.subtree
+            for variable, array in node.data_vars.items()
+            if name in array.dims
+        }
+        for number, tree in enumerate(made):
+            stated = _stated(tree, name)
+            if name not in tree.dims and stated is not None:
+                made[number] = _swept(tree, name, stated, sweeping[0][name].attrs, over)
+    return made
+
+
+def _stated(tree: xr.DataTree, name: str) -> xr.DataArray | None:
+    """What a study states for a parameter, over what it depends on; None where it does not say."""
+    if name in UNCHANGED:
+        return xr.DataArray(UNCHANGED[name])
+    found = tree.to_dataset().get(STATED[name])
+    return None if found is None else abs(found)
+
+
+def _swept(
+    tree: xr.DataTree,
+    name: str,
+    stated: xr.DataArray,
+    attributes: Mapping[Any, Any],
+    over: Collection[tuple[str, str]],
+) -> xr.DataTree:
+    """A dataset with one more dimension, which the variables `over`, of path and name, have."""
+    known = np.unique(stated.values[np.isfinite(stated.values)])
+    if not len(known):
+        return tree
+    labels = known[np.concatenate([[True], np.diff(known) > SAME_NUMBER * known[1:]])]
+    axis = xr.DataArray(labels, dims=name, name=name, attrs=dict(attributes))
+    here = xr.concat([abs(stated - label) <= SAME_NUMBER * label for label in labels], name).assign_coords({name: axis})
+    groups = {}
+    for node in tree.subtree:
+        data = node.to_dataset()
+        found = data.drop_vars(name, errors="ignore")
+        for variable in found.data_vars:
+            if (node.path, str(variable)) not in over:
+                continue
+            array = found[variable]
+            empty, dtype = nothing([array])
+            mask = here.any([one for one in here.dims if one not in (*array.dims, name)])
+            spread = array.astype(dtype).where(mask, np.array(empty, dtype)).transpose(*array.dims, name)
+            found[variable] = spread.assign_attrs(array.attrs)
+        groups[node.path] = found
+    made = xr.DataTree.from_dict(groups)
+    made.attrs = tree.attrs
+    return made

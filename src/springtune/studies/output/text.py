@@ -1,0 +1,104 @@
+"""Text for a terminal."""
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+from typing import SupportsFloat
+
+from springtune.problem.parameters import SWEPT, with_unit
+from springtune.safe_io.escapes import shown
+
+
+def paragraphs(parts: Iterable[Iterable[str]]) -> str:
+    """Paragraphs of lines with an empty line between, each line one line on the terminal whatever values it has."""
+    return "\n\n".join("\n".join(map(shown, lines)) for lines in parts)
+
+
+def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
+    """Rows in columns, those in `right` flush right."""
+    texts = [[shown(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*texts)]
+    lines = []
+    for row in texts:
+        cells = [
+            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
+        ]
+        lines.append((" " * left + "  ".join(cells)).rstrip())
+    return "\n".join(lines)
+
+
+def bytes_text(number: float) -> str:
+    """So many bytes, as people read them."""
+    for unit in ("B", "kB", "MB"):
+        if number < 1000:
+            return f"{number:.3g} {unit}"
+        number /= 1000
+    return f"{number:.3g} GB"
+
+
+def number_text(number: float, unit: str) -> str:
+    """A number with its unit, lengths in mm.
+
+    Parameters
+    ----------
+    number : float
+    unit : str
+        ``"1"`` where it has none.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
+    ('5 mm', '0.3', '400000 N')
+    """
+    if unit == "m":
+        return f"{1e3 * number:.6g} mm"
+    return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
+
+
+def label_text(dimension: str, label: object, unit: str = "1") -> str:
+    """A label of a dimension as people read it.
+
+    Parameters
+    ----------
+    dimension : str
+    label : str or float
+    unit : str, optional
+        Of a number.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> label_text("mesh_size", 0.005, "m"), label_text("load", "shear"), label_text("friction", 0.2)
+    ('5 mm', 'shear', 'friction 0.2')
+    >>> label_text("mesh_size", 0.0, "m")
+    'size of the file'
+    >>> label_text("force", 12345.6, "N"), label_text("gap", 0.001, "m")
+    ('12.3456 kN', 'gap 1 mm')
+    """
+    if isinstance(label, str) or not isinstance(label, SupportsFloat):
+        return str(label)
+    if dimension in SWEPT:
+        return with_unit(dimension, float(label), digits=6).replace("\u00a0", " ")
+    if dimension == "mesh_size" and not float(label):  # of a shape's own mesh
+        return "size of the file"
+    said = number_text(float(label), unit)
+    return said if dimension == "mesh_size" else f"{dimension.replace('_', ' ')} {said}"
+
+
+def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
+    """Labels of a cell as people read them, by dimension as the units of numbers are."""
+    return ", ".join(label_text(name, label, units.get(name, "1")) for name, label in labels.items())
+
+
+NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
+
+
+def without_numbers(text: str) -> str:
+    """A message by which those are alike that differ in numbers alone."""
+    return NUMBER.sub("#", text)

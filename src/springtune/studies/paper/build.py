@@ -1,0 +1,157 @@
+"""Build a paper: its numbers, tables and figures from datasets, then the PDF, with Typst."""
+
+import os
+import sys
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from springtune.safe_io import atomic
+
+from ..runs import records
+from . import PaperError
+
+if TYPE_CHECKING:
+    from .datasets import Dataset
+
+MAIN = "main.typ"
+
+
+def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str | Path) -> None:
+    """Build a paper.
+
+    The same datasets and source give the same bytes: only fonts that Typst brings along are used, and no date is
+    written.
+
+    Parameters
+    ----------
+    source : str or Path
+        Folder with ``main.typ``, ``numbers.yaml``, ``printed.yaml`` and ``figures.yaml``.
+    folder : str or Path
+        Where numbers and figures go.
+    output : str or Path
+        PDF file to write.
+    *paths : str or Path
+        ``dataset.nc`` files.
+
+    Raises
+    ------
+    PaperError
+        If Typst is not installed, a text has typed numbers, a number is not there, or Typst refuses the source.
+    """
+    source, folder = Path(source), Path(folder)
+    check_typst()
+    _check_texts(source)
+    # Here, so that what is wrong with the source is told at once.
+    from . import figures, numbers
+    from .datasets import read
+
+    declared, printed = numbers.load(source / "numbers.yaml"), numbers.load(source / "printed.yaml")
+    datasets = read(paths)
+    content = {
+        "numbers": numbers.numbers(declared.get("numbers", {}), printed, datasets),
+        "tables": {
+            name: numbers.table(entry, datasets, f"table {name}") for name, entry in declared.get("tables", {}).items()
+        },
+        "figures": figures.draw(
+            numbers.load(source / "figures.yaml"), datasets, folder, source.resolve().parents[1] / "examples"
+        ),
+        "datasets": [one.origin() for one in datasets.values()],
+        "labels": _labels(datasets),
+    }
+    atomic.write_json(folder / "numbers.json", content)
+    atomic.write_bytes(output, typeset(source, folder))
+
+
+def main(source: str, folder: str, output: str, record: str, digest: str, *paths: str) -> None:
+    """Build a paper and write the record of it.
+
+    Parameters
+    ----------
+    source, folder, output, *paths
+        As of `run`.
+    record : str
+        Record to write.
+    digest : str
+        Of what is asked for.
+    """
+    checksums = [records.checksum(path) for path in paths]
+    run(source, folder, output, *paths)
+    records.write(record, digest, [output], read=checksums)
+
+
+def typeset(source: Path, folder: Path) -> bytes:
+    """Set a paper whose numbers and figures are there.
+
+    Parameters
+    ----------
+    source : Path
+        Folder with ``main.typ``.
+    folder : Path
+        Folder with ``numbers.json`` and the figures.
+
+    Returns
+    -------
+    bytes
+        The PDF.
+
+    Raises
+    ------
+    PaperError
+        If Typst refuses the source; the message says where.
+    """
+    import typst
+
+    source, folder = source.resolve(), folder.resolve()
+    root = Path(os.path.commonpath([source, folder]))
+    try:
+        made = typst.compile(
+            source / MAIN, root=root, ignore_system_fonts=True,
+            sys_inputs={"data": "/" + folder.relative_to(root).as_posix()},
+        )  # fmt: skip
+    except typst.TypstError as error:
+        raise PaperError(getattr(error, "diagnostic", "") or str(error)) from None
+    return bytes(made)
+
+
+def check_typst() -> None:
+    """Whether Typst is installed.
+
+    Raises
+    ------
+    PaperError
+        If it is not.
+    """
+    if find_spec("typst") is None:
+        raise PaperError('the paper is set with Typst, which is not installed: pip install "springtune[paper]"')
+
+
+def _check_texts(source: Path) -> None:
+    from .typed import typed_numbers
+
+    if not (source / MAIN).is_file():
+        raise PaperError(f"{source / MAIN}: there is no such file; give the folder of a paper's source")
+    found = [
+        f"{path}:{line}: '{number}' is typed; declare it in numbers.yaml, or printed.yaml, and write #n(\"its name\")"
+        for path in sorted(source.glob("*.typ"))
+        if path.name != "template.typ"
+        for line, number in typed_numbers(path.read_text(encoding="utf-8"))
+    ]
+    if found:
+        raise PaperError("\n".join(found))
+
+
+def _labels(datasets: Mapping[str, "Dataset"]) -> list[str]:
+    """Labels of all dimensions: what the text may call a beam or a definition."""
+    found = {str(label) for one in datasets.values() for name in ("beam", "definition", "mesh_type", "material")
+             if name in one.tree.coords for label in one.tree.coords[name].values}  # fmt: skip
+    return sorted(found)
+
+
+if __name__ == "__main__":
+    os.environ["MPLBACKEND"] = "Agg"
+    try:
+        main(*sys.argv[1:])
+    except PaperError as problem:
+        sys.exit(str(problem))

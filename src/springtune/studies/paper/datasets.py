@@ -1,0 +1,110 @@
+"""The datasets that a paper reads, by the names of their studies."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..output import reading
+from ..runs import provenance
+from . import PaperError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+HASH_SHOWN = 12
+"""Digits of a hash that are shown."""
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A dataset in memory, with where it came from.
+
+    Attributes
+    ----------
+    path : Path
+    tree : xarray.DataTree
+    sha256 : str
+        Hash of the file's bytes: times and seconds in it count, too.
+    """
+
+    path: Path
+    tree: "xr.DataTree"
+    sha256: str
+
+    @property
+    def study(self) -> str:
+        """Name of its study."""
+        return str(self.tree.attrs["study"])
+
+    def origin(self) -> dict[str, object]:
+        """What a statement on reproducibility says of it."""
+        attributes = self.tree.attrs
+        return {
+            "study": self.study,
+            "title": attributes["title"],
+            "version": attributes["springtune_version"],
+            "commit": attributes["git_commit"][:HASH_SHOWN] or "no commit",
+            "changed": attributes["git_commit"].endswith(provenance.CHANGED),
+            "created": attributes["created"][:10],
+            "software": json.loads(attributes["software"]),
+            "sha256": self.sha256[:HASH_SHOWN],
+        }
+
+
+def read(paths: Iterable[str | Path]) -> dict[str, Dataset]:
+    """Read datasets.
+
+    Parameters
+    ----------
+    paths : iterable of str or Path
+        Of ``dataset.nc`` files.
+
+    Returns
+    -------
+    dict of str to Dataset
+        By the names of their studies.
+
+    Raises
+    ------
+    PaperError
+        If one cannot be read.
+    """
+    found: dict[str, Dataset] = {}
+    for path in map(Path, paths):
+        try:
+            with reading.open(path) as tree:
+                one = Dataset(path, tree.load(), hashlib.sha256(path.read_bytes()).hexdigest())
+        except (OSError, ValueError) as error:
+            raise PaperError(str(error)) from None
+        found[one.study] = one
+    return found
+
+
+def chosen(datasets: Mapping[str, Dataset], study: str, what: str) -> Dataset:
+    """Dataset of a study.
+
+    Parameters
+    ----------
+    datasets : mapping of str to Dataset
+    study : str
+    what : str
+        What asks for it, for the message.
+
+    Returns
+    -------
+    Dataset
+
+    Raises
+    ------
+    PaperError
+        If it was not given.
+    """
+    if study not in datasets:
+        raise PaperError(
+            f"{what}: no dataset of the study '{study}' was given; there is {', '.join(datasets) or 'none'}: "
+            f"run config/{study}.yaml and give its results/{study}/dataset.nc"
+        )
+    return datasets[study]

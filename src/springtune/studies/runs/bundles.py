@@ -1,0 +1,282 @@
+"""Which tasks share a job: bundles of about equal cost, by what such tasks have cost on this machine.
+
+One process a scene would be all start-up, so tasks are put together until start-up is a small share of a job. Jobs say
+what their tasks cost (`task_costs`), the stage `collect` adds that up over studies (`remember`), and the
+next bundles are made by it. A bundle once made keeps its tasks as long as the study asks for them: only what is new is
+shared out. On a cluster a job waits in a queue before it starts, and is to last for the minutes that its profile says;
+what it asks the cluster for is in `Needs`.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import ceil, inf
+from pathlib import Path
+from typing import Any
+
+from . import checked_json
+
+Usual = Mapping[str, tuple[float, float]]
+"""Seconds of a task by its name: in any case, and per unit."""
+
+START_UP = 0.25
+"""Seconds of imports of a job before any was measured."""
+
+SPAWNED = 0.25
+"""Seconds of a job's start-up that it does not see: Snakemake's share, the shell's, and those of an interpreter."""
+
+START_SHARE = 0.05
+"""Share of a job that its start-up may take."""
+
+QUEUED = 300.0
+"""Seconds that a job on a cluster may take besides its work: interpreters start twice, from a filesystem that others
+read from, too."""
+
+TIME_MARGIN, MEMORY_MARGIN = 3.0, 1.5
+"""How much more a job asks a cluster for than it is expected to need: nodes may be slower, meshes finer than before."""
+
+MEMORY, LEAST_MEMORY = 2e9, 1e9
+"""Bytes that a job asks for before any was measured, and at least: a core of a cluster has as many, and asking for less
+gains nothing."""
+
+FORGET = 0.5
+"""Share of the memory of before that jobs are still expected to need if they needed less: one small run does not make
+all that follow ask for too little."""
+
+REMEMBERED = 20
+"""A machine's costs follow the last jobs: those before count as at most so many times the work of the last run."""
+
+
+class Costs:
+    """What tasks cost on this machine.
+
+    Parameters
+    ----------
+    path : Path
+        File of `remember`; without it, costs are the usual ones.
+    usual : dict of str to tuple of float
+        Seconds of a task, in any case and per unit, before any was measured, by name; what a machine measures
+        multiplies them.
+
+    Examples
+    --------
+    >>> Costs(Path("no such file"), {"linear": (5e-4, 1e-6)}).of("linear", 1000)
+    0.0015
+    """
+
+    def __init__(self, path: Path, usual: Usual) -> None:
+        self.usual = usual
+        known = checked_json.read(path, kinds=dict) or {}  # as good as new where it is damaged
+        self.ratios = {
+            kind: seconds / expected for kind, (expected, seconds) in known.get("kinds", {}).items() if expected
+        }
+        self.start_up = known.get("start_up", START_UP) + SPAWNED
+        self.memory: dict[str, float] = known.get("memory", {})
+
+    def of(self, kind: str, units: float = 0.0) -> float:
+        """Seconds of a task.
+
+        Parameters
+        ----------
+        kind : str
+            Its name.
+        units : float, optional
+            Its particles, or what else its cost grows with.
+
+        Returns
+        -------
+        float
+            None of a task of no known cost.
+        """
+        return self.ratios.get(kind, 1.0) * _usual(self.usual, kind, 1, units) if kind in self.usual else 0.0
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a job asks a cluster for.
+
+    Attributes
+    ----------
+    seconds : float
+        That it is expected to work.
+    memory : float
+        Bytes that it is expected to need; 0 where nothing like it was measured.
+    most_memory : float
+        Bytes beyond which none of its tasks may go.
+    """
+
+    seconds: float
+    memory: float = 0.0
+    most_memory: float = inf
+
+    def minutes(self, attempt: int) -> int:
+        """Minutes after which the cluster may end the job.
+
+        Parameters
+        ----------
+        attempt : int
+            1 where it is new; each further one doubles them.
+
+        Returns
+        -------
+        int
+
+        Examples
+        --------
+        >>> [Needs(300.0).minutes(attempt) for attempt in (1, 2, 3)]
+        [20, 40, 80]
+        """
+        return ceil((QUEUED + TIME_MARGIN * self.seconds) / 60) * 2 ** (attempt - 1)
+
+    def megabytes(self, attempt: int) -> int:
+        """Memory beyond which the cluster may end the job [MB].
+
+        Parameters
+        ----------
+        attempt : int
+            As of `minutes`; a task that is within the study's limits fits in, however large it is.
+
+        Returns
+        -------
+        int
+
+        Examples
+        --------
+        >>> [Needs(300.0, 1e9, 4e9).megabytes(attempt) for attempt in (1, 2, 3)]
+        [1500, 3000, 5000]
+        """
+        asked = max(LEAST_MEMORY, MEMORY_MARGIN * self.memory if self.memory else MEMORY) * 2 ** (attempt - 1)
+        # What the limits allow comes on top of what a job has before its tasks.
+        return ceil(min(asked, self.most_memory + LEAST_MEMORY) / 1e6)
+
+
+def _usual(usual: Usual, kind: str, count: float, units: float) -> float:
+    always, each = usual[kind]
+    return always * count + each * units
+
+
+def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
+    """Add what the jobs of a run did to what is known of the machine.
+
+    Parameters
+    ----------
+    path : Path
+        Note: sums of usual and of measured seconds by kind, a job's imports, and its largest memory by stage.
+    done : iterable of Path
+        Records of jobs, with a `Spent.summary`; those older than the file at `path` are in it already.
+    usual : dict of str to tuple
+        As of `Costs`.
+    """
+    known = checked_json.read(path, kinds=dict)
+    since = path.stat().st_mtime if known else 0.0
+    known = known or {"kinds": {}}
+    found = [(file.stem, checked_json.read(file)) for file in done if file.stat().st_mtime > since]
+    notes = [note for _, note in found if note]
+    sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+    for note in notes:
+        for kind, (count, units, seconds) in note.get("work", {}).items():
+            if kind in usual:
+                sums[kind][0] += _usual(usual, kind, count, units)
+                sums[kind][1] += seconds
+    for kind, (expected, seconds) in sums.items():
+        before = known["kinds"].get(kind, [0.0, 0.0])
+        fade = min(1.0, REMEMBERED * expected / before[0]) if before[0] else 0.0
+        known["kinds"][kind] = [fade * before[0] + expected, fade * before[1] + seconds]
+    starts = sorted(note["start_up"] for note in notes if note.get("work"))
+    if starts:
+        known["start_up"] = starts[len(starts) // 2]
+        known["memory"] = _memory(known.get("memory", {}), found)
+        checked_json.write(path, known)
+
+
+def _memory(before: Mapping[str, float], found: Iterable[tuple[str, Any]]) -> dict[str, float]:
+    """Largest memory of a job by its stage: by those of a run that computed anything, and of before."""
+    now: dict[str, float] = {}
+    for name, note in found:
+        if note and note.get("work"):
+            stage = name.rpartition("_")[0]
+            now[stage] = max(now.get(stage, 0.0), note.get("memory", 0.0))
+    return {**before, **{stage: max(most, FORGET * before.get(stage, 0.0)) for stage, most in now.items()}}
+
+
+def share_out(
+    costs: Mapping[str, float], cores: int, start_up: float, before: Mapping[str, list[str]], lasting: float = 0.0
+) -> dict[str, list[str]]:
+    """Bundles of about equal cost.
+
+    Parameters
+    ----------
+    costs : dict of str to float
+        Seconds of each task by name.
+    cores : int
+        As many bundles are made at least, unless start-up were most of their work.
+    start_up : float
+        Seconds of a job's start-up.
+    before : dict of str to list of str
+        Bundles made before; what they hold stays there.
+    lasting : float, optional
+        Seconds that a job is to last about; without, as few as keep its start-up a small share of it.
+
+    Returns
+    -------
+    dict of str to list of str
+        Names of the tasks of each bundle by its label.
+
+    Examples
+    --------
+    >>> bundles = share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0}, 2, 0.5, {})
+    >>> bundles
+    {'0': ['fine'], '1': ['middle', 'coarse']}
+    >>> share_out({"coarse": 1.0, "fine": 4.0, "new": 3.0}, 2, 0.5, bundles)
+    {'0': ['fine'], '1': ['coarse', 'new']}
+    """
+    bundles = {label: [name for name in names if name in costs] for label, names in before.items()}
+    bundles = {label: names for label, names in bundles.items() if names}
+    new = sorted(costs.keys() - {name for names in bundles.values() for name in names}, key=lambda n: (-costs[n], n))
+    if not new:
+        return bundles
+    size = lasting or start_up / START_SHARE
+    load = {label: sum(costs[name] for name in names) for label, names in bundles.items()}
+    wanted = _number(sum(costs.values()), size, start_up, cores, len(costs))
+    labels = (str(number) for number in range(len(load) + wanted) if str(number) not in load)
+    while len(load) < wanted:
+        load[next(labels)] = 0.0
+    # What is new goes to the bundles that have least, so that only those run again.
+    count = _number(sum(costs[name] for name in new), size, start_up, cores, len(new))
+    chosen = sorted(load, key=lambda label: (load[label], int(label)))[:count]
+    added = dict.fromkeys(chosen, 0.0)
+    for name in new:
+        least = min(chosen, key=lambda label: (added[label], load[label], int(label)))
+        bundles.setdefault(least, []).append(name)
+        added[least] += costs[name]
+    return {label: bundles[label] for label in sorted(bundles, key=int)}
+
+
+def beside(kept: Mapping[str, list[str]], shared: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """Bundles and others, which get labels that are free.
+
+    Parameters
+    ----------
+    kept, shared : dict of str to list of str
+        Names of the tasks of each bundle by its label.
+
+    Returns
+    -------
+    dict of str to list of str
+
+    Examples
+    --------
+    >>> beside({"1": ["done"]}, {"0": ["coarse"], "1": ["fine"]})
+    {'0': ['coarse'], '1': ['done'], '2': ['fine']}
+    """
+    free = (str(number) for number in range(len(kept) + len(shared)) if str(number) not in kept)
+    found = {**kept, **({next(free): names for names in shared.values()} if kept else shared)}
+    return {label: found[label] for label in sorted(found, key=int)}
+
+
+def _number(seconds: float, size: float, start_up: float, cores: int, most: int) -> int:
+    """Number of bundles for so many seconds of work: as many on each core, if there are more than cores."""
+    count = round(seconds / size)
+    if count > cores:
+        count = cores * ceil(count / cores)
+    return max(1, min(max(count, min(cores, ceil(seconds / (2 * start_up)))), most))

@@ -1,0 +1,402 @@
+"""Which code and which packages a result is computed by, found in the source.
+
+Snakemake does not see edits of an imported package, and taking the whole package as input would solve everything
+again after an edit of a plot. So what a module computes depends on the modules that it imports, directly or not, and on
+the packages that these import. All imports count that can run, those inside of functions and of ``try`` included; what
+type checkers alone read does not. Of a package's ``__init__`` that only imports, the names asked for are followed, not
+all that it has.
+
+What is imported by its name as a text is not seen. Definitions and mesh types are such: they count where they are
+chosen (`definition_closure`, `mesh_type_closure`); so do the modules of outputs, which the rules name.
+"""
+
+import hashlib
+import inspect
+import sys
+import textwrap
+from collections.abc import Iterable
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from springtune.mesh import MESH_TYPES
+from springtune.registry import Declared
+from springtune.springs import DEFINITIONS
+
+from . import checked_json, syntax
+from .syntax import Import, Source, read
+
+PACKAGE = Path(__file__).parents[2]
+
+CARRIED = {
+    ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
+    ("safe_io/inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
+    ("safe_io/processes.py", "psutil"): "it says which processes live",
+    ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
+    ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
+    ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
+    ("mesh/formats.py", "meshio"): "so do the meshes between two stages; where a study's own file is read it counts",
+    ("units.py", "pint"): "what a study says with units is in the parameters as numbers",
+}
+"""Packages that modules use and that no result depends on, and why."""
+
+CODE_FILE = "code.json"
+"""File beside the studies' folders: what was read of the package's source."""
+
+DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
+"""Distributions of packages whose names differ; of those that are not here it is looked up, in a third of a second."""
+
+
+class Closure(NamedTuple):
+    """All that a module runs on.
+
+    Attributes
+    ----------
+    files : tuple of Path
+    packages : tuple of str
+        Names of packages from elsewhere, as they are imported.
+    digest : str
+        Hash of the code, wherever its files are.
+    """
+
+    files: tuple[Path, ...]
+    packages: tuple[str, ...]
+    digest: str
+
+
+class Code:
+    """Files of code, each read once.
+
+    Parameters
+    ----------
+    package : Path, optional
+        Folder of the package whose imports are followed; those of others are its dependencies.
+    """
+
+    def __init__(self, package: Path = PACKAGE) -> None:
+        self.package = package
+        self._known: dict[str, list[Any]] = {}
+        self._sources: dict[Path, Source] = {}
+        self._closures: dict[tuple[Path, frozenset[Path], bool], Closure] = {}
+        self._taken: dict[Path, tuple[set[Path], set[tuple[str, str]]]] = {}
+
+    @property
+    def files(self) -> frozenset[Path]:
+        """Files that closures were made of so far."""
+        return frozenset(self._sources)
+
+    def recall(self, path: Path) -> None:
+        """Take what was read before of files with the same content, which costs as much as half a plan.
+
+        Parameters
+        ----------
+        path : Path
+            Note of `remember`; nothing is taken where there is none, or one of other code.
+        """
+        note = checked_json.read(path, sources=dict)
+        if note is not None and note.get("reader") == READER:
+            self._known = note["sources"]
+
+    def remember(self, path: Path) -> None:
+        """Write down what was read of files of the package, for `recall`.
+
+        Parameters
+        ----------
+        path : Path
+            It stays as it is where it has all that was read.
+        """
+        read_now = {
+            _mark(file.read_bytes()): [source.digest, sorted(source.imports), source.face]
+            for file, source in self._sources.items()
+            if self._has(file)
+        }
+        if not read_now.keys() <= self._known.keys():
+            checked_json.write(path, {"reader": READER, "sources": read_now})
+
+    def closure(self, start: Path, without: frozenset[Path] = frozenset(), carried: bool = True) -> Closure:
+        """A file and all that it imports, directly or not.
+
+        Parameters
+        ----------
+        start : Path
+        without : frozenset of Path, optional
+            Files that are left out, with what they alone import.
+        carried : bool, optional
+            Whether packages of `CARRIED` are left out.
+
+        Returns
+        -------
+        Closure
+        """
+        known = start, without, carried
+        if known not in self._closures:
+            found: set[Path] = set()
+            packages: set[str] = set()
+            waiting = {start}
+            while waiting:
+                path = waiting.pop()
+                found.add(path)
+                if path not in self._taken:
+                    self._taken[path] = self._imported(path, self._source(path).imports)
+                files, taken = self._taken[path]
+                waiting |= files - found - without
+                packages |= {package for place, package in taken if not (carried and (place, package) in CARRIED)}
+            self._closures[known] = self._closed(found, packages)
+        return self._closures[known]
+
+    def union(self, closures: Iterable[Closure]) -> Closure:
+        """Closures as one."""
+        found = list(closures)
+        files = {file for one in found for file in one.files}
+        return self._closed(files, {package for one in found for package in one.packages})
+
+    def of_text(self, text: str) -> Closure:
+        """What a text runs on that is in no file.
+
+        Parameters
+        ----------
+        text : str
+            Python, or a part of it of which nothing but itself is known.
+
+        Returns
+        -------
+        Closure
+        """
+        try:
+            source = read(textwrap.dedent(text), self.package.name)
+        except SyntaxError:
+            source = Source(hashlib.sha256(text.encode()).hexdigest(), frozenset(), None)
+        files, taken = self._imported(Path.cwd() / "text.py", source.imports)
+        found = self.union(map(self.closure, files))
+        return self._closed(set(found.files), {*found.packages, *(package for _, package in taken)}, source.digest)
+
+    def _closed(self, files: set[Path], packages: set[str], text: str = "") -> Closure:
+        digests = sorted(self._source(file).digest for file in files)
+        digest = hashlib.sha256("".join([text, *digests]).encode()).hexdigest()
+        return Closure(tuple(sorted(files)), tuple(sorted(packages)), digest)
+
+    def _source(self, path: Path) -> Source:
+        if path not in self._sources:
+            content, ours = path.read_bytes(), self._has(path)
+            known = self._known.get(_mark(content)) if ours else None
+            if known:
+                digest, imports, face = known
+                names = None if face is None else {name: _import(one) for name, one in face.items()}
+                self._sources[path] = Source(digest, frozenset(map(_import, imports)), names)
+            else:
+                self._sources[path] = read(content, "" if ours else self.package.name)
+        return self._sources[path]
+
+    def _has(self, path: Path) -> bool:
+        return path.is_relative_to(self.package)
+
+    def _imported(self, path: Path, imports: Iterable[Import]) -> tuple[set[Path], set[tuple[str, str]]]:
+        """Files that a file imports, and packages, each with the file as `CARRIED` names it."""
+        files: set[Path] = set()
+        packages: set[tuple[str, str]] = set()
+        where = path.relative_to(self.package).as_posix() if self._has(path) else str(path)
+        for one in imports:
+            for found in self._followed(path, one):
+                if isinstance(found, Path):
+                    files.add(found)
+                elif found not in sys.stdlib_module_names:
+                    packages.add((where, found))
+        return files, packages
+
+    def _followed(self, path: Path, one: Import, faces: frozenset[Path] = frozenset()) -> list[Path | str]:
+        """Files that an import of a file reads through some faces, or the name of a package from elsewhere."""
+        _, module, name = one
+        place = self._place(path, *one[:2])
+        if place is None:
+            return [module.partition(".")[0]]
+        file = _file(place)
+        if not name and place == self.package:
+            return []  # its attributes say what of it
+        if name in ("", "*"):
+            return [file] if file else []
+        face = self._source(file).face if file else {}
+        if file and file not in faces and face is not None and name in face:
+            return self._followed(file, face[name], faces | {file})
+        if file == PACKAGE / "__init__.py" and (lazy := _lazy_names().get(name)):
+            return self._followed(file, (1, lazy, name), faces)
+        below = _file(place / name)
+        # What a face lacks may come from any of its modules.
+        return [found for found in (file if face is None or not below else None, below) if found]
+
+    def _place(self, path: Path, level: int, module: str) -> Path | None:
+        """Where a module is, without an ending; None of a package from elsewhere."""
+        parts = module.split(".") if module else []
+        if level:
+            return path.parents[level - 1].joinpath(*parts)
+        if parts[0] == self.package.name:
+            return self.package.joinpath(*parts[1:])
+        if self._has(path) or parts[0] in sys.stdlib_module_names:
+            return None
+        beside = path.parent / parts[0]
+        root = beside if beside.is_dir() or _file(beside) else _own(parts[0])
+        return root and root.joinpath(*parts[1:])
+
+
+def _import(parts: list[Any]) -> Import:
+    level, module, name = parts
+    return level, module, name
+
+
+def _mark(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+READER = _mark(Path(syntax.__file__).read_bytes())
+"""What reads source: what was read by another one is not taken."""
+
+OURS = Code()
+"""The code of springtune."""
+
+
+def modules(*names: str) -> tuple[str, ...]:
+    """Files that modules run on: their own and all that they import.
+
+    Parameters
+    ----------
+    *names : str
+        Modules, from the package on, such as ``"studies.kinds.collect"``.
+
+    Returns
+    -------
+    tuple of str
+        Paths, sorted.
+
+    Examples
+    --------
+    >>> [Path(file).name for file in modules("studies.runs.hashing")]
+    ['hashing.py']
+    """
+    return tuple(sorted({str(file) for name in names for file in OURS.closure(_module(name)).files}))
+
+
+def stage_closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
+    """What modules run on, without definitions and mesh types that they may choose.
+
+    Parameters
+    ----------
+    *names : str
+        Modules, as `modules` takes them.
+    without : tuple of str, optional
+        Modules that they import for other results than those that are asked about.
+
+    Returns
+    -------
+    Closure
+    """
+    return OURS.union(OURS.closure(_module(name), frozenset(map(_module, without))) for name in names)
+
+
+def definition_closure(name: str, code: Code = OURS) -> Closure:
+    """What a definition runs on: of this package, and from beside its file or elsewhere.
+
+    Parameters
+    ----------
+    name : str
+        Key of `springtune.springs.DEFINITIONS`.
+    code : Code, optional
+        What is read of files.
+
+    Returns
+    -------
+    Closure
+    """
+    return _declared_closure(DEFINITIONS[name], code)
+
+
+def mesh_type_closure(name: str) -> Closure:
+    """What a mesh type runs on, as `definition_closure`.
+
+    Parameters
+    ----------
+    name : str
+        Key of `springtune.mesh.MESH_TYPES`.
+
+    Returns
+    -------
+    Closure
+    """
+    return _declared_closure(MESH_TYPES[name], OURS)
+
+
+def mesh_file_closure() -> Closure:
+    """What meshes from files are read by, the packages that read them included."""
+    return OURS.closure(_module("mesh.formats"), carried=False)
+
+
+@cache
+def _declared_closure(one: Declared, code: Code) -> Closure:
+    if one.file is not None:
+        return code.closure(one.file)
+    function = inspect.unwrap(one.function)
+    try:  # of a notebook: the function is all that is known
+        return code.of_text(inspect.getsource(function))
+    except OSError:  # a prompt that keeps no text
+        made = function.__code__
+        constants = [value for value in made.co_consts if not hasattr(value, "co_code")]
+        return code.of_text(f"({made.co_code!r}, {made.co_names!r}, {constants!r})")
+
+
+@cache
+def distribution(package: str) -> str:
+    """Distribution that has a package.
+
+    Parameters
+    ----------
+    package : str
+        As it is imported.
+
+    Returns
+    -------
+    str
+        The package's own name where none has it.
+
+    Examples
+    --------
+    >>> distribution("skfem"), distribution("numpy")
+    ('scikit-fem', 'numpy')
+    """
+    if package in DISTRIBUTIONS:
+        return DISTRIBUTIONS[package]
+    from importlib.metadata import PackageNotFoundError, packages_distributions, version
+
+    try:
+        version(package)
+    except PackageNotFoundError:
+        return packages_distributions().get(package, [package])[0]
+    return package
+
+
+def _module(name: str) -> Path:
+    return PACKAGE / (name.replace(".", "/") + ".py")
+
+
+@cache
+def _own(package: str) -> Path | None:
+    """Place of a package that no distribution has, such as one of the user's on Python's path."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        version(distribution(package))
+    except PackageNotFoundError:
+        spec = find_spec(package)
+        origin = Path(spec.origin) if spec and spec.origin else Path()
+        if origin.suffix == ".py":
+            return origin.parent if origin.stem == "__init__" else origin.with_suffix("")
+    return None
+
+
+@cache
+def _lazy_names() -> dict[str, str]:
+    """Modules of the names that `springtune` imports when they are asked for."""
+    places: dict[str, str] = vars(sys.modules[PACKAGE.name])["_PLACES"]
+    return places
+
+
+def _file(place: Path) -> Path | None:
+    return next((file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()), None)

@@ -1,0 +1,88 @@
+"""What lies in a study's folder and nothing asks for any more: outputs and results of values that it no longer has."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from springtune.handover.paraview import pieces_of
+from springtune.safe_io.atomic import UNFINISHED
+
+from ..config.kind import FORMATS
+from . import plan, rerun
+from .damage import ASIDE
+
+if TYPE_CHECKING:
+    from ..config.model import Study
+
+JOB_FILES = {"tasks": ".json", "done": ".json", "logs": ".log", "benchmarks": ".tsv"}
+"""Folders of files that each job has one of, and how these end."""
+
+COLLECTED, PIECE = ".pvd", ".vtu"
+"""How files end of which ParaView opens many at once, and those that they name, in a folder beside them."""
+
+OUTPUT_FILES = {
+    "figures": tuple(f".{ending}" for ending in FORMATS),
+    "tables": (".csv", ".html", ".md"),
+    "paraview": (COLLECTED,),
+}
+"""Folders of outputs, and how their files end."""
+
+STORED, STORES = (
+    ".h5",
+    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement", "samples"}
+    | {"shape_meshes", "shape_references", "shape_solutions"},
+)
+"""Ending of what stages store, see `springtune.studies.runs.store`, and the folders where they do."""
+
+
+def orphans(study: "Study", folder: Path) -> list[Path]:
+    """Files of the kinds that runs make which the study's next run neither makes nor reads.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where the study's results are.
+
+    Returns
+    -------
+    list of Path
+        Sorted; none of them outside of the folder. Whatever else lies there is not looked at.
+    """
+    planned = plan.plan(study, folder, 1)
+    jobs = rerun.jobs(study, planned)
+    products = [Path(path) for job in jobs.values() for path in job.products]
+    kept = {folder / plan.BUNDLES_FILE, *products}
+    kept |= {piece for path in products if path.suffix == COLLECTED for piece in pieces_of(path)}
+    found = {path for path in _candidates(folder) if path not in kept}
+    found -= {folder / name / f"{job}{ending}" for name, ending in JOB_FILES.items() for job in jobs}
+    return sorted(found)
+
+
+def _candidates(folder: Path) -> Iterator[Path]:
+    """Files of the kinds that runs make, in a study's folder and those directly in it that are no links elsewhere."""
+    names = tuple(f"{name}_" for name in (*(stage.name for stage in plan.stages()), rerun.PRESENT))
+    for path in _files(folder):
+        if _is_left(path):
+            yield path
+    for below in sorted(folder.iterdir()):
+        if below.is_symlink() or not below.is_dir():
+            continue
+        if below.name in OUTPUT_FILES and COLLECTED in OUTPUT_FILES[below.name]:
+            yield from (path for path in sorted(below.glob(f"*/*{PIECE}")) if path.is_file() and not path.is_symlink())
+        for path in _files(below):
+            made = path.suffix in OUTPUT_FILES.get(below.name, ())
+            made |= below.name in JOB_FILES and path.name.startswith(names)
+            made |= below.name in STORES and path.suffix == STORED
+            made |= below.name == "meshes" and path.suffix in (".vtu", ".json")
+            if made or _is_left(path):
+                yield path
+
+
+def _is_left(path: Path) -> bool:
+    """Whether a file was being written, or was set aside."""
+    return UNFINISHED in path.name or path.name.endswith(ASIDE)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    return (path for path in folder.iterdir() if path.is_file() and not path.is_symlink())

@@ -1,0 +1,194 @@
+"""Where a dataset comes from: attributes of its root."""
+
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Collection
+from datetime import UTC, datetime
+from pathlib import Path
+
+from springtune import __version__
+
+from ..config.kind import kinds
+from ..config.model import Study
+from .keys import installed
+from .records import checksum
+
+SOFTWARE = (
+    "cvxopt",
+    "h5netcdf",
+    "h5py",
+    "meshio",
+    "netcdf4",
+    "netgen-mesher",
+    "numba",
+    "numpy",
+    "pyamg",
+    "scikit-fem",
+    "scipy",
+    "snakemake",
+    "xarray",
+)
+
+LOCK = Path("requirements/run.txt")
+"""Versions that a checkout installs, beside the study or above it."""
+
+COMPARED_WITH_COMMIT = ("src", "Snakefile", "workflow/paper", "workflow/report", "workflow/rules")
+"""Package and rules, from the checkout on. Profiles are not among them: they may hold what is one user's own."""
+
+CHANGED = "+changes"
+"""What `git_commit` ends with where files of the checkout differed from the commit."""
+
+LONGEST = 40_000
+"""Characters of a difference from the commit that are kept."""
+
+PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
+"""Where printed values are from, by the name of their file."""
+
+
+def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -> dict[str, str]:
+    """Attributes of the root of a study's dataset.
+
+    Parameters
+    ----------
+    study : Study
+    config : str or Path
+        YAML file of the study.
+    untold : collection of str, optional
+        Attributes to leave empty: ``git_diff``, ``host``.
+
+    Returns
+    -------
+    dict of str to str
+    """
+    created = datetime.now(UTC).isoformat(timespec="seconds")
+    software = {name: installed(name) for name in SOFTWARE} | {"python": platform.python_version()}
+    folder = Path(config).resolve().parent
+    commit = git_commit(folder)
+    found = {
+        "title": study.title,
+        "Conventions": "CF-1.11",
+        "history": f"{created} springtune {__version__}: collected from the results of the study {study.name}",
+        "source": f"springtune {__version__}: mass-spring networks, and finite elements as their references",
+        "study": study.name,
+        "config": study.text,
+        "config_sha256": hashlib.sha256(study.text.encode()).hexdigest(),
+        "inputs": json.dumps(inputs(study, folder), sort_keys=True),
+        "springtune_version": __version__,
+        "git_commit": commit,
+        "git_diff": git_diff(study, folder) if commit.endswith(CHANGED) and "git_diff" not in untold else "",
+        "created": created,
+        "software": json.dumps(software, sort_keys=True),
+        "host": "" if "host" in untold else platform.node(),
+    }
+    return found | _references(study)
+
+
+def _references(study: Study) -> dict[str, str]:
+    """Where the printed values are from; nothing where the dataset has none."""
+    cells = {(one.mesh.beam.name, one.mesh.mesh_type, one.material.name, one.load) for one in study.scenes}
+    if not study.printed_path or not any(
+        (one.beam, one.mesh_type, one.material, one.load) in cells for one in study.printed
+    ):
+        return {}
+    name = study.printed_path.name
+    return {"references": f"paper_*: as printed in {PRINTED.get(name, name)}"}
+
+
+def inputs(study: Study, folder: Path) -> dict[str, str]:
+    """SHA-256 of each file that a study is made from, the versions of its software included.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Where the study's file is, absolute.
+
+    Returns
+    -------
+    dict of str to str
+        By the file's name: seen from the checkout, or from the study where there is none.
+    """
+    root = _checkout(folder)
+    files = input_files(study) | ({root / LOCK} if root else set())
+    return {_name(file.resolve(), root or folder): checksum(file) for file in sorted(files)}
+
+
+def _checkout(folder: Path) -> Path | None:
+    """The checkout that holds a folder."""
+    return next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
+
+
+def input_files(study: Study) -> set[Path]:
+    """The study's file, and all that it names: meshes, rows of parameters, tests, printed values.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    set of Path
+    """
+    files = {study.path, *study.test_files, *study.row_files}
+    files |= {mesh.file for mesh in study.mesh_files.values() if mesh.file}
+    files |= {study.printed_path} if study.printed_path else set()
+    return files | {file for kind in kinds() for file in kind.files(study.parts[kind.name])}
+
+
+def _name(file: Path, root: Path) -> str:
+    """Name of a file without what is the machine's own."""
+    return file.relative_to(root).as_posix() if file.is_relative_to(root) else f"{file.parent.name}/{file.name}"
+
+
+def git_commit(folder: Path) -> str:
+    """Commit of the checkout that holds a folder, with `CHANGED` where files differ from it; empty outside of git."""
+    return git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
+
+
+def git_diff(study: Study, folder: Path) -> str:
+    """What differs from the commit, see `difference`; of a long text the beginning, and its SHA-256."""
+    # Whatever files are written in.
+    text = difference(study, folder).encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
+    if len(text) <= LONGEST:
+        return text
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    kept = text[: text.rfind("\n", 0, LONGEST) + 1]
+    return f"{kept}... cut here; the whole difference has {len(text)} characters and SHA-256 {digest}\n"
+
+
+def difference(study: Study, folder: Path, *options: str) -> str:
+    """What of the package, the rules and the study's own files differs from the commit, and nothing else.
+
+    Files that git does not know are not part of it.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        In the checkout, absolute.
+    *options : str
+        Of ``git diff``.
+
+    Returns
+    -------
+    str
+        Bytes that are no UTF-8 are escaped.
+    """
+    top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
+    files = {file.resolve() for file in input_files(study)} | (
+        {root / name for name in COMPARED_WITH_COMMIT} if root else set()
+    )
+    known = [str(file) for file in sorted(files) if file.is_relative_to(top)]
+    command = ("--literal-pathspecs", "diff", "--no-color", "--no-ext-diff", *options, "HEAD", "--")
+    return git(folder, *command, *known) if known else ""
+
+
+def git(folder: Path, *arguments: str) -> str:
+    """What git says in a folder, empty where it fails or is not there; bytes that are no UTF-8 are escaped."""
+    try:
+        answer = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return answer.stdout.decode(errors="surrogateescape")

@@ -1,0 +1,117 @@
+"""Records: what a job did, and size, time and checksum of all that it made.
+
+A run plans by them, whatever else it finds: a job is done if its record says that it did what is asked for now, and if
+what it made is still what it was.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from . import checked_json
+
+MISSING, DAMAGED = " is missing", " is damaged"
+"""How a fault ends that begins with a file which is not as it was made."""
+
+
+def checksum(path: str | Path) -> str:
+    """SHA-256 of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    str
+    """
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write(path: str | Path, digest: str, products: Iterable[str | Path], **more: Any) -> None:
+    """Write the record of a job that is done.
+
+    Parameters
+    ----------
+    path : str or Path
+    digest : str
+        Of all that it was to do.
+    products : iterable of str or Path
+        Files that it was to make; one that is not there could not be made, and what it made instead says why.
+    **more
+        What else is to be told of it.
+    """
+    made: dict[str, list[Any] | None] = {}
+    for product in map(Path, products):
+        made[str(product)] = None
+        if product.exists():
+            state = product.stat()
+            made[str(product)] = [state.st_size, state.st_mtime_ns, checksum(product)]
+    checked_json.write(path, {"digest": digest, "products": made} | more)
+
+
+def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> str:
+    """Why a job is to run.
+
+    Parameters
+    ----------
+    path, digest, products, wholly
+        As of `faults`.
+
+    Returns
+    -------
+    str
+        The first of its faults; empty where there is none.
+    """
+    return next(faults(path, digest, products, wholly), "")
+
+
+def faults(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> Iterator[str]:
+    """All reasons for which a job is to run.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its record.
+    digest : str
+        Of what it is to do.
+    products : iterable of str or Path
+        Files that it is to make; those that its record names besides are compared, too.
+    wholly : bool, optional
+        Whether to compare the checksum of each of them, not only of those whose size or time is another.
+
+    Yields
+    ------
+    str
+        None where it has done what is asked for, and what it made is there as it was.
+    """
+    path = Path(path)
+    if not path.exists():
+        yield "not done yet"
+        return
+    record = checked_json.read(path, digest=str, products=dict)
+    if record is None:
+        yield f"{path}{DAMAGED}"
+        return
+    if record["digest"] != digest:
+        yield "something else is asked for"
+        return
+    # A job may make more than it is known to before it runs.
+    for product in map(Path, dict.fromkeys([*map(str, products), *record["products"]])):
+        known = record["products"].get(str(product))
+        try:
+            state = product.stat()
+        except OSError:
+            if known is not None:
+                yield f"{product}{MISSING}"
+            continue
+        if known is None:
+            yield f"{product} is not what this job made"
+            continue
+        size, time, content = known
+        if (wholly or state.st_mtime_ns != time or state.st_size != size) and (
+            state.st_size != size or checksum(product) != content
+        ):
+            yield f"{product}{DAMAGED}"

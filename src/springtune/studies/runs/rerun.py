@@ -1,0 +1,291 @@
+"""What a run has to do: which jobs have not done what is asked for, or have made what is not there as it was.
+
+Stages are planned in `springtune.studies.runs.plan`; here are the jobs after them, and what becomes of all of them.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..config.kind import FORMATS, KINDS, kinds, outputs
+from ..config.shown import keeps_fields
+from . import checked_json, records
+from .dependencies import PACKAGE
+from .hashing import hash_of
+from .keys import stage_key
+from .plan import Plan, table_files
+from .provenance import inputs
+from .run_tasks import RECORDS
+
+if TYPE_CHECKING:
+    from ..config.kind import Output
+    from ..config.model import Study
+
+DATASET, SUMMARY, PAGE = "dataset.nc", "summary.txt", "index.html"
+"""Files that every study has."""
+
+COLLECT, BROWSE, PRESENT = "collect", "browse", "present"
+"""Jobs after the stages, by name; of those that make outputs the first part of it."""
+
+PAPER, PAPER_FILE = "paper", "paper.pdf"
+"""The job that sets the paper, and what it makes."""
+
+PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
+"""Studies that the paper reads."""
+
+
+BLANKED = {"no_diff": "git_diff", "no_host": "host"}
+"""Attributes that a dataset leaves empty on request, by the option of a run."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of a run.
+
+    Attributes
+    ----------
+    name : str
+        Stem of its files.
+    digest : str
+        Of all that it depends on, apart from what jobs before it make.
+    products : tuple of str
+        Files that it makes.
+    record : Path
+        What it has done.
+    reads : str
+        Job whose first product it is made from; empty for stages, whose results are known by their keys.
+    inputs : tuple of str
+        Files that it is made from, where several jobs make them.
+    """
+
+    name: str
+    digest: str
+    products: tuple[str, ...]
+    record: Path
+    reads: str = ""
+    inputs: tuple[str, ...] = ()
+
+
+def output_jobs(study: "Study") -> "dict[str, list[Output]]":
+    """Outputs that a study asks for and that have files in it, by the job that makes them.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    dict of str to list of Output
+    """
+    found: dict[str, list[Output]] = {}
+    for one in () if study.part else outputs().values():  # figures and tables are of whole studies
+        if one.name in study.outputs and output_files(one, study):
+            found.setdefault(f"{PRESENT}_{one.made_by}", []).append(one)
+    return found
+
+
+def output_files(output: "Output", study: "Study") -> list[str]:
+    """Files of an output.
+
+    Parameters
+    ----------
+    output : Output
+    study : Study
+
+    Returns
+    -------
+    list of str
+        From the study's folder on.
+    """
+    figures = [f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS]
+    return figures + [f"{output.into}/{name}" for name in table_files(output, study)]
+
+
+def linked(study: "Study") -> list[str]:
+    """Files that the page to browse links to, from the study's folder on."""
+    made = (path for members in output_jobs(study).values() for one in members for path in output_files(one, study))
+    return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
+
+
+def untold(folder: Path, chosen: Mapping[str, bool] | None = None) -> list[str]:
+    """Attributes that the dataset of a study leaves empty.
+
+    Parameters
+    ----------
+    folder : Path
+        Where its results are.
+    chosen : dict of str to bool, optional
+        By the options of a run, see `BLANKED`; what is not chosen is as in the dataset that is there.
+
+    Returns
+    -------
+    list of str
+    """
+    before = (checked_json.read(folder / RECORDS / f"{COLLECT}.json", products=dict) or {}).get("untold", [])
+    return [name for option, name in BLANKED.items() if (chosen or {}).get(option, name in before)]
+
+
+def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -> dict[str, Job]:
+    """All jobs of a study.
+
+    Parameters
+    ----------
+    study : Study
+    plan : Plan
+        Of its stages.
+    chosen : dict of str to bool, optional
+        As of `untold`.
+
+    Returns
+    -------
+    dict of str to Job
+        By name, in an order in which each comes after those that it waits for.
+    """
+    folder = plan.folder
+    found = [Job(one.name, one.digest, one.products, plan.record(one.name)) for one in plan.jobs.values()]
+    collected = hash_of(_collect_digest(study, plan), untold(folder, chosen))
+    made = [(COLLECT, collected, [DATASET, SUMMARY], "")]
+    for name, members in output_jobs(study).items():
+        files = [file for one in members for file in output_files(one, study)]
+        made.append((name, _present_digest(members, files), files, COLLECT))
+    made.append((BROWSE, _browse_digest(study), [PAGE], COLLECT))
+    for name, digest, files, reads in made:
+        paths = tuple(str(folder / file) for file in files)
+        found.append(Job(name, digest, paths, plan.record(name), reads))
+    return {job.name: job for job in found}
+
+
+def _collect_digest(study: "Study", plan: Plan) -> str:
+    """Digest of a study's dataset: of the study as it is expanded, and of the files that the dataset names."""
+    collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
+    code = [stage_key("studies.kinds.collect")]
+    code += [stage_key(f"studies.kinds.{name}.{part}") for name in KINDS for part in ("kind", "collect")]
+    code += [stage_key(made.collect) for made in collected]
+    about = [
+        study.name,
+        study.title,
+        study.axes,
+        study.swept,
+        study.stiffness_ratios,
+        study.further_references,
+        study.calibration,
+    ]
+    # What is stored of a scene knows neither its labels nor its beam's.
+    of_scenes = [[*study.labels(scene).values(), scene.force] for scene in study.scenes]
+    bodies = {scene.mesh.beam for scene in study.scenes}, {scene.material for scene in study.scenes}
+    named = [sorted((_plain(one) for one in group), key=str) for group in bodies]
+    parts = {name: _plain(part) for name, part in study.parts.items() if name != "scenes"}
+    printed = [_plain(cell) for cell in study.printed]
+    stages = [job.digest for job in plan.jobs.values()]
+    return hash_of(
+        about,
+        of_scenes,
+        named,
+        parts,
+        [made.name for made in collected],
+        keeps_fields(study),
+        printed,
+        stages,
+        code,
+        inputs(study, study.path.resolve().parent),
+    )
+
+
+def _plain(part: Any) -> Any:
+    """A study's part in dicts and lists."""
+    if is_dataclass(part) and not isinstance(part, type):
+        return asdict(part)
+    return [_plain(one) for one in part] if isinstance(part, tuple | list) else part
+
+
+def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
+    used = ["studies.output.present", *(f"studies.kinds.{name}.outputs" for name in KINDS)]
+    templates = []
+    for one in members:
+        used += filter(None, (one.module, one.write))
+        if one.page:
+            used += ["studies.output.page", *(f"studies.kinds.{name}.kind" for name in KINDS)]
+            used += [f"studies.kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
+            templates.append(records.checksum(PACKAGE / "studies/output/page.html"))
+    return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
+
+
+def _browse_digest(study: "Study") -> str:
+    kinds_with_views = [name for name in KINDS if (PACKAGE / f"studies/kinds/{name}/views.py").exists()]
+    views = [f"studies.kinds.{name}.views" for name in kinds_with_views]
+    assets = {
+        path.name: records.checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())
+    }
+    return hash_of(linked(study), [stage_key(name) for name in ("studies.output.browse.job", *views)], assets)
+
+
+def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
+    """The job that sets the paper.
+
+    Parameters
+    ----------
+    source : Path
+        Folder of its source.
+    datasets : iterable of Path
+        That it reads; those that are made again in the same run come before it anyway.
+    folder : Path
+        Where the paper goes.
+
+    Returns
+    -------
+    Job
+    """
+    texts = {path.name: records.checksum(path) for path in sorted(source.iterdir()) if path.is_file()}
+    examples = sorted((source.resolve().parents[1] / "examples").glob("*.py"))
+    texts |= {f"examples/{path.name}": records.checksum(path) for path in examples}
+    used = ["studies.paper.build", *(one.module for one in outputs().values() if one.module)]
+    digest = hash_of(texts, [stage_key(name) for name in dict.fromkeys(used)])
+    record = folder / RECORDS / f"{PAPER}.json"
+    return Job(PAPER, digest, (str(folder / PAPER_FILE),), record, inputs=tuple(map(str, datasets)))
+
+
+def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
+    """Why a job is to run, whatever becomes of those before it.
+
+    Parameters
+    ----------
+    job : Job
+    found : dict of str to Job
+        All jobs of its study.
+    wholly : bool, optional
+        Whether to compare the checksum of all that it made, not only of files whose size or time is another.
+
+    Returns
+    -------
+    str
+        Empty where it has done what is asked for, and what it made is there as it was.
+    """
+    why = records.fault(job.record, job.digest, job.products, wholly)
+    if not why and job.reads and not _is_up_to_date(job, found[job.reads]):
+        return f"{found[job.reads].products[0]} is another one"
+    if not why and job.inputs and checked_json.read(job.record)["read"] != [_checksum(path) for path in job.inputs]:
+        return "a dataset that it reads is another one"
+    return why
+
+
+def _checksum(path: str) -> str:
+    return records.checksum(path) if Path(path).exists() else ""
+
+
+def _is_up_to_date(job: Job, before: Job) -> bool:
+    """Whether a job read what the one before it has made; that of a job that is to run is not asked for."""
+    read, made = checked_json.read(job.record), checked_json.read(before.record, products=dict)
+    product = made and made["products"].get(before.products[0])
+    return not product or read["read"] == product[2]
+
+
+def is_damage(why: str) -> bool:
+    """Whether a job is to run since a file is not as it was made: a user should know.
+
+    Parameters
+    ----------
+    why : str
+        As of `fault`.
+    """
+    return why.endswith((records.DAMAGED, records.MISSING))

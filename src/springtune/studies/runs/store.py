@@ -1,0 +1,296 @@
+"""Results of scenes on disk: one HDF5 file a mesh and stage, results by a hash of all they depend on.
+
+Scalars and texts of all results are one JSON text, since a group with attributes for each would cost more than solving
+it; arrays are datasets. A stage computes only the results that the file does not hold. What an earlier grid asked for
+stays, so going back to it computes nothing. Nothing but the dataset is meant for users.
+
+A file begins with a checksum of what follows, in a user block that HDF5 passes over. It is compared whenever a file is
+read, before HDF5 sees it.
+"""
+
+import hashlib
+import json
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import h5py
+import numpy as np
+
+from springtune.safe_io import atomic
+
+from .damage import DamagedError, set_aside
+
+SCALARS = "scalars"
+"""Dataset of what is not an array."""
+
+MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
+"""What a file begins with."""
+
+LIMITS = "limits"
+"""What a result notes that was lost to limits: these, in words; readers are not told."""
+
+USER_BLOCK = 512
+"""Length of the block before HDF5's own [bytes]."""
+
+OLD = b"\x89HDF"
+"""What files began with before they had a checksum."""
+
+
+def _checked(path: str | Path) -> None:
+    """Compare a file with its checksum.
+
+    Raises
+    ------
+    DamagedError
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise DamagedError(path, error.strerror or "cannot be read") from None
+    if not content:
+        raise DamagedError(path, "it is empty")
+    if content[:USER_BLOCK] != _user_block(content[USER_BLOCK:]):
+        whole = content.startswith(MAGIC)
+        raise DamagedError(path, "its checksum is not that of its content" if whole else "it is no file of results")
+
+
+def _user_block(image: bytes) -> bytes:
+    return (MAGIC + hashlib.sha256(image).hexdigest().encode()).ljust(USER_BLOCK, b"\0")
+
+
+def stored(path: str | Path, limits: str | None = None) -> set[str]:
+    """Keys of the results in a file; a damaged one is set aside and holds none.
+
+    Parameters
+    ----------
+    path : str or Path
+    limits : str, optional
+        Limits that tasks have now: a result that was lost to others is not stored.
+
+    Returns
+    -------
+    set of str
+    """
+    if not Path(path).exists():
+        return set()
+    try:
+        _checked(path)
+    except DamagedError as error:
+        if not _is_old(path):
+            set_aside(error)
+        return set()
+    with h5py.File(path) as file:
+        scalars = _scalars(file)
+    return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
+
+
+def _is_old(path: str | Path) -> bool:
+    """Whether a file was written when files had no checksum yet."""
+    if not Path(path).is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(len(OLD)) == OLD
+
+
+def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
+    scalars: dict[str, dict[str, Any]] = json.loads(file[SCALARS][()])
+    return scalars
+
+
+def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """Read results.
+
+    Parameters
+    ----------
+    path : str or Path
+    names : iterable of str
+        Keys of the results to read.
+    fields : sequence of str, optional
+        Arrays to read besides scalars.
+
+    Returns
+    -------
+    dict of str to dict
+        Results by key: scalars, texts and the arrays asked for.
+
+    Raises
+    ------
+    DamagedError
+        If the file is not there, is not what was written or lacks one of the results.
+    """
+    _checked(path)
+    with h5py.File(path) as file:
+        scalars = _scalars(file)
+        names = list(names)
+        lacking = [name for name in names if name not in scalars]
+        if lacking:
+            raise DamagedError(path, f"it lacks {len(lacking)} of {len(names)} results", whole=True)
+        results = {name: {label: value for label, value in scalars[name].items() if label != LIMITS} for name in names}
+        for name, result in results.items() if fields else ():
+            if name in file:
+                result |= {label: file[name][label][()] for label in fields if label in file[name]}
+    return results
+
+
+def contents(path: str | Path) -> dict[str, dict[str, Any]]:
+    """All results in a file, as `add` takes them: scalars, texts and all arrays.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict of str to dict
+        Results by key; those that were lost to limits say so.
+
+    Raises
+    ------
+    DamagedError
+        If the file is not there or is not what was written.
+    """
+    _checked(path)
+    with h5py.File(path) as file:
+        found = _scalars(file)
+        for name, result in found.items():
+            result |= {label: array[()] for label, array in file[name].items()} if name in file else {}
+    return found
+
+
+def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[str, Any]:
+    """Read a result that has a file to itself, named by its key.
+
+    Parameters
+    ----------
+    folder : str or Path
+    key : str
+    fields : sequence of str, optional
+        Arrays to read besides scalars.
+
+    Returns
+    -------
+    dict
+        Scalars, texts and the arrays asked for.
+
+    Raises
+    ------
+    DamagedError
+        As `read`.
+    """
+    return read(Path(folder) / f"{key}.h5", [key], fields)[key]
+
+
+def missing(
+    folder: str | Path, tasks: Iterable[Mapping[str, Any]], limits: str | None = None
+) -> Iterator[tuple[Path, Mapping[str, Any]]]:
+    """Tasks whose result, a file each, named by the task's key, is not stored yet.
+
+    Parameters
+    ----------
+    folder : str or Path
+    tasks : iterable of dict
+        Each with its ``key``.
+    limits : str, optional
+        As of `stored`.
+
+    Yields
+    ------
+    path : Path
+        Where the result belongs.
+    task : dict
+    """
+    for task in tasks:
+        path = Path(folder) / f"{task['key']}.h5"
+        if task["key"] not in stored(path, limits):
+            yield path, task
+
+
+KEPT_BACK = 5.0
+"""Seconds for which a `Keeper` has results in memory: writing them costs as much as computing small ones."""
+
+
+class Keeper:
+    """Context that adds results to a file now and then, and at its end: what is computed is not lost to what comes.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path, self.results, self.since = path, dict[str, Mapping[str, Any]](), time.perf_counter()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._write()
+
+    def __setitem__(self, key: str, result: Mapping[str, Any]) -> None:
+        self.results[key] = result
+        if time.perf_counter() > self.since + KEPT_BACK:
+            self._write()
+
+    def _write(self) -> None:
+        add(self.path, self.results)
+        self.results, self.since = {}, time.perf_counter()
+
+
+def lose(folder: str | Path, key: str, hole: Mapping[str, Any], limits: str) -> None:
+    """Store that a task, whose result has a file to itself, went beyond its limits.
+
+    Parameters
+    ----------
+    folder : str or Path
+    key : str
+        Of the task.
+    hole : dict
+        Its result.
+    limits : str
+        In words; where they change, the task is not stored any more.
+    """
+    add(Path(folder) / f"{key}.h5", {key: {**hole, LIMITS: limits}})
+
+
+def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
+    """Add results to a file, which changes whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    results : dict of str to dict
+        Results by key; arrays become datasets, all else one JSON text.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "results.h5"
+    ...     add(path, {"one": {"displacement": 1.25e-3, "field": np.arange(3.0)}})
+    ...     read(path, stored(path), ["field"])
+    {'one': {'displacement': 0.00125, 'field': array([0., 1., 2.])}}
+    """
+    if not results:
+        return
+    scalars: dict[str, dict[str, Any]] = {}
+    # In memory: what is on the disk is written at once, checksum and all.
+    with h5py.File("results", "w", driver="core", backing_store=False) as file:
+        if stored(path):
+            with h5py.File(path) as before:
+                scalars = {name: kept for name, kept in _scalars(before).items() if name not in results}
+                for name in before:
+                    if name in scalars:
+                        before.copy(name, file)
+        for name, result in results.items():
+            scalars[name] = {}
+            for label, value in result.items():
+                if isinstance(value, np.ndarray):
+                    file.create_dataset(f"{name}/{label}", data=value)
+                else:
+                    scalars[name][label] = value.item() if isinstance(value, np.generic) else value
+        file[SCALARS] = json.dumps(scalars)
+        file.flush()
+        image = file.id.get_file_image()
+    atomic.write_bytes(path, _user_block(image) + image)

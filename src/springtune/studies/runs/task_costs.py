@@ -1,0 +1,125 @@
+"""The tasks of a job: what each costs, which limits it has, and what becomes of one that fails."""
+
+import resource
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .task_limits import Watch
+
+
+KIBI = 1024
+"""Bytes in which Linux tells the memory of a process."""
+
+LOST = "beyond limits"
+"""What tasks are counted as that went beyond their limits."""
+
+
+class Spent:
+    """What the tasks of a job cost, for the record that says it is done.
+
+    Parameters
+    ----------
+    watch : Watch, optional
+        Keeps each task within its limits; there are none without.
+
+    Attributes
+    ----------
+    broken : list of Exception
+        What was raised by a program that is broken.
+
+    Examples
+    --------
+    >>> spent = Spent()
+    >>> spent.add("linear", 231, 0.5)
+    >>> spent.add("linear", 19, 0.25)
+    >>> spent.summary()["work"]
+    {'linear': [2, 250.0, 0.75]}
+    """
+
+    def __init__(self, watch: "Watch | None" = None) -> None:
+        self.start_up = time.process_time()  # spent on imports so far
+        self.sums: dict[str, list[float]] = defaultdict(lambda: [0, 0.0, 0.0])
+        self.watch = watch
+        self.broken: list[Exception] = []
+
+    @property
+    def limits(self) -> str:
+        """Limits of a task in words, which a result that is lost to them notes."""
+        return self.watch.words if self.watch else ""
+
+    def attempt(self, key: str, function: Callable[[], Any], hole: Callable[[str], dict[str, Any]]) -> Any:
+        """Result of a task.
+
+        Parameters
+        ----------
+        key : str
+            Of the task: one that is beyond its limits is lost under this name.
+        function : callable
+            Computes the result.
+        hole : callable
+            Result of a task that fails for reasons of its own, from these.
+
+        Returns
+        -------
+        object
+            None where the program is broken: nothing is to be stored, and the job ends with an error.
+        """
+        from .failures import own_reason  # here: what counts alone needs no definitions
+
+        try:
+            if self.watch is None:
+                return function()
+            with self.watch.over(key):
+                return function()
+        except MemoryError:
+            return hole(f"not enough memory: {self.limits or 'the machine has no more'}") | {"limits": self.limits}
+        except Exception as error:
+            from .damage import DamagedError
+
+            if isinstance(error, DamagedError):
+                raise
+            why = own_reason(error)
+            if not why:
+                self.broken.append(error)
+                return None
+            return hole(why)
+
+    def add(self, kind: str, units: float, seconds: float, count: int = 1) -> None:
+        """Count tasks.
+
+        Parameters
+        ----------
+        kind : str
+        units : float
+            Its particles, or what else its cost grows with.
+        seconds : float
+        count : int, optional
+            Tasks of which these are the sums.
+        """
+        sums = self.sums[kind]
+        sums[0] += count
+        sums[1] += units
+        sums[2] += seconds
+
+    def summary(self) -> dict[str, Any]:
+        """What to write to the record.
+
+        Returns
+        -------
+        dict
+            ``start_up``, seconds spent on imports; ``work``, by kind: number of tasks, sums of their units and seconds;
+            ``memory``, the most that this process, or one that it called, had [byte].
+        """
+        lost = self.watch.lost if self.watch else 0
+        work = dict(self.sums) | ({LOST: [lost, 0.0, 0.0]} if lost else {})
+        return {"start_up": self.start_up, "work": work, "memory": most_memory()}
+
+
+def most_memory() -> int:
+    """Most memory that this process, or a child of it that is done, had so far [byte]."""
+    most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return most if sys.platform == "darwin" else KIBI * most

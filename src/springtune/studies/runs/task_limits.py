@@ -1,0 +1,165 @@
+"""Limits of a task: a job is done by a child of its process, so that a task beyond them ends the child alone.
+
+Seconds are those of the processor, which the kernel counts and a busy machine does not change; memory is what a task
+may take on top of what there was. Where the system counts neither, there are no limits.
+"""
+
+import ctypes
+import mmap
+import os
+import resource
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+from springtune.safe_io.inputs import virtual_memory
+
+PLACES = 4096
+"""Bytes of the name of a task."""
+
+STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Signals by which somebody ends a job; all others a task brings upon itself."""
+
+LIMITS_TOLD = "(`limits` of the study)"
+"""How limits end in words."""
+
+PARENT_DEATH = 1
+"""Linux's number for the signal of a process whose parent is gone (prctl)."""
+
+
+class Watch:
+    """Limits of the tasks of a job, and which task is under way.
+
+    Parameters
+    ----------
+    limits : dict
+        ``seconds`` and ``memory`` [byte] of a task.
+
+    Attributes
+    ----------
+    words : str
+        The limits, for a reader.
+    lost : int
+        Tasks that went beyond them so far.
+    """
+
+    def __init__(self, limits: Mapping[str, float]) -> None:
+        self.seconds, self.memory = limits["seconds"], limits["memory"]
+        self.words = f"at most {self.seconds:g} s and {self.memory / 1e9:g} GB for each {LIMITS_TOLD}"
+        self.lost = 0
+        self._name = mmap.mmap(-1, PLACES)  # shared with the child
+
+    @contextmanager
+    def over(self, key: str) -> Iterator[None]:
+        """Context of a task.
+
+        Parameters
+        ----------
+        key : str
+        """
+        self._write(key)
+        before = resource.getrlimit(resource.RLIMIT_AS)
+        used = virtual_memory()
+        if used:
+            # A limit that the user, or a cluster, has set for the whole job is kept.
+            most = [limit for limit in before if limit != resource.RLIM_INFINITY]
+            resource.setrlimit(resource.RLIMIT_AS, (min([used + int(self.memory), *most]), before[1]))
+        signal.setitimer(signal.ITIMER_PROF, self.seconds)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0)
+            resource.setrlimit(resource.RLIMIT_AS, before)
+            self._write("")
+
+    def under_way(self) -> str:
+        """Key of the task that has begun and not ended; empty where there is none."""
+        return self._name[:PLACES].rstrip(b"\0").decode()
+
+    def _write(self, key: str) -> None:
+        self._name[:PLACES] = key.encode().ljust(PLACES, b"\0")
+
+
+def go_with_parent() -> None:
+    """Let the kernel end this process when the one that forked it ends; where it can."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGKILL)
+
+
+def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str], None]) -> None:
+    """Call a function in a child of this process, again after each task that ends the child.
+
+    Parameters
+    ----------
+    function : callable
+        Does the tasks that are left.
+    watch : Watch
+    lose : callable
+        Of a task's key and why it is lost: takes it from those that are left.
+
+    Raises
+    ------
+    SystemExit
+        If the function raises, or the child was stopped.
+    """
+    while True:
+        child = _begin(function)
+        with _passed_on(child):
+            _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status):
+            if os.WEXITSTATUS(status):
+                raise SystemExit(os.WEXITSTATUS(status))
+            return
+        number = signal.Signals(os.WTERMSIG(status))
+        key = watch.under_way()
+        if not key or number in STOPPED:
+            hint = ": is the machine's memory short?" if number == signal.SIGKILL else ""
+            print(f"stopped by {number.name}{hint}", file=sys.stderr)
+            raise SystemExit(128 + number)
+        beyond = number == signal.SIGPROF
+        why = f"not done within {watch.seconds:g} s" if beyond else f"the program was ended by {number.name}"
+        lose(key, f"{why}; {watch.words}")
+        watch.lost += 1
+
+
+def _begin(function: Callable[[], None]) -> int:
+    """Child that calls a function; it goes when this process goes."""
+    parent = os.getpid()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    child = os.fork()
+    if child:
+        return child
+    code = 1
+    try:
+        go_with_parent()
+        if os.getppid() == parent:
+            function()
+            code = 0
+    except SystemExit as error:
+        if isinstance(error.code, str):
+            print(error.code, file=sys.stderr)
+        code = error.code if isinstance(error.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+@contextmanager
+def _passed_on(child: int) -> Iterator[None]:
+    """Context in which whoever stops this process stops its child."""
+
+    def stop(number: int, frame: object) -> None:
+        os.kill(child, number)
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
