@@ -29,14 +29,14 @@ from .syntax import Import, Source, read
 
 PACKAGE = Path(__file__).parents[2]
 
-CARRIED = {
+NOT_COUNTED = {
     ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
     ("safe_io/inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
     ("safe_io/processes.py", "psutil"): "it says which processes live",
     ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
     ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
-    ("mesh/formats.py", "meshio"): "so do the meshes between two stages; where a study's own file is read it counts",
+    ("mesh/formats.py", "meshio"): "as of the store; `mesh_file_closure` counts it where a study's own file is read",
     ("units.py", "pint"): "what a study says with units is in the parameters as numbers",
 }
 """Packages that modules use and that no result depends on, and why."""
@@ -78,7 +78,7 @@ class Code:
         self.package = package
         self._known: dict[str, list[Any]] = {}
         self._sources: dict[Path, Source] = {}
-        self._closures: dict[tuple[Path, frozenset[Path], bool], Closure] = {}
+        self._closures: dict[tuple[Path, frozenset[Path], str], Closure] = {}
         self._taken: dict[Path, tuple[set[Path], set[tuple[str, str]]]] = {}
 
     @property
@@ -114,7 +114,7 @@ class Code:
         if not read_now.keys() <= self._known.keys():
             checked_json.write(path, {"reader": READER, "sources": read_now})
 
-    def closure(self, start: Path, without: frozenset[Path] = frozenset(), carried: bool = True) -> Closure:
+    def closure(self, start: Path, without: frozenset[Path] = frozenset(), counted: str = "") -> Closure:
         """A file and all that it imports, directly or not.
 
         Parameters
@@ -122,14 +122,14 @@ class Code:
         start : Path
         without : frozenset of Path, optional
             Files that are left out, with what they alone import.
-        carried : bool, optional
-            Whether packages of `CARRIED` are left out.
+        counted : str, optional
+            Package of `NOT_COUNTED` that counts here.
 
         Returns
         -------
         Closure
         """
-        known = start, without, carried
+        known = start, without, counted
         if known not in self._closures:
             found: set[Path] = set()
             packages: set[str] = set()
@@ -141,7 +141,9 @@ class Code:
                     self._taken[path] = self._imported(path, self._source(path).imports)
                 files, taken = self._taken[path]
                 waiting |= files - found - without
-                packages |= {package for place, package in taken if not (carried and (place, package) in CARRIED)}
+                packages |= {
+                    package for place, package in taken if package == counted or (place, package) not in NOT_COUNTED
+                }
             self._closures[known] = self._closed(found, packages)
         return self._closures[known]
 
@@ -192,7 +194,7 @@ class Code:
         return path.is_relative_to(self.package)
 
     def _imported(self, path: Path, imports: Iterable[Import]) -> tuple[set[Path], set[tuple[str, str]]]:
-        """Files that a file imports, and packages, each with the file as `CARRIED` names it."""
+        """Files that a file imports, and packages, each with the file as `NOT_COUNTED` names it."""
         files: set[Path] = set()
         packages: set[tuple[str, str]] = set()
         where = path.relative_to(self.package).as_posix() if self._has(path) else str(path)
@@ -325,8 +327,8 @@ def mesh_type_closure(name: str) -> Closure:
 
 
 def mesh_file_closure() -> Closure:
-    """What meshes from files are read by, the packages that read them included."""
-    return OURS.closure(_module("mesh.formats"), carried=False)
+    """What meshes from files are read by, meshio included."""
+    return OURS.closure(_module("mesh.formats"), counted="meshio")
 
 
 @cache
