@@ -117,12 +117,7 @@ class LogHandler(LogHandlerBase):
         return False
 
     def emit(self, record: LogRecord) -> None:
-        """Show a record.
-
-        Parameters
-        ----------
-        record : LogRecord
-        """
+        """Show a record."""
         try:
             self._show(record)
         except Exception:

@@ -25,12 +25,7 @@ OVERDUE = 0.2
 
 
 class Job:
-    """A job and how far it is.
-
-    Parameters
-    ----------
-    load : Load
-    """
+    """A job and how far it is."""
 
     def __init__(self, load: "Load") -> None:
         self.load = load
@@ -77,20 +72,7 @@ def _newer(path: Path, than: float) -> bool:
 
 
 class Display:
-    """The display of a run, from its beginning until `stop`.
-
-    Parameters
-    ----------
-    loads : dict of int to Load
-        What each job has to do, by the job's number.
-    cores : int
-    title : str
-        First line.
-    colourless : bool, optional
-        Whether it is to do without colours.
-    console : rich.console.Console, optional
-        Where it is shown; on stderr without.
-    """
+    """The display of a run, from its beginning until `stop`."""
 
     def __init__(
         self,

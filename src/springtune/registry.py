@@ -39,10 +39,6 @@ class Declared:
 
     Attributes
     ----------
-    name : str
-        Label in a study and in the dataset.
-    function : callable
-        What was declared.
     order : float
         Place among the others, the smallest first; those of one place are sorted by name.
     """
@@ -78,15 +74,7 @@ NAME_RULE = (
 
 
 class Registry(Mapping[str, Entry]):
-    """Read-only mapping from names to what was declared, in order; the modules of a package are read when needed.
-
-    Parameters
-    ----------
-    package : str
-        Package whose modules declare entries.
-    what : str
-        What an entry is, for messages.
-    """
+    """Read-only mapping from names to what was declared, in order; the modules of a package are read when needed."""
 
     def __init__(self, package: str, what: str):
         self._package, self._what = package, what
@@ -98,11 +86,6 @@ class Registry(Mapping[str, Entry]):
 
         A function that is declared once more from the same place, as when a cell of a notebook runs again, replaces
         the former one.
-
-        Raises
-        ------
-        ValueError
-            If another function has the name, or the entry cannot be one.
         """
         if not (isinstance(entry.name, str) and NAME.fullmatch(entry.name)):
             raise ValueError(f"{self._what}: {entry.name!r} cannot name one; {NAME_RULE}")

@@ -20,15 +20,6 @@ if TYPE_CHECKING:
 class Kind:
     """A kind of quantity.
 
-    Attributes
-    ----------
-    name : str
-        E.g. ``"length"``.
-    unit : str
-        Its SI unit, in which numbers are returned.
-    example : str
-        A quantity to show in messages.
-
     Examples
     --------
     >>> QUANTITY_KINDS["stress"].unit
@@ -104,23 +95,6 @@ class UnitError(ValueError):
 
 def parse(text: str, kind: str) -> float:
     """Number in SI units of a quantity.
-
-    Parameters
-    ----------
-    text : str
-        Number and unit, e.g. ``"200 mm"``.
-    kind : str
-        Key of `QUANTITY_KINDS`.
-
-    Returns
-    -------
-    float
-        In the kind's SI unit, correctly rounded: ``"5 mm"``, ``"0.5 cm"`` and ``"0.005 m"`` are one number.
-
-    Raises
-    ------
-    UnitError
-        If the text has no number, no unit, or one of another kind of quantity.
 
     Examples
     --------

@@ -63,12 +63,7 @@ COMPLETION = "_SPRINGTUNE_COMPLETE"
 
 
 class Shown(io.TextIOBase):
-    """Stream on which control characters but line breaks and tabs are shown, whoever prints them.
-
-    Parameters
-    ----------
-    stream : text stream
-    """
+    """Stream on which control characters but line breaks and tabs are shown, whoever prints them."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

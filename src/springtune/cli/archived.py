@@ -17,21 +17,7 @@ TOLD = 20
 
 
 def verified(path: Path, again: bool, fresh: bool) -> bool:
-    """Tell of an archive.
-
-    Parameters
-    ----------
-    path : Path
-    again : bool
-        Whether to compute it again.
-    fresh : bool
-        Whether to do so in a new environment in any case.
-
-    Returns
-    -------
-    bool
-        Whether it is as it was packed, and came out the same.
-    """
+    """Tell of an archive."""
     from ..studies.archive.reproduction import ReproductionError, check, reproduce
 
     try:

@@ -33,19 +33,7 @@ class Trouble(click.ClickException):
 
 
 def tolerance(context: click.Context, parameter: click.Parameter, given: str | None) -> float | None:
-    """A tolerance of its text: a finite number, not below zero.
-
-    Parameters
-    ----------
-    context : click.Context
-    parameter : click.Parameter
-    given : str or None
-
-    Returns
-    -------
-    float or None
-        None where none is given.
-    """
+    """A tolerance of its text: a finite number, not below zero."""
     if given is None:
         return None
     try:
@@ -127,22 +115,7 @@ def diff(
 
 @contextmanager
 def opened(path: Path) -> "Iterator[xr.DataTree]":
-    """Open a dataset, or expected values, in a context.
-
-    Parameters
-    ----------
-    path : Path
-
-    Yields
-    ------
-    xarray.DataTree
-
-    Raises
-    ------
-    OSError
-    ValueError
-        If it is neither.
-    """
+    """Open a dataset, or expected values, in a context."""
     from ..studies.output import expected, reading
 
     if path.suffix == ".yaml":
@@ -159,24 +132,7 @@ def opened(path: Path) -> "Iterator[xr.DataTree]":
 def comparison_text(
     found: "Comparison", paths: Sequence[Path], sides: Sequence[str], most: int | None = ROWS, config: bool = False
 ) -> str:
-    """What changed, as text.
-
-    Parameters
-    ----------
-    found : Comparison
-    paths : sequence of Path
-        Of what was compared.
-    sides : sequence of str
-        What they are called.
-    most : int, optional
-        Rows of each table; None is all.
-    config : bool, optional
-        Whether to show the diff of the studies' files.
-
-    Returns
-    -------
-    str
-    """
+    """What changed, as text."""
     width = max(map(len, sides)) + 1
     head = [f"{f'{side}:':{width}} {path}" for side, path in zip(sides, paths)]
     parts = [[*head, _summary(found, sides)]]
@@ -338,20 +294,7 @@ def _difference(row: "Change") -> str:
 
 
 def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) -> dict[str, object]:
-    """A comparison as JSON has it.
-
-    Parameters
-    ----------
-    found : Comparison
-    paths : sequence of Path
-    config : bool, optional
-        Whether the diff of the studies' files is part of it.
-
-    Returns
-    -------
-    dict
-        Numbers that are none, or infinite, are None.
-    """
+    """A comparison as JSON has it."""
     return {
         "different": found.different,
         "before": str(paths[0]),

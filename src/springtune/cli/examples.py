@@ -4,16 +4,6 @@
 def examples(*lines: str) -> str:
     r"""Epilog of a command that shows how it is called.
 
-    Parameters
-    ----------
-    *lines : str
-        Commands as one types them.
-
-    Returns
-    -------
-    str
-        With the mark that keeps click from joining lines.
-
     Examples
     --------
     >>> examples("springtune definitions")

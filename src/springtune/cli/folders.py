@@ -15,23 +15,7 @@ DATASET = "dataset.nc"
 
 
 def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
-    """Studies with the folders of their results.
-
-    Parameters
-    ----------
-    given : Path or None
-        A study's YAML file, or the folder of its results; all folders in ``results`` without.
-
-    Yields
-    ------
-    study : Study
-    folder : Path
-
-    Raises
-    ------
-    click.ClickException
-        If there is no such folder, or no study of its name.
-    """
+    """Studies with the folders of their results."""
     from ..studies.kinds import load_study
     from ..studies.runs.locks import LockedError, check_claim, claimed
 
@@ -60,18 +44,7 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
 
 
 def idle(folder: Path) -> None:
-    """Refuse to remove anything under a run.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the study's results are.
-
-    Raises
-    ------
-    click.ClickException
-        If a process computes it.
-    """
+    """Refuse to remove anything under a run."""
     from ..studies.runs.locks import LockedError, is_held
 
     try:
@@ -81,23 +54,7 @@ def idle(folder: Path) -> None:
 
 
 def dataset_path(given: str) -> Path:
-    """Dataset of what a command is given.
-
-    Parameters
-    ----------
-    given : str
-        A dataset, the folder of a study's results, the study's YAML file, or its name; or a file of expected values.
-
-    Returns
-    -------
-    Path
-        The file; it may be damaged.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or it is of another study of that name.
-    """
+    """Dataset of what a command is given."""
     from ..studies.runs.locks import check_claim
 
     path = Path(given)

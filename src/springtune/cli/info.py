@@ -39,18 +39,7 @@ def info(path: Path) -> None:
 
 
 def info_text(tree: "xr.DataTree", path: Path) -> str:
-    """What a dataset holds, as text.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-    path : Path
-        Its file.
-
-    Returns
-    -------
-    str
-    """
+    """What a dataset holds, as text."""
     parts = [_head(tree, path)]
     ends = [line for node in tree.subtree for line in _ends(node)]
     parts += [["how it ended", *ends]] if ends else []

@@ -122,19 +122,7 @@ def _path(given: str) -> Path:
 
 
 def template_text(path: Path, template: str = TEMPLATE) -> str:
-    """Text of a study to begin with.
-
-    Parameters
-    ----------
-    path : Path
-        Where it is to be.
-    template : str, optional
-        `TEMPLATE` or `SHAPE_TEMPLATE`.
-
-    Returns
-    -------
-    str
-    """
+    """Text of a study to begin with."""
     from ..mesh import MESH_TYPES
 
     schema = _beside(path, SCHEMA)

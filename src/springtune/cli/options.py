@@ -147,13 +147,7 @@ def asked_size(beam: "Beam", mesh_type: str, size: str | None) -> float:
 
 
 def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "Mesh":
-    """Mesh of a type with edges of a length [m], or of the file of that name where there is no length.
-
-    Raises
-    ------
-    MeshError
-        If the file cannot be read, or does not mesh the beam once.
-    """
+    """Mesh of a type with edges of a length [m], or of the file of that name where there is no length."""
     from ..mesh import MESH_TYPES, read_beam_mesh
 
     if edge is not None:

@@ -28,21 +28,8 @@ def prediction_text(
 
     Parameters
     ----------
-    mesh_name : str
-        Such as ``"structured 2 mm"``.
-    about : dict
-        Its ``particles`` and ``springs``; no springs where it is too large to be made.
-    beam : Beam
-    material : Material
-    choices : list of Choice
-    known : dict
-        What `springtune.prediction.references` gave.
     sizes : list of float, optional
         Mesh sizes that bands are from [m]; none where the mesh itself was solved.
-
-    Returns
-    -------
-    str
     """
     from ..studies.output.text import aligned
 
@@ -91,18 +78,8 @@ def shape_text(
 
     Parameters
     ----------
-    mesh_name : str
-        Such as ``"free 2 mm"``.
-    about : dict
-        Its ``particles`` and ``springs``.
-    statement : ShapeStatement
-    choices : list of Choice
     known : dict
         What `springtune.prediction.shape_references` gave.
-
-    Returns
-    -------
-    str
     """
     from ..studies.output.text import aligned
 
@@ -142,39 +119,14 @@ def _unit(statement: "ShapeStatement", name: str) -> str:
 
 
 def search_text(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
-    """Text of a search for a mesh.
-
-    Parameters
-    ----------
-    beam : Beam
-    material : Material
-    search : MeshSearch
-    springs_alone : bool, optional
-        Whether springs with energies besides them are left out.
-
-    Returns
-    -------
-    str
-    """
+    """Text of a search for a mesh."""
     head = f"{beam.label}; {_body_text(beam, material)}"
     meaning = f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,"
     return _search_text(head, "under", meaning, search, springs_alone, material.density is not None)
 
 
 def shape_search_text(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
-    """Text of a search for a mesh of a shape.
-
-    Parameters
-    ----------
-    statement : ShapeStatement
-    search : MeshSearch
-    springs_alone : bool, optional
-        As of `search_text`.
-
-    Returns
-    -------
-    str
-    """
+    """Text of a search for a mesh of a shape."""
     head = f"{_shape_head(statement)}; {_made_of(statement)}"
     meaning = "Errors are (network - reference) / |reference| of each quantity, solved on each mesh,"
     dense = all(one.density is not None for one in statement.materials)
@@ -253,21 +205,7 @@ def prediction_json(
     known: "References",
     sizes: Sequence[float] = (),
 ) -> str:
-    """A prediction as JSON; numbers that are not there are null, and those of a band are lists of two.
-
-    Parameters
-    ----------
-    beam : Beam
-    material : Material
-    mesh : dict
-        Its ``type``, ``file``, ``size``, ``particles`` and ``springs``.
-    choices, known, sizes
-        As of `prediction_text`.
-
-    Returns
-    -------
-    str
-    """
+    """A prediction as JSON; numbers that are not there are null, and those of a band are lists of two."""
     first, plain = recommended(choices)
     return _json(
         _head_json(beam, material, known)
@@ -288,15 +226,8 @@ def shape_json(
 
     Parameters
     ----------
-    statement : ShapeStatement
-    mesh : dict
-        Its ``type``, ``file``, ``size``, ``particles`` and ``springs``.
     choices, known
         As of `shape_text`.
-
-    Returns
-    -------
-    str
     """
     first, plain = recommended(choices)
     return _json(
@@ -311,17 +242,7 @@ def shape_json(
 
 
 def search_json(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
-    """A search for a mesh as JSON; numbers that are not there are null.
-
-    Parameters
-    ----------
-    beam, material, search, springs_alone
-        As of `search_text`.
-
-    Returns
-    -------
-    str
-    """
+    """A search for a mesh as JSON; numbers that are not there are null."""
     return _json(_head_json(beam, material, cast("References", search.known)) | _found_json(search, springs_alone))
 
 
@@ -332,10 +253,6 @@ def shape_search_json(statement: "ShapeStatement", search: "MeshSearch", springs
     ----------
     statement, search, springs_alone
         As of `shape_search_text`.
-
-    Returns
-    -------
-    str
     """
     return _json(_shape_json(statement, cast("ShapeReferences", search.known)) | _found_json(search, springs_alone))
 
@@ -378,16 +295,7 @@ def _found_json(search: "MeshSearch", springs_alone: bool) -> dict[str, Any]:
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
-    """The first definition without a failure, and the first one that has springs alone; None where there is none.
-
-    Parameters
-    ----------
-    choices : list of Choice
-
-    Returns
-    -------
-    first, plain : str or None
-    """
+    """The first definition without a failure, and the first one that has springs alone; None where there is none."""
     solved = [choice for choice in choices if choice.worst < math.inf]
     plain = [choice for choice in solved if not choice.energies]
     return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
@@ -400,10 +308,6 @@ def size_text(size: float) -> str:
     ----------
     size : float
         [m]
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -54,22 +54,7 @@ def schema_text() -> str:
 
 
 def manual_text(frame: str) -> str:
-    """Manual of studies: the hand-written text around the generated tables stays.
-
-    Parameters
-    ----------
-    frame : str
-        The manual so far.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ValueError
-        If the marks around the generated part are missing.
-    """
+    """Manual of studies: the hand-written text around the generated tables stays."""
     before, begin, rest = frame.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

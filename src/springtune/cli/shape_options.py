@@ -42,16 +42,8 @@ def check_kind(shape: str | None, beam: str | None, of_shapes: tuple[str, ...]) 
 
     Parameters
     ----------
-    shape, beam : str or None
     of_shapes : tuple of str
         Parameters that are of shapes alone.
-
-    Raises
-    ------
-    ValueError
-        Names the option.
-    click.UsageError
-        If there is neither.
     """
     context = click.get_current_context()
     if shape is None and beam is None:
@@ -83,10 +75,6 @@ class AskedShape:
     part : Shapes
         What the study has of shapes.
     shape : Shape
-    load : str
-        Name of its load case.
-    materials : dict of str to Material
-        By part.
     size : float or None
         Length of an edge [m]; None where the mesh is that of a file.
     """
@@ -108,15 +96,7 @@ class AskedShape:
         return Path(self.shape.file).name if self.size is None else f"free {self.size_text}"
 
     def mesh(self) -> "GroupedMesh":
-        """The mesh, finer where the study says so.
-
-        Raises
-        ------
-        ValueError
-            If the shape cannot be meshed so; names the option.
-        MeshError
-            If the file cannot be read.
-        """
+        """The mesh, finer where the study says so."""
         from ..mesh.group_files import read_shape  # here, since studies are read without scipy
         from ..mesh.outlines import mesh_shape
 
@@ -138,20 +118,10 @@ def asked_shape(
 
     Parameters
     ----------
-    text : str
     load, material, density, size : str or None
         Of the options; a load or material may be left out where the study has but one for the shape.
     sized : bool, optional
         Whether a shape of an outline needs a size.
-
-    Returns
-    -------
-    AskedShape
-
-    Raises
-    ------
-    ValueError
-        Names the option, but for a study that is wrong in itself.
     """
     study, part, shape = _shape(text)
     if load is None and len(shape.loads) > 1:

@@ -167,21 +167,8 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
 
     Parameters
     ----------
-    asked : AskedShape
-    definition : str
     scale : float, optional
         Factor on the load [1].
-    stiffness : str, optional
-        For definitions that are told one.
-
-    Returns
-    -------
-    SpringNet
-
-    Raises
-    ------
-    ValueError
-        If the load moves a support, or an argument is wrong; the message names the option.
     """
     from ..handover.net import SpringNet
     from ..mechanics.statics import SingularError
@@ -208,19 +195,7 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
 
 
 def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:
-    """What was written, and how far off it is.
-
-    Parameters
-    ----------
-    net : SpringNet
-    written : iterable of Path
-    mujoco : int, optional
-        Version of MuJoCo that was asked for.
-
-    Returns
-    -------
-    str
-    """
+    """What was written, and how far off it is."""
     from ..handover.formats import for_mujoco
     from ..handover.mujoco import for_versions
 

@@ -49,9 +49,6 @@ class Content(NamedTuple):
     ----------
     arrays : dict of str to ndarray
         By the names of `ARRAYS`; those that a net does not have are left out.
-    energies : tuple of Terms
-    header : dict
-        Plain texts, numbers and dicts of them.
     """
 
     arrays: dict[str, np.ndarray]
@@ -60,28 +57,7 @@ class Content(NamedTuple):
 
 
 def write(path: str | Path, content: Content, mujoco: int | None = None) -> list[Path]:
-    """Write the content of a net in the format that the ending of a name says; files appear whole or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-        Ending in one of `ENDINGS` or `FOR_SIMULATORS`.
-    content : Content
-    mujoco : int, optional
-        Version of MuJoCo, for its files alone.
-
-    Returns
-    -------
-    list of Path
-        What was written, the file of that name first.
-
-    Raises
-    ------
-    ValueError
-        If the ending is another one, the folder is not there, or the version is of no such file or unknown.
-    OSError
-        If the file cannot be written.
-    """
+    """Write the content of a net in the format that the ending of a name says; files appear whole or not at all."""
     path = Path(path)
     check_target(path)
     form = _format_of(path)
@@ -95,24 +71,7 @@ def write(path: str | Path, content: Content, mujoco: int | None = None) -> list
 
 
 def read(path: str | Path) -> Content:
-    """Read the content of a net.
-
-    Parameters
-    ----------
-    path : str or Path
-        That `write` wrote.
-
-    Returns
-    -------
-    Content
-
-    Raises
-    ------
-    ValueError
-        If there is no such file, or it is not as springtune writes nets.
-    OSError
-        If the file cannot be read.
-    """
+    """Read the content of a net."""
     path = Path(path)
     form = _format_of(path)
     if not path.is_file():
@@ -131,16 +90,7 @@ def read(path: str | Path) -> Content:
 
 
 def check_target(path: str | Path) -> None:
-    """Refuse a name whose ending is no format of a net, or whose folder is not there.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse a name whose ending is no format of a net, or whose folder is not there."""
     _format_of(Path(path))
     check_folder(path)
 
@@ -239,17 +189,7 @@ TITLES = {
 
 
 def companions(path: Path) -> dict[str, Path]:
-    """Tables beside that of the springs, ``net.particles.csv`` and so on, by what they hold.
-
-    Parameters
-    ----------
-    path : Path
-        Of the springs, such as ``net.csv``.
-
-    Returns
-    -------
-    dict of str to Path
-    """
+    """Tables beside that of the springs, ``net.particles.csv`` and so on, by what they hold."""
     return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in ("particles", *CELL_ARRAYS.values())}
 
 
@@ -389,18 +329,7 @@ def _header_of(lines: Iterable[str]) -> dict[str, Any]:
 
 
 def as_json(content: Content) -> dict[str, Any]:
-    """Content of a net as JSON has it: lists, numbers, texts.
-
-    Parameters
-    ----------
-    content : Content
-
-    Returns
-    -------
-    dict
-        ``header``, the arrays by name, and ``energies``: a list of ``kind``, ``formula``, ``cells`` (the name of the
-        array that they stand in), ``units`` and ``values``.
-    """
+    """Content of a net as JSON has it: lists, numbers, texts."""
     return {
         "header": content.header,
         **{name: content.arrays[name].tolist() if name in content.arrays else None for name in ARRAYS},
@@ -465,12 +394,8 @@ def write_vtu_with(
 
     Parameters
     ----------
-    path : str or Path
-    content : Content
     of_particles : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
     of_springs : mapping of str to ndarray of float, shape (n_springs,)
-    numbers : mapping of str to float, optional
-        Field data besides those of the header.
     """
     arrays = content.arrays
     data = {new: arrays[old] for old, new in POINT_NAMES.items() if old in arrays}

@@ -44,23 +44,6 @@ LARGEST_ACCELERATION = 1e9
 def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
     """Model of a net for MuJoCo.
 
-    Parameters
-    ----------
-    net : Net
-    version : int, optional
-        Of MuJoCo, of `VERSIONS`. Springs alone are the same in all.
-
-    Returns
-    -------
-    str
-        XML. Opened as it is, it moves to its equilibrium, which is the keyframe ``predicted``.
-
-    Raises
-    ------
-    ValueError
-        If MuJoCo has no law of the net's energies, the net has no masses, linear kinematics or a load that turns, or
-        the version is another one.
-
     Examples
     --------
     >>> import springtune as st
@@ -123,19 +106,7 @@ def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
 
 
 def for_versions(energies: Sequence[Terms], version: int | None = None) -> str:
-    """Which versions of MuJoCo a file is for.
-
-    Parameters
-    ----------
-    energies : sequence of Terms
-        Of the net.
-    version : int, optional
-        That the file was asked for.
-
-    Returns
-    -------
-    str
-    """
+    """Which versions of MuJoCo a file is for."""
     if not energies:
         return f"for MuJoCo {' and '.join(map(str, VERSIONS))}: springs are the same in both"
     version = version or VERSIONS[-1]

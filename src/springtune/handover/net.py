@@ -330,16 +330,7 @@ class SpringNet:
 
 
 def content_of(net: SpringNet) -> Content:
-    """What the files of a net hold.
-
-    Parameters
-    ----------
-    net : SpringNet
-
-    Returns
-    -------
-    Content
-    """
+    """What the files of a net hold."""
     arrays = {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
     return Content(arrays, net.energies, net.header | {"thickness": float(net.thickness)})
 
@@ -349,18 +340,8 @@ def terms(energy: Energy, reference: float) -> Terms:
 
     Parameters
     ----------
-    energy : Energy
     reference : float
         Reference stiffness that its moduli are over [N/m].
-
-    Returns
-    -------
-    Terms
-
-    Raises
-    ------
-    DefinitionError
-        If it is of none of the kinds of `springtune.mechanics.energies`.
     """
     points, corners = energy.points, energy.corners
     values: dict[str, np.ndarray]
@@ -491,19 +472,7 @@ def _beam(beam: Beam) -> dict[str, Any]:
 
 
 def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
-    """Formula of a definition in words, and where it comes from.
-
-    Parameters
-    ----------
-    definition : Definition or OwnDefinition
-
-    Returns
-    -------
-    formula : str
-        First line of its function's docstring, which `springtune definitions` shows.
-    source : str
-        Docstring of its module, which has formula, source and assumptions; of a function of one's own its own.
-    """
+    """Formula of a definition in words, and where it comes from."""
     function = inspect.unwrap(definition.function)
     own = inspect.getdoc(function) or ""
     module = sys.modules.get(function.__module__)

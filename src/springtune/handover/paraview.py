@@ -27,7 +27,6 @@ def write_vtu(
 
     Parameters
     ----------
-    path : str or Path
     points : ndarray of float, shape (n_points, 2)
         [m]
     cells : mapping of int to ndarray of int, shape (n, corners)
@@ -36,10 +35,6 @@ def write_vtu(
         Vectors get a third component of zero, as ParaView wants them.
     cell_data : mapping of str to mapping of int to ndarray
         By name, and by the corners of the cells that have it; NaN on the others.
-    numbers : mapping of str to float, optional
-        Of the whole: the grid's field data.
-    comment : str, optional
-        For whoever opens the file with an editor.
     """
     import meshio
 
@@ -80,16 +75,7 @@ def write_vtu(
 
 
 def comment_of(path: str | Path) -> str:
-    """Comment of a file that `write_vtu` wrote; empty where it has none.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    str
-    """
+    """Comment of a file that `write_vtu` wrote; empty where it has none."""
     found = re.search(rb"<!--\n(.*?)\n--><UnstructuredGrid>", Path(path).read_bytes(), re.DOTALL)
     return found.group(1).decode() if found else ""
 
@@ -107,11 +93,6 @@ def series(path: str | Path) -> Iterator[Add]:
 
     ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none is, and those that a collection of
     that name had before, and has no more, are removed.
-
-    Parameters
-    ----------
-    path : str or Path
-        Ending in ``.pvd``.
 
     Yields
     ------
@@ -161,16 +142,7 @@ def series(path: str | Path) -> Iterator[Add]:
 
 
 def pieces_of(path: str | Path) -> list[Path]:
-    """A collection that `series` wrote and the files that it names; none where there is no such file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    list of Path
-    """
+    """A collection that `series` wrote and the files that it names; none where there is no such file."""
     path = Path(path)
     if not path.is_file():
         return []

@@ -75,8 +75,6 @@ class Simulation:
         than the lowest one under its own critical damping: under small loads it is that.
     displacements : ndarray of float, shape (n_points, 2), or None
         Equilibrium under the load [m]; None where there is none that is stable.
-    why : str
-        Why there is none; empty where there is one.
     """
 
     masses: np.ndarray
@@ -92,24 +90,6 @@ class Simulation:
 
 def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     """What a simulator is told of a net besides its springs.
-
-    Parameters
-    ----------
-    net : Net
-    program : str
-        Name of the simulator, for messages.
-    laws : iterable of str, optional
-        Kinds of energies besides springs that it has, of `springtune.handover.terms.FORMULAS`.
-
-    Returns
-    -------
-    Simulation
-
-    Raises
-    ------
-    ValueError
-        If the net has energies that the simulator lacks, no masses, linear kinematics or a load that turns; the message
-        says what to take instead.
 
     Notes
     -----
@@ -170,16 +150,7 @@ def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
 
 
 def load_in_words(load: Mapping[str, Any]) -> str:
-    """Load of a header, with its size: the force on a beam, the factor on a load case of a shape.
-
-    Parameters
-    ----------
-    load : dict
-
-    Returns
-    -------
-    str
-    """
+    """Load of a header, with its size: the force on a beam, the factor on a load case of a shape."""
     if "force" in load:
         return f"{load['name']} of {abs(load['force']):g} N"
     return load["name"] + ("" if load["scale"] == 1 else f" times {load['scale']:g}")
@@ -260,19 +231,7 @@ def _network(net: Net, reference: float) -> Network:
 
 
 def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
-    """Lines that say in a file what it is of: definition, material, load, expected errors, and its step.
-
-    Parameters
-    ----------
-    net : Net
-    simulation : Simulation
-    integrator : str
-        What is said of the step that the file has.
-
-    Returns
-    -------
-    list of str
-    """
+    """Lines that say in a file what it is of: definition, material, load, expected errors, and its step."""
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
     constants = ""

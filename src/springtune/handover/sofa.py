@@ -36,14 +36,7 @@ PLUGINS = (
 
 
 class Component(NamedTuple):
-    """A component of a scene.
-
-    Attributes
-    ----------
-    name : str
-        Of its class.
-    data : mapping of str to str
-    """
+    """A component of a scene."""
 
     name: str
     data: Mapping[str, str]
@@ -56,8 +49,6 @@ class SofaScene(NamedTuple):
     ----------
     step : float
         [s]
-    about : list of str
-        What the scene is of.
     root, sheet, predicted : list of Component
         Of the three nodes; the sheet's first two are the integrator, whose class goes by the version, and its solver.
     """
@@ -71,19 +62,6 @@ class SofaScene(NamedTuple):
 
 def sofa_xml(net: Net) -> str:
     """Scene of a net for SOFA v24.06 to v25.12, as XML.
-
-    Parameters
-    ----------
-    net : Net
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ValueError
-        If the net has energies, no masses, linear kinematics or a load that turns.
 
     Examples
     --------
@@ -154,11 +132,6 @@ def sofa_python(net: Net) -> str:
     """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python.
 
     Parameters and errors as of `sofa_xml`.
-
-    Returns
-    -------
-    str
-        Python with a function ``createScene``.
     """
     scene = _scene(net)
     said = "\n".join(f"# {line}" for line in scene.about)

@@ -44,8 +44,6 @@ class Terms:
 
     Attributes
     ----------
-    kind : str
-        Key of `FORMULAS`, such as ``"area"``.
     cells : ndarray of int, shape (n_cells, n_corners)
         Particles of each cell, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
     values : dict of str to ndarray of float, shape (n_cells,) or (n_cells, n_corners)

@@ -23,49 +23,13 @@ FRAMES = 50
 def write_springs(
     path: str | Path, scene: Scene, springs: Springs, *, mujoco: int | None = None, **options: Any
 ) -> list[Path]:
-    """Write springs of a scene, see `springtune.handover.net.SpringNet.write`.
-
-    Parameters
-    ----------
-    path : str or Path
-    scene : Scene
-    springs : Springs
-        The scene's, or others on its mesh.
-    mujoco : int, optional
-        Version of MuJoCo that its file is for.
-    **options
-        As `springtune.handover.net.SpringNet.from_scene` takes them.
-
-    Returns
-    -------
-    list of Path
-        What was written.
-    """
+    """Write springs of a scene, see `springtune.handover.net.SpringNet.write`."""
     check_target(path)
     return SpringNet.from_scene(scene, springs=springs, **options).write(path, mujoco=mujoco)
 
 
 def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path]:
-    """Write a deformed network, or the path to it, for ParaView; see `springtune.Result.write`.
-
-    Parameters
-    ----------
-    path : str or Path
-    result : Result
-    steps : int, optional
-        Steps of a path.
-
-    Returns
-    -------
-    list of Path
-        What was written.
-
-    Raises
-    ------
-    ValueError
-        If the name has another ending, its folder is not there, there is no equilibrium to write, or none at a step of
-        the path.
-    """
+    """Write a deformed network, or the path to it, for ParaView; see `springtune.Result.write`."""
     path, scene = Path(path), result.scene
     if path.suffix.lower() not in (".vtu", ".pvd"):
         raise ValueError(
@@ -102,27 +66,7 @@ def write_motion(
     frames: int = FRAMES,
     **options: Any,
 ) -> Run:
-    """Move a scene and write it as it moves, for ParaView; see `springtune.Scene.write_motion`.
-
-    Parameters
-    ----------
-    path : str or Path
-    scene : Scene
-    motion : Motion
-    integrator, step, steps, **options
-        As `springtune.mechanics.dynamics.Motion.run` takes them.
-    frames : int, optional
-
-    Returns
-    -------
-    Run
-
-    Raises
-    ------
-    ValueError
-        If the name does not end in ``.pvd``, its folder is not there, a number is out of its range, or the motion came
-        to nothing.
-    """
+    """Move a scene and write it as it moves, for ParaView; see `springtune.Scene.write_motion`."""
     path = Path(path)
     if path.suffix.lower() != ".pvd":
         raise ValueError(f"{path}: '{path.suffix}' is no format of a motion; give a name ending in .pvd")

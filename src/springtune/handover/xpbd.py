@@ -29,21 +29,6 @@ CONTENT = {
 def xpbd(net: Net) -> str:
     """Particles and distance constraints of a net for XPBD.
 
-    Parameters
-    ----------
-    net : Net
-
-    Returns
-    -------
-    str
-        JSON: ``header``, ``content``, which says what all else is, and the entries of `CONTENT`.
-
-    Raises
-    ------
-    ValueError
-        If springs have a negative stiffness, or the net has energies, no masses, linear kinematics or a load that
-        turns.
-
     Examples
     --------
     >>> import springtune as st

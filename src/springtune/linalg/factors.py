@@ -27,25 +27,13 @@ class SingularError(ArithmeticError):
 
 
 class Factor(Protocol):
-    """What solves systems of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`.
-
-    Attributes
-    ----------
-    name : str
-        One of `springtune.linalg.SOLVERS`.
-    """
+    """What solves systems of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`."""
 
     name: str
 
     @property
     def negative_pivots(self) -> int:
-        """Number of negative eigenvalues of the matrix; 0 where it is positive definite.
-
-        Raises
-        ------
-        SingularError
-            If they cannot be told.
-        """
+        """Number of negative eigenvalues of the matrix; 0 where it is positive definite."""
         ...
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -77,14 +65,6 @@ class SuperLUFactor:
     Parameters
     ----------
     matrix : csc_array, shape (unknowns, unknowns)
-    order : ndarray of int, optional
-        Unknowns in the order in which the matrix has them, which is that of elimination; SuperLU's own (minimum degree)
-        without.
-
-    Raises
-    ------
-    SingularError
-        If it is singular.
 
     Examples
     --------
@@ -120,13 +100,7 @@ class SuperLUFactor:
 
     @cached_property
     def negative_pivots(self) -> int:
-        """Number of negative eigenvalues of the matrix (Sylvester's law of inertia).
-
-        Raises
-        ------
-        SingularError
-            If a pivot on the diagonal is zero and the factorization went beside it: its signs then say nothing.
-        """
+        """Number of negative eigenvalues of the matrix (Sylvester's law of inertia)."""
         if (self._lu.perm_r != self._lu.perm_c).any():
             raise SingularError("a zero pivot")
         return int((self._lu.U.diagonal() < 0).sum())
@@ -137,13 +111,6 @@ class Analysis:
 
     Method: supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22,
     2008).
-
-    Parameters
-    ----------
-    indices, pointers : ndarray of int
-        Rows of the entries of each column, ascending, and column pointers, as in `scipy.sparse.csc_array`.
-    order : ndarray of int, optional
-        Order of elimination; CHOLMOD's own (minimum degree) without.
 
     Attributes
     ----------
@@ -170,10 +137,6 @@ class Analysis:
         Parameters
         ----------
         data : ndarray of float, shape (n_entries,)
-
-        Returns
-        -------
-        CholeskyFactor or None
         """
         from cvxopt import cholmod, matrix
 
@@ -193,17 +156,7 @@ class Analysis:
 
 
 class CholeskyFactor:
-    """A factorized positive definite matrix, see `Factor`; made by `Analysis.factorize`.
-
-    Parameters
-    ----------
-    factor : object
-        CHOLMOD's.
-    spare : list
-        Where it goes when nobody needs it any more.
-    size : int
-        Number of unknowns.
-    """
+    """A factorized positive definite matrix, see `Factor`; made by `Analysis.factorize`."""
 
     name = "Cholesky"
     negative_pivots = 0
@@ -257,18 +210,6 @@ def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | Cho
     Parameters
     ----------
     matrix : sparse array, shape (n, n)
-    solver : str, optional
-        ``"Cholesky"`` or ``"SuperLU"``; by what is installed otherwise. What is not positive definite is factorized by
-        SuperLU all the same.
-
-    Returns
-    -------
-    SuperLUFactor or CholeskyFactor
-
-    Raises
-    ------
-    SingularError
-        If it is singular.
 
     Examples
     --------

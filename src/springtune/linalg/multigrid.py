@@ -73,11 +73,6 @@ class Multigrid:
         Particles [m].
     places : ndarray of int, shape (unknowns,)
         Direction that each unknown is of: twice the number of its particle, plus 1 for y.
-    otherwise : callable, optional
-        Makes the factor that takes over where conjugate gradients do not end, or meet a direction without stiffness;
-        that is an error without.
-    like : Multigrid, optional
-        Of a matrix that differs little, such as that at rest: its grids serve as long as they do.
 
     Attributes
     ----------
@@ -177,15 +172,6 @@ class Multigrid:
         Returns
         -------
         ndarray of float, shape (unknowns,)
-
-        Raises
-        ------
-        IndefiniteError
-            If a direction without stiffness is met, and there is no factor that takes over.
-        NotPositiveError
-            If it does not end, likewise.
-        SingularError
-            If a particle moves without any stiffness, whatever would take over.
         """
         if self._direct is None:
             try:

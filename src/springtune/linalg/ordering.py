@@ -74,8 +74,6 @@ def narrow(count: int, edges: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    count : int
-        Number of particles.
     edges : ndarray of int, shape (n_edges, 2)
 
     Returns
@@ -107,8 +105,6 @@ def spread(points: np.ndarray, count: int) -> np.ndarray:
     ----------
     points : ndarray of float, shape (n_points, 2)
         [m]
-    count : int
-        Number of parts, a power of 2.
 
     Returns
     -------

@@ -40,22 +40,8 @@ class PinnedFactor:
     ----------
     matrix : csc_array, shape (unknowns, unknowns)
         Symmetric.
-    factor : CholeskyFactor
-        Of the matrix with pins.
     pins : ndarray of int, shape (n_pins,)
         Unknowns that are pinned.
-    stiffness : float
-        That of each pin.
-
-    Attributes
-    ----------
-    negative_pivots : int
-        Number of negative eigenvalues of the matrix.
-
-    Raises
-    ------
-    UncertainError
-        If it is not certain: an eigenvalue of the matrix is as near to zero as the factor is exact.
     """
 
     name = "pinned Cholesky"
@@ -106,15 +92,6 @@ def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np
     ----------
     matrix : csc_array, shape (unknowns, unknowns)
         Symmetric, its rows ascending within columns, with all entries of its diagonal.
-    analysis : Analysis
-        Of its sparsity.
-    choices : sequence of ndarray of int
-        Unknowns to pin: each of these in turn, until what is pinned is positive definite.
-
-    Returns
-    -------
-    PinnedFactor or None
-        None where no choice holds it, or where it is too near to singular to count its negative eigenvalues.
 
     Examples
     --------

@@ -13,11 +13,6 @@ def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     Of springs it is the closed form ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66 whatever their
     stiffness; an upper bound of `springtune.mechanics.moduli.outline_stiffness`, which a lattice attains.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    springs : Springs
-
     Returns
     -------
     ndarray of float, shape (3, 3)

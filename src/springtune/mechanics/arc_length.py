@@ -53,18 +53,12 @@ def follow(
 
     Parameters
     ----------
-    problem : StaticProblem
     s : float
         Force over the reference stiffness at which it ends [m].
     increment : float
         First and largest length of an increment, norm of the displacements of all unknowns [m].
-    most_points : int, optional
     limit : float, optional
         Largest norm of the displacements; the path ends there [m].
-
-    Returns
-    -------
-    Path
 
     Examples
     --------
@@ -131,7 +125,6 @@ def buckling(problem: StaticProblem, guess: float) -> Buckling:
 
     Parameters
     ----------
-    problem : StaticProblem
     guess : float
         A load of its magnitude and sign [m].
 
@@ -208,18 +201,10 @@ def smallest_share(
 
     Parameters
     ----------
-    network : Network
     first, second : ndarray of float, shape (n_points, 2)
         Displacements [m]; None at rest.
-    factor : Factor, optional
-        First tangent factorized.
     mirror : ndarray of float, shape (n_points, 2), optional
         As far before the first as the second is beyond it [m]: tangents then change as they do at the first.
-
-    Returns
-    -------
-    float
-        Infinite where there is no such place.
     """
     here, there = network.tangent(first), network.tangent(second)
     change = here - there if mirror is None else 0.5 * (network.tangent(mirror) - there)

@@ -105,17 +105,12 @@ class Body:
 
     Parameters
     ----------
-    network : Network
     reference : float
         Reference stiffness of the network [N/m].
     forces : ndarray of float, shape (n_points, 2), optional
         Dead forces at full load [N].
-    pressure : FollowerPressure, optional
-        Pressure that follows a side; it comes with `force`.
     force : float, optional
         Its total force at full load [N], positive outwards.
-    moves_little : bool, optional
-        Whether its tangent at rest serves throughout: it is factorized once.
     prescribed : ndarray of float, shape (n_points, 2), optional
         Displacements of held directions at full load [m]; zero without.
     """
@@ -232,8 +227,6 @@ class _Sides:
         Of each edge: its start [m], unit vector, length [m] and unit normal out of the body.
     turn : ndarray of float
         Sine of the turn at the end of each edge, positive where the body has a corner that sticks out.
-    corners : ndarray of int
-        Particles of the outline.
     meeting : ndarray of float, shape (n_corners, 2, 2)
         Normals of the edges that meet at each corner.
     outward : ndarray of float, shape (n_corners, 2)
@@ -291,10 +284,6 @@ class Contact:
 
     Parameters
     ----------
-    bodies : list of Body
-    obstacles : list of Obstacle, optional
-    floor : bool, optional
-        Whether y = 0 may not be passed.
     size : float
         Mesh size, the unit of tolerances [m].
     friction : float, optional
@@ -324,10 +313,6 @@ class Contact:
 
         Where the edges of the other body turn towards the corner, it has to stay before the next ones as well; where
         they turn away and it is at their joint, that joint's own conditions hold it.
-
-        Returns
-        -------
-        Contacts
         """
         none = np.zeros(0, dtype=int)
         parts = [Contacts(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
@@ -444,11 +429,6 @@ class Contact:
         ----------
         first, smallest : float
             First and smallest load step [1].
-
-        Raises
-        ------
-        ContactError
-            Where no equilibrium is found; displacements are those of the last good step, at `share`.
         """
         step = first
         while self.share < 1.0:
@@ -474,11 +454,6 @@ class Contact:
         ----------
         share : float
             [1]
-
-        Returns
-        -------
-        int or None
-            Number of steps; None where it does not converge.
         """
         near = False
         for body in self.bodies:

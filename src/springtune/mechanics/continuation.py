@@ -71,10 +71,8 @@ def next_point(
 
     Parameters
     ----------
-    problem : Continued
     s : float
         A load, whose sign is the way the path begins [m].
-    last : Point
     direction : ndarray of float, shape (unknowns,), or None
         From the point before the last to it [m]; None at rest.
     length : float
@@ -84,7 +82,6 @@ def next_point(
 
     Returns
     -------
-    found : Point or None
     length : float
         Of its increment [m].
     """
@@ -153,7 +150,6 @@ def continued(
 
     Parameters
     ----------
-    problem : Continued
     load : float
         Of the equilibrium, over the reference stiffness [m].
     last, before : ndarray of float, shape (n_points, 2)
@@ -163,10 +159,6 @@ def continued(
     farthest : float, optional
         Length of an increment behind a limit point, norm of the displacements of all unknowns [m]; the path is not
         followed behind it without.
-
-    Returns
-    -------
-    Continuation
 
     Examples
     --------

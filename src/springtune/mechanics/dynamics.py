@@ -45,7 +45,6 @@ def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
 
     Parameters
     ----------
-    mesh : Mesh
     density : float
         [kg/m3]
     thickness : float
@@ -81,11 +80,6 @@ def rayleigh(ratios: tuple[float, float], frequencies: tuple[float, float]) -> t
     mass_damping, stiffness_damping : float
         alpha [1/s] and beta [s].
 
-    Raises
-    ------
-    ValueError
-        If the frequencies are equal, or the damping that comes out is negative: the run would gain energy.
-
     Examples
     --------
     >>> alpha, beta = rayleigh((0.02, 0.02), (10.0, 30.0))
@@ -117,7 +111,6 @@ class Run:
         done), ``"diverged"`` or ``"inverted"``.
     message : str
         What went wrong and what to do; empty where nothing did.
-    steps : int
     time : float
         [s]
     residual : float
@@ -144,7 +137,6 @@ class Motion:
 
     Parameters
     ----------
-    network : Network
     inertia : ndarray of float, shape (n_points,)
         Mass of each particle over the reference stiffness [s2].
     load : ndarray of float, shape (n_points, 2), optional
@@ -154,13 +146,6 @@ class Motion:
     dampers : ndarray of float, shape (n_springs,), optional
         Damping of each spring along its direction over the reference stiffness [s]; ``beta * network.stiffness`` is
         damping in proportion to the springs' stiffness.
-    linear : bool, optional
-        Whether the network has linear kinematics.
-
-    Raises
-    ------
-    ValueError
-        If a particle that can move has no mass, or a damping is negative.
 
     Examples
     --------
@@ -252,11 +237,6 @@ class Motion:
         :math:`4 M - 2 h C - h^2 K` has no negative eigenvalue; for one mode of damping ratio xi that is
         :math:`(2/\omega)(\sqrt{1 + \xi^2} - \xi)`.
 
-        Parameters
-        ----------
-        integrator : str
-            One of `INTEGRATORS`.
-
         Returns
         -------
         float
@@ -287,11 +267,6 @@ class Motion:
 
         By Lanczos' method from that answer, which a symmetric load keeps among the modes that it excites; one
         factorization.
-
-        Raises
-        ------
-        ValueError
-            If there is no load.
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
@@ -359,36 +334,12 @@ class Motion:
 
         Parameters
         ----------
-        integrator : str or BackwardEuler
-            One of `INTEGRATORS`, ``backward-euler`` also with options.
         step : float
             [s]
-        steps : int
-            At most so many.
         start, velocities : ndarray of float, shape (n_points, 2), optional
             Where it starts [m], [m/s]; at rest without.
-        rest : float, optional
-            Ends the run where the out-of-balance force is at most this share of the load, and the particles are as
-            slow; it goes on without. Whether the equilibrium is stable is judged by the tangent there: loads as near to
-            a critical one as the run is to balance may be misjudged.
-        sample : int, optional
-            Steps between samples of energy and momentum; none without.
         watch : callable, optional
             Told time [s], displacements [m] and velocities [m/s], shape (n_points, 2), with every sample.
-        precision : str, optional
-            ``"float64"`` or ``"float32"``, of explicit schemes.
-        threads : int, optional
-            At most so many, of explicit schemes; networks with energies move in one. The numbers are the same for any.
-
-        Returns
-        -------
-        Run
-
-        Raises
-        ------
-        ValueError
-            If there is no such integrator or precision, the step is not above zero, or the scheme or the network has no
-            steps in single precision or in threads.
         """
         name = "backward-euler" if isinstance(integrator, BackwardEuler) else integrator
         if name not in INTEGRATORS:
@@ -488,13 +439,6 @@ class Motion:
         ----------
         displacements : ndarray of float, shape (n_points, 2)
             [m]
-
-        Returns
-        -------
-        status : str
-            ``"rest"`` or ``"unstable"``.
-        message : str
-            Why it is unstable, or was not checked, or that it lies behind a snap; else empty.
         """
         network = self.network
         if free_motion(network.mesh.points, network.held):
@@ -559,18 +503,8 @@ def relax(
 
     Parameters
     ----------
-    network : Network
     load : ndarray of float, shape (n_points, 2)
         Force on each particle over the reference stiffness [m].
-    linear : bool, optional
-    tolerance : float, optional
-        Out-of-balance force over the load at which it ends.
-    max_steps : int, optional
-
-    Returns
-    -------
-    Run
-        Its time and velocities are those of the made-up masses.
     """
     # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
     inertia = 0.3 * network.local_stiffness.max(axis=1, initial=0.0, where=~network.held)

@@ -133,8 +133,6 @@ class AreaEnergy(Energy):
 
     Parameters
     ----------
-    points, corners
-        As in `Energy`.
     modulus : ndarray of float, shape (n_cells,)
         Modulus kappa over the reference stiffness [1].
     """
@@ -189,8 +187,6 @@ class AngleEnergy(Energy):
 
     Parameters
     ----------
-    points, corners
-        As in `Energy`; triangles.
     modulus : ndarray of float, shape (n_cells,)
         Modulus beta over the reference stiffness [m2].
     """
@@ -262,8 +258,6 @@ class BiquadraticEnergy(Energy):
 
     Parameters
     ----------
-    points, corners
-        As in `Energy`; triangles.
     tensile : ndarray of float, shape (n_cells, 3)
         Stiffnesses k_i over the reference stiffness [1/m2].
     coupling : ndarray of float, shape (n_cells, 3), or None
@@ -428,8 +422,6 @@ class YeohEnergy(_SheetEnergy):
 
     Parameters
     ----------
-    points, corners
-        As in `Energy`; triangles.
     coefficients : ndarray of float, shape (n_cells, n)
         Coefficients times the thickness over the reference stiffness [1], from the linear one on.
     largest : float or ndarray of float, shape (n_cells,), optional
@@ -500,8 +492,6 @@ class NeoHookeEnergy(_SheetEnergy):
 
     Parameters
     ----------
-    points, corners
-        As in `Energy`; triangles.
     shear, bulk : ndarray of float, shape (n_cells,)
         Shear modulus mu and bulk modulus K at small strain times the thickness over the reference stiffness [1].
     """

@@ -33,20 +33,12 @@ class Expansion:
 
     Parameters
     ----------
-    network : Network
     load : ndarray of float, shape (unknowns,)
         Load pattern [1].
     s : float
         Force over the reference stiffness at the point [m].
     displacements : ndarray of float, shape (n_points, 2), or None
         Equilibrium at the point [m]; None at rest.
-    factor : Factor
-        Tangent factorized there.
-    order : int, optional
-    turning : bool, optional
-        Whether the parameter is the way along the path.
-    rough : bool, optional
-        Whether Newton's method corrects what is left of a solve.
 
     Attributes
     ----------
@@ -199,17 +191,10 @@ class Expansion:
     def reach(self, sign: float) -> tuple[float, bool]:
         """How far the series is good to start a solve, 0 where it is not; and whether the load turns there.
 
-        Parameters
-        ----------
-        sign : float
-            1 towards larger parameters, -1 towards smaller ones.
-
         Returns
         -------
         sigma : float
             Parameter [m].
-        turns : bool
-            Whether the load is largest there: a limit point of the path.
         """
         if not np.isfinite(self._products).all():  # next to a singular point
             return 0.0, False

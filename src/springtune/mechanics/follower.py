@@ -16,7 +16,6 @@ class FollowerPressure:
 
     Parameters
     ----------
-    mesh : Mesh
     edges : ndarray of int, shape (n, 2)
         Edges of the outline, the body to the left; of one side or of several.
     pressure : float or ndarray of float, shape (n,)
@@ -37,15 +36,8 @@ class FollowerPressure:
 
         Parameters
         ----------
-        mesh : Mesh
         edges : ndarray of int, shape (n, 2)
             Edges of the side, either way round.
-        axis : int
-            Axis along the side; the force is along the other one.
-
-        Returns
-        -------
-        FollowerPressure
         """
         along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
         wanted = 1 if axis == 0 else -1

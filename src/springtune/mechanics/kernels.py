@@ -151,9 +151,6 @@ def advance_springs(
 
     Parameters
     ----------
-    thread : int
-    pointers : ndarray of int, shape (n_points + 1,)
-        First spring of each particle, to particles of larger numbers.
     first, second : ndarray of int, shape (n_springs,)
         Ends of the springs, in ascending order.
     rest : ndarray, shape (2, n_springs)
@@ -164,18 +161,12 @@ def advance_springs(
         g [s-1] and load [m].
     keep, step : float
         d [1] and step [s].
-    size, bandwidth : int
-        Particles of a block, largest difference between the numbers of a spring's ends.
     force : ndarray, shape (n_points, 2)
         Loads, and loads again at the end [m].
     room : ndarray, shape (4, most springs of a block)
         Of the thread, for what is between the loops.
     u, v : ndarray, shape (1, n_points, 2)
         State [m, m/s].
-    steps, depth : int
-        All of them, and those of a pass.
-    progress : ndarray of int64, shape (n_threads + 1, STRIDE)
-        Blocks that each thread has done, zeros; the last row is not zero where a thread has failed.
     """
     u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
     ax, ay, bx, by = room[0], room[1], room[2], room[3]
@@ -243,22 +234,11 @@ def advance_matrix(
 
     Parameters
     ----------
-    thread : int
-    pointers, indices : ndarray of int
-        Sparsity of both.
     stiffness, dampers : ndarray, shape (n_entries,)
         Entries [1] and [s]; no dampers have length 0.
     gain, load : ndarray, shape (unknowns,)
-    keep, step, size : float or int
-        As of `advance_springs`, blocks being of unknowns.
-    bandwidth : int
-        Largest difference between the row and the column of an entry.
     u, v : ndarray, shape (2, unknowns) and (1 or 2, unknowns)
         State, from one to the other in turns where there are two: v needs two if there are dampers.
-    steps, depth : int
-        All of them, and those of a pass.
-    progress : ndarray of int64, shape (n_threads + 1, STRIDE)
-        As of `advance_springs`.
     """
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
     blocks, distance = _passes(count, size, depth, bandwidth)

@@ -38,8 +38,6 @@ class Elastic(Protocol):
     ----------
     relative : ndarray of float, shape (n_springs,)
         Stiffness over the reference stiffness [1].
-    energies : tuple of Energy
-        Energies besides the springs'.
     lateral : float
         Pull on the faces over the axial stress [1]; 0 for springs that need none.
     """
@@ -58,17 +56,7 @@ class Elastic(Protocol):
 
 
 def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Particles of the left and of the right end, straight or staggered: of outline edges that lie on neither face.
-
-    Parameters
-    ----------
-    mesh : Mesh
-
-    Returns
-    -------
-    left, right : ndarray of int
-        Ascending.
-    """
+    """Particles of the left and of the right end, straight or staggered: of outline edges that lie on neither face."""
     y = mesh.points[:, 1]
     tolerance = 1e-9 * np.ptp(y)
     edges = mesh.edges[mesh.on_outline]
@@ -102,14 +90,6 @@ def strip_fault(mesh: Mesh) -> str:
 
     An even strain is what a continuum has between the ends alone where the mesh is a strip: between a straight lower
     and a straight upper face, of one length at every height, without a hole. Staggered ends are fine.
-
-    Parameters
-    ----------
-    mesh : Mesh
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -151,19 +131,10 @@ def _one_round(outline: np.ndarray, count: int) -> bool:
 def free_body(mesh: Mesh) -> np.ndarray:
     """Directions to hold so that a body cannot move as a whole and is free otherwise.
 
-    Parameters
-    ----------
-    mesh : Mesh
-
     Returns
     -------
     ndarray of bool, shape (n_points, 2)
         Three are held, at two particles far from each other.
-
-    Raises
-    ------
-    MeshError
-        If the mesh has parts that no edge joins, or points without a cell.
     """
     parts = connected(mesh.edges, len(mesh.points)).max() + 1
     if parts > 1:
@@ -182,7 +153,6 @@ def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    mesh : Mesh
     displacements : ndarray of float, shape (n_points, 2)
         [m]
 
@@ -204,10 +174,6 @@ def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
 
 class PatchTest:
     """Patch tests of many networks on one mesh, whose numbering of unknowns they share.
-
-    Parameters
-    ----------
-    mesh : Mesh
 
     Examples
     --------
@@ -319,24 +285,12 @@ def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
     What is no strip, see `strip_fault`, has no axis of its own: its moduli are means over all directions, see
     `isotropic_moduli`, of `outline_stiffness`.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    springs : Springs
-
     Returns
     -------
     young_modulus : float
         E t over the reference stiffness [1].
     poisson_ratio : float
         Mean transverse over mean axial strain, sign changed [1].
-
-    Raises
-    ------
-    SingularError
-        If the network is singular or unstable at rest.
-    MeshError
-        If the mesh is no strip and the springs go with a lateral stress.
 
     Examples
     --------
@@ -353,20 +307,10 @@ def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
 def shear_modulus(mesh: Mesh, springs: Elastic) -> float:
     """Shear modulus under even shear of the whole outline.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    springs : Springs
-
     Returns
     -------
     float
         G t over the reference stiffness [1].
-
-    Raises
-    ------
-    SingularError
-        If the network is singular or unstable at rest.
     """
     return PatchTest(mesh).shear(springs)
 
@@ -385,7 +329,6 @@ def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    mesh : Mesh
     stress : ndarray of float, shape (2, 2)
         [Pa]
 
@@ -411,20 +354,10 @@ def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     triangles it returns the material's own stiffness. A network relaxes inside. No test of the same mesh is stiffer
     (Hill's bounds): with `outline_compliance` it encloses what the network is under even loads of other kinds.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    springs : Springs
-
     Returns
     -------
     ndarray of float, shape (3, 3)
         Times the thickness, over the reference stiffness [1]; Voigt: xx, yy, shear angle xy.
-
-    Raises
-    ------
-    SingularError
-        If the network is singular or unstable at rest.
 
     Examples
     --------
@@ -451,22 +384,10 @@ def outline_compliance(mesh: Mesh, springs: Elastic) -> np.ndarray:
     Column by column the mean strains under unit stresses xx, yy and xy. Like `outline_stiffness` exact on any mesh; no
     test of the same mesh is softer.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    springs : Springs
-
     Returns
     -------
     ndarray of float, shape (3, 3)
         Over the thickness, times the reference stiffness [1]; Voigt: xx, yy, shear angle xy.
-
-    Raises
-    ------
-    SingularError
-        If the network is singular or unstable at rest.
-    MeshError
-        If the mesh has parts that no edge joins.
 
     Examples
     --------
@@ -493,8 +414,6 @@ def isotropic_moduli(compliance: np.ndarray) -> tuple[float, float]:
 
     Returns
     -------
-    young_modulus : float
-        One over the unit of the compliance.
     poisson_ratio : float
         [1]
     """

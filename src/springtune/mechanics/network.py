@@ -42,21 +42,6 @@ as fast."""
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
     """Solver that takes over from multigrid where conjugate gradients do not end.
 
-    Parameters
-    ----------
-    solver : str or None
-        That a network was made with: one that is named has no successor.
-    unknowns : int
-    symmetric : bool
-        Whether the matrix is.
-    cholesky : bool, optional
-        Whether CHOLMOD is there.
-
-    Returns
-    -------
-    str or None
-        None where factors would take more memory than most machines have.
-
     Examples
     --------
     >>> [successor(None, 500_000, symmetric, cholesky=True) for symmetric in (True, False)]
@@ -71,20 +56,10 @@ class Network:
 
     Parameters
     ----------
-    mesh : Mesh
-        Its points are the particles, its edges the springs.
     held : ndarray of bool, shape (n_points, 2)
         True where a particle cannot move in x or y.
     stiffness : ndarray of float, shape (n_springs,)
         Stiffness of each spring as a multiple of the reference stiffness [1].
-    energies : sequence of Energy, optional
-        Energies besides the springs'.
-    like : Network, optional
-        A network with the same cells and the same directions held, whose numbering this one takes over.
-    solver : str, optional
-        One of `springtune.linalg.SOLVERS`; by what is installed and the number of unknowns without. What is not
-        positive definite has a Cholesky factor only with pins (`springtune.linalg.pinned`); where it is small, or
-        pins do not hold it, SuperLU takes its place.
 
     Attributes
     ----------
@@ -94,11 +69,6 @@ class Network:
         From the first end to the second, at rest [m].
     rest_lengths : ndarray of float, shape (n_springs,)
         [m]
-
-    Raises
-    ------
-    ValueError
-        If there is no such solver.
 
     Examples
     --------
@@ -222,8 +192,6 @@ class Network:
         ----------
         displacements : ndarray of float, shape (n_points, 2)
             [m]
-        linear : bool, optional
-            Whether the network is linear in the displacements.
 
         Returns
         -------
@@ -248,8 +216,6 @@ class Network:
         ----------
         displacements : ndarray of float, shape (n_points, 2)
             [m]
-        linear : bool, optional
-            Whether it is `linear_resistance` that is meant.
         """
         total = np.zeros(self.held.shape)
         if linear:
@@ -304,8 +270,6 @@ class Network:
         ----------
         displacements : ndarray of float, shape (n_points, 2), optional
             Where it is taken; at rest without.
-        follower : tuple of float and FollowerPressure, optional
-            A pressure and what it acts on, whose own derivative is taken off.
 
         Returns
         -------
@@ -382,17 +346,6 @@ class Network:
         ----------
         displacements : ndarray of float, shape (n_points, 2), optional
             Where it is taken; at rest without.
-        follower : tuple of float and FollowerPressure, optional
-            As in `tangent`.
-
-        Returns
-        -------
-        Factor
-
-        Raises
-        ------
-        SingularError
-            If the tangent is singular; multigrid does not see that of a body that is not held, so it is looked for.
         """
         if self._by_multigrid and self._loose:
             raise SingularError(self._loose)
@@ -414,18 +367,6 @@ class Network:
         Parameters
         ----------
         matrix : csc_array, shape (unknowns, unknowns)
-        symmetric : bool, optional
-            Whether the matrix is symmetric.
-
-        Returns
-        -------
-        Factor
-            Cholesky's only where the matrix is symmetric; with pins where it is not positive definite.
-
-        Raises
-        ------
-        SingularError
-            If it is singular.
         """
         if symmetric and self._by_cholesky:
             factor = self._cholesky(matrix)
@@ -476,8 +417,6 @@ class Network:
         ----------
         displacements : ndarray of float, shape (n_points, 2)
             [m]
-        follower : tuple of float and FollowerPressure, optional
-            As in `tangent`. No real eigenvalue is negative where the symmetric part is positive definite (Bendixson).
         """
         if follower is not None:
             follower = follower[0], follower[1].symmetric

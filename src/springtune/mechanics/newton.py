@@ -45,15 +45,10 @@ class Equilibrium:
     ----------
     displacements : ndarray of float, shape (n_points, 2)
         Displacement of each particle [m]; of the last iterate where it did not converge.
-    converged : bool
-    iterations : int
-        Newton steps.
     residual : float
         Norm of the out-of-balance force over that of the load [1].
     factor : Factor or None
         Factorized tangent: that at the solution, where it converged.
-    reason : str
-        Why it did not converge, empty where it did.
     error_estimate : float
         Estimated error of the displacements over their size [1]; NaN where there is no balance.
     unstable_share : float
@@ -128,13 +123,8 @@ class Newton:
 
     Parameters
     ----------
-    problem : Balance
     s : float
         Force over the reference stiffness [m].
-    max_factorizations : int, optional
-        Largest number of factorizations on the way; one more is that of the tangent at the solution.
-    keep_tangent : float, optional
-        Share of the residual that a step may leave for its tangent to serve once more; with 0 each step has its own.
     """
 
     def __init__(
@@ -155,10 +145,6 @@ class Newton:
         start : ndarray of float, shape (n_points, 2)
             [m]; rest takes its place where forces are not finite or cells are inside out. Displacements that are
             prescribed are in their places.
-
-        Returns
-        -------
-        Equilibrium
         """
         here = self._at(start)
         if not np.isfinite(here.residual) or self.network.inverted(start):
@@ -267,15 +253,10 @@ def error_estimate(
 
     Parameters
     ----------
-    network : Network
-    factor : Factor
-        Tangent factorized near them.
     missing : ndarray of float, shape (unknowns,)
         Load less resistance [m].
     displacements : ndarray of float, shape (n_points, 2)
         [m]
-    linear : bool, optional
-        Whether the network has linear kinematics.
 
     Returns
     -------
@@ -296,21 +277,8 @@ def refine(
 ) -> tuple[Iterate, float]:
     """Steps with one tangent for as long as each of them halves the estimated error.
 
-    Parameters
-    ----------
-    network : Network
-    here : Iterate
-    factor : Factor
-        Tangent factorized there.
-    balance : callable
-        Load less resistance and residual at displacements.
-    linear : bool, optional
-        Whether the network has linear kinematics.
-
     Returns
     -------
-    iterate : Iterate
-        Where they end.
     error : float
         Its estimated error [1].
     """

@@ -26,14 +26,11 @@ class Pattern:
 
     Parameters
     ----------
-    mesh : Mesh
     held : ndarray of bool, shape (n_points, 2)
         True where a particle cannot move in x or y.
 
     Attributes
     ----------
-    size : int
-        Number of unknowns.
     number : ndarray of int, shape (n_points, 2)
         Unknown of each direction of each particle, -1 where it is held.
     indices, pointers : ndarray of int32

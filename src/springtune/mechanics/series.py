@@ -56,8 +56,6 @@ def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> t
 
     Parameters
     ----------
-    problem : StaticProblem
-        Of springs alone, under dead loads.
     weights : ndarray of float, shape (n_points, 2)
         Weights of the displacements to sum.
     targets : ndarray of float, shape (n,)
@@ -116,8 +114,6 @@ class StablePath:
 
     Parameters
     ----------
-    problem : StaticProblem
-        Of springs alone, under dead loads.
     weights : ndarray of float, shape (n_points, 2)
         Weights of the displacements to sum.
     targets : ndarray of float, shape (n,)
@@ -177,8 +173,6 @@ class StablePath:
         values : ndarray of float, shape (n,)
         good : ndarray of bool, shape (n,)
             Whether the estimated error of the series about rest is small.
-        count : int
-            How many of the loads the series serve, proved at the last one of each.
         """
         self._rest = series = self.problem.rest
         values, errors = series.measure(self.weights, loads)
@@ -383,8 +377,6 @@ class StablePath:
         Returns
         -------
         displacements : ndarray of float, shape (n_points, 2), or None
-        factor : Factor or None
-            None where it is unstable.
         """
         network = self.problem.network
         if network.inverted(guess):
@@ -454,13 +446,7 @@ class StablePath:
 
 
 class LinearPath:
-    """As `StablePath`, of a network with linear kinematics, whose displacements are in proportion to the load.
-
-    Parameters
-    ----------
-    problem, weights, targets
-        As of `StablePath`.
-    """
+    """As `StablePath`, of a network with linear kinematics, whose displacements are in proportion to the load."""
 
     end = ""
 

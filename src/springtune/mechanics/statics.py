@@ -69,11 +69,8 @@ class StaticProblem:
 
     Parameters
     ----------
-    network : Network
     pattern : ndarray of float, shape (n_points, 2)
         Forces on the particles [1]; scaled by ``s``.
-    follower : FollowerPressure, optional
-        What the forces become as the particles move; they stay as they are without.
     dead : ndarray of float, shape (n_points, 2), optional
         Forces besides those of the follower, that stay as they are [1]; the pattern is both together.
     given : ndarray of float, shape (n_points, 2), optional
@@ -170,10 +167,6 @@ class StaticProblem:
         ----------
         s : float
             Force over the reference stiffness [m].
-
-        Returns
-        -------
-        Equilibrium
         """
         slope, residual, error = self._slope
         reason = uncertainty(error)
@@ -188,20 +181,6 @@ class StaticProblem:
             Force over the reference stiffness [m].
         displacements : ndarray of float, shape (n_points, 2)
             [m]
-        factor : Factor
-            Tangent factorized there; that at rest for linear kinematics.
-
-        Returns
-        -------
-        negative : int
-            Number of negative eigenvalues of the tangent.
-        flutters : bool
-            Whether two modes have merged, as they may under a follower pressure alone.
-
-        Raises
-        ------
-        SingularError
-            If the tangent is singular, as it is at a limit point.
         """
         if self.follower is None or factor is self.rest_factor:
             return factor.negative_pivots, False
@@ -222,8 +201,6 @@ class StaticProblem:
             Force over the reference stiffness [m].
         displacements : ndarray of float, shape (n_points, 2)
             [m]
-        factor : Factor
-            Tangent factorized there.
 
         Returns
         -------
@@ -248,14 +225,9 @@ class StaticProblem:
         ----------
         s : float
             Force over the reference stiffness [m].
-        found : Equilibrium
 
         Returns
         -------
-        status : Status
-            Solved, unstable or not converged.
-        message : str
-            Why it is not solved; where it is, what its energies have against it, mostly nothing.
         negative_pivots : int or float
             Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
         """
@@ -302,11 +274,6 @@ class StaticProblem:
         ----------
         s : float
             Force over the reference stiffness [m].
-
-        Returns
-        -------
-        Equilibrium
-            Its factor is that of the tangent at the solution.
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]

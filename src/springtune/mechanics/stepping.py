@@ -66,19 +66,8 @@ def make_stepper(
 
     Parameters
     ----------
-    motion : Moving
-    integrator : str or BackwardEuler
-        One of `springtune.mechanics.integrators.INTEGRATORS`.
     step : float
         [s]
-    precision : str, optional
-        ``"float64"`` or ``"float32"``, of explicit schemes.
-    threads : int, optional
-        At most so many, of explicit schemes.
-
-    Returns
-    -------
-    Stepper
     """
     if integrator in EXPLICIT:
         return ExplicitSteps(motion, integrator, step, precision, threads)
@@ -88,13 +77,7 @@ def make_stepper(
 
 
 class Stepper(ABC):
-    """State of a run and how it advances.
-
-    Attributes
-    ----------
-    failed : str
-        Why a step failed; empty where none did.
-    """
+    """State of a run and how it advances."""
 
     failed = ""
 
@@ -298,28 +281,7 @@ class ExplicitSteps(Stepper):
 
 
 def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, threads: int) -> tuple[int, int, int]:
-    """How the rows of a network are advanced: in blocks, some steps of a block before those far from it.
-
-    Parameters
-    ----------
-    pointers : ndarray of int, shape (n_rows + 1,)
-        First entry of each row.
-    bandwidth : int
-        Rows that lie between the ends of an entry at most.
-    of_row, of_entry : int
-        Bytes of what belongs to a row and to an entry.
-    threads : int
-        At most so many.
-
-    Returns
-    -------
-    threads : int
-        As many as have enough to do, and as can follow each other along the rows at the distance that they need.
-    size : int
-        Rows of a block.
-    depth : int
-        Steps of a pass at most.
-    """
+    """How the rows of a network are advanced: in blocks, some steps of a block before those far from it."""
     rows, entries = len(pointers) - 1, int(pointers[-1])
     each = of_row + of_entry * entries / max(1, rows)
     for count in range(min(threads, max(1, entries // FEWEST)), 1, -1):
@@ -355,10 +317,8 @@ class BackwardEulerSteps(Stepper):
 
     Parameters
     ----------
-    motion : Moving
     step : float
         [s]
-    options : BackwardEuler
     """
 
     def __init__(self, motion: Moving, step: float, options: BackwardEuler) -> None:
@@ -398,7 +358,6 @@ class MidpointSteps(Stepper):
 
     Parameters
     ----------
-    motion : Moving
     step : float
         [s]
     """

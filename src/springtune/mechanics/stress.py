@@ -30,12 +30,8 @@ def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> 
 
     Parameters
     ----------
-    network : Network
     displacements : ndarray of float, shape (n_points, 2)
         [m]
-    linear : bool
-        Whether the network is linear in the displacements: forces and areas are then those at rest, and Cauchy's stress
-        otherwise.
 
     Returns
     -------
@@ -74,7 +70,6 @@ def particle_stresses(
 
     Parameters
     ----------
-    mesh : Mesh
     stresses : dict of int to ndarray of float, shape (n_cells, 3)
         As of `cell_stresses`.
     chosen : dict of int to ndarray of bool, shape (n_cells,), optional

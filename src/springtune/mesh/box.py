@@ -11,19 +11,8 @@ def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
 
     Parameters
     ----------
-    mesh : Mesh
-        Its sides are off by less than `DIGITS`.
     box : ndarray of float, shape (2,)
         Length and height [m].
-
-    Returns
-    -------
-    Mesh
-
-    Raises
-    ------
-    MeshError
-        If cells lie within rounding of a side.
     """
     near = np.abs(mesh.points - box) <= DIGITS * box
     points = np.where(near, box, np.where(mesh.points <= DIGITS * box, 0.0, mesh.points))
@@ -37,15 +26,6 @@ def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
 
 def box_fault(mesh: Mesh) -> str:
     """Why a mesh does not fill the box around it exactly once, with the remedy; empty where it does.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Looked at once: it keeps what is found.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

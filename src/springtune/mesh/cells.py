@@ -383,10 +383,6 @@ def corner_angles(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def quality(mesh: Mesh) -> dict[str, float]:
     """Quality figures of a mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-
     Returns
     -------
     dict

@@ -58,17 +58,6 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
 
     Sides become lines and points vertices. In ``.vtu``, cell data of zeros and ones mark the cells of each group; in
     ``.msh``, format 2.2 of Gmsh, groups are physical ones. `springtune.read_shape` reads both.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to write, ending in ``.vtu``, or of a `GroupedMesh` in ``.msh``.
-    mesh : Mesh or GroupedMesh
-
-    Raises
-    ------
-    MeshError
-        If the name has another ending, `mesh` is none, or the format cannot hold the name of a group.
     """
     if not isinstance(mesh, Mesh | GroupedMesh):
         raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
@@ -166,24 +155,13 @@ def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.nda
 
     Parameters
     ----------
-    path : str or Path
-        For messages.
-    content : meshio.Mesh
-        See `file_content`.
     unit : float
         Of the coordinates [m].
 
     Returns
     -------
-    mesh : Mesh
-        Cells of each number of corners in the order of the file.
     used : ndarray of int, shape (n_points,)
         Numbers of its particles in the file.
-
-    Raises
-    ------
-    MeshError
-        As of `read_mesh`.
     """
     cells = _read_cells(path, content)
     used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
@@ -334,20 +312,10 @@ def read_beam_mesh(path: str | Path, length: float, height: float, unit: float =
 
     Parameters
     ----------
-    path : str or Path
     length, height : float
         Extent of the box [m].
     unit : float, optional
         Unit of the coordinates in the file [m].
-
-    Returns
-    -------
-    Mesh
-
-    Raises
-    ------
-    MeshError
-        As `read_mesh`, and if the mesh does not fill the box exactly once.
     """
     mesh = read_mesh(path, unit)
     box = np.array([length, height])

@@ -29,15 +29,6 @@ def free(length: float, height: float, size: float) -> Mesh:
         Extent of the box [m].
     size : float
         Imposed length of the edges on the outline [m].
-
-    Returns
-    -------
-    Mesh
-
-    Raises
-    ------
-    MeshError
-        If netgen fails.
     """
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException

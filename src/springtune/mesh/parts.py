@@ -9,7 +9,6 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
     Parameters
     ----------
     edges : ndarray of int, shape (n_edges, 2)
-    count : int
 
     Returns
     -------
@@ -43,12 +42,6 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
     edges : ndarray of int, shape (n_edges, 2)
     held : ndarray of bool, shape (n_points, 2)
         Whether a point is held along x and y.
-    where : str
-        What the supports are of, for the message.
-
-    Raises
-    ------
-    ValueError
     """
     components = connected(edges, len(points))
     count = components.max() + 1
@@ -74,10 +67,6 @@ def free_motion(points: np.ndarray, held: np.ndarray) -> str:
         Coordinates [m].
     held : ndarray of bool, shape (n_points, 2)
         Whether a point is held along x and y.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -32,10 +32,6 @@ def structured(length: float, height: float, size: float) -> Mesh:
         Extent of the box [m].
     size : float
         Asked length of an edge [m].
-
-    Returns
-    -------
-    Mesh
     """
     return _fitted(length, height, *nearest_counts(length, height, size, ROW_HEIGHT))
 
@@ -117,16 +113,10 @@ def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None =
 
     Parameters
     ----------
-    cells, rows : int
-        Edges in a line, rows of triangles.
     size : float, optional
         Length of an edge along the rows [m].
     row_height : float, optional
         Height of a row [m]; that of equilateral triangles without.
-
-    Returns
-    -------
-    Mesh
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
     for name, value in (("cells", cells), ("rows", rows)):

@@ -23,14 +23,6 @@ def sheet_fault(mesh: Mesh) -> str:
     rounds that meet neither themselves nor each other: there are no slits, no hanging points, and no cells that hang
     together in a point alone.
 
-    Parameters
-    ----------
-    mesh : Mesh
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     Two triangles that meet in a point:
@@ -85,16 +77,10 @@ def not_convex(mesh: Mesh) -> str:
 def outline_of(mesh: Mesh) -> tuple[np.ndarray, str]:
     """Sides of cells that have no neighbour, and why edges have more cells than a plane has sides.
 
-    Parameters
-    ----------
-    mesh : Mesh
-
     Returns
     -------
     edges : ndarray of int, shape (n, 2)
         Particles at their ends, the cell on the left.
-    fault : str
-        With the remedy; empty where no two cells lie on the same side of an edge.
     """
     edges = np.concatenate(
         [np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2) for corners in mesh.cells.values()]
@@ -117,12 +103,6 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
     points : ndarray of float, shape (n_points, 2)
         [m]
     edges : ndarray of int, shape (n, 2)
-    count : str
-        What they are and how many.
-
-    Returns
-    -------
-    str
     """
     from scipy.spatial import cKDTree  # here, since a good mesh needs none
 

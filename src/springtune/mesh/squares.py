@@ -24,10 +24,6 @@ def right(length: float, height: float, size: float) -> Mesh:
         Extent of the box [m].
     size : float
         Asked side of a square [m]; both directions are stretched to fit whole numbers of them.
-
-    Returns
-    -------
-    Mesh
     """
     points, a, b, c, d = _grid(length, height, size)
     return Mesh(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))

@@ -18,18 +18,7 @@ LARGEST_SIZE = 1000.0
 
 
 def check_box(length: float, height: float, size: float) -> None:
-    """Refuse a box that cannot be meshed.
-
-    Parameters
-    ----------
-    length, height, size
-        As of a `MeshType`.
-
-    Raises
-    ------
-    MeshError
-        If one is no finite number above zero, the size absurdly large, or there would be too many particles.
-    """
+    """Refuse a box that cannot be meshed."""
     for name, value in (("length", length), ("height", height), ("size", size)):
         number = isinstance(value, Real) and not isinstance(value, bool)
         if not (number and 1e-40 <= value <= 1e40):
@@ -46,16 +35,8 @@ def too_many(count: float, size: float, side: float, body: str) -> str:
 
     Parameters
     ----------
-    count : float
-        Particles, about.
     size, side : float
         Mesh size and smaller extent of the body [m].
-    body : str
-        What it is, such as ``"beam '200x40'"``.
-
-    Returns
-    -------
-    str
     """
     if count <= MOST_MESHED:
         return ""
@@ -65,16 +46,7 @@ def too_many(count: float, size: float, side: float, body: str) -> str:
 
 
 def nearest_whole(ratio: float) -> int:
-    """Nearest whole number, at least 1, halves to even ones: 2.5000000000000004 is a half, too.
-
-    Parameters
-    ----------
-    ratio : float
-
-    Returns
-    -------
-    int
-    """
+    """Nearest whole number, at least 1, halves to even ones: 2.5000000000000004 is a half, too."""
     return max(1, round(round(ratio, 9)))
 
 
@@ -89,16 +61,6 @@ def nearest_counts(length: float, height: float, size: float, row_height: float 
         Asked length of an edge [m].
     row_height : float, optional
         Height of a row over the length of an edge [1].
-
-    Returns
-    -------
-    cells, rows : int
-        At least 1.
-
-    Raises
-    ------
-    MeshError
-        As of `check_box`.
 
     Examples
     --------
@@ -118,14 +80,8 @@ class MeshType(Declared):
 
     Attributes
     ----------
-    name : str
-        Label in a study and in the dataset.
     function : callable
         (length, height, size) -> `Mesh`.
-    order : float
-        Place in the order of labels.
-    corners : int
-        Corners of its cells: 3 or 4.
     row_height : float
         Height of a row of cells over the mesh size [1].
     own_stretch : callable or None
@@ -145,10 +101,6 @@ class MeshType(Declared):
             Extent of the box [m].
         size : float
             Asked length of an edge [m].
-
-        Returns
-        -------
-        Mesh
         """
         found = self.function(length, height, size)
         if not isinstance(found, Mesh):
@@ -171,19 +123,7 @@ class MeshType(Declared):
         return (length / size + 1.5) * (height / (self.row_height * size) + 1.0)
 
     def refusal(self, length: float, height: float, size: float, box: str) -> str:
-        """Why no mesh of a size is made, with the remedy; empty where one is.
-
-        Parameters
-        ----------
-        length, height, size
-            As of a call.
-        box : str
-            What the box is, for the text, such as ``"beam '200x40'"``.
-
-        Returns
-        -------
-        str
-        """
+        """Why no mesh of a size is made, with the remedy; empty where one is."""
         side = min(length, height)
         if size > side:
             return f"is larger than {box}; give at most its smaller side"

@@ -43,32 +43,13 @@ def extrapolate(
 
     Parameters
     ----------
-    mesh_type : str
-        Key of `springtune.mesh.MESH_TYPES`.
     size : float
         Length of an edge [m].
-    beam : Beam
-    material : Material
-    known : dict, optional
-        What `references` gave for the beam and the material.
-    most : int, optional
-        Largest number of particles to solve.
-    loads : iterable of str, optional
-        As of `predict`.
 
     Returns
     -------
-    choices : list of Choice
-        Their numbers are pairs of bounds; what fails on one of the meshes fails.
     sizes : list of float
         Mesh sizes that were solved [m].
-
-    Raises
-    ------
-    ValueError
-        If the beam is so slender that a mesh of so many particles has less than four cells across.
-    DefinitionError
-        If no definition can live on meshes of the type.
     """
     check_beam(beam)
     finest = sqrt(beam.length * beam.height / most)

@@ -77,8 +77,6 @@ class QuantityReference(NamedTuple):
 
     Attributes
     ----------
-    value : float
-        In SI units.
     error_estimate : float
         Relative [1].
     """
@@ -155,16 +153,7 @@ class Choice:
 
 
 def check_beam(beam: Beam) -> None:
-    """Refuse a beam that is none: larger than any, smaller than atoms, or more slender than its references resolve.
-
-    Parameters
-    ----------
-    beam : Beam
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse a beam that is none: larger than any, smaller than atoms, or more slender than its references resolve."""
     is_a(beam, Beam, "beam", A_BEAM)
     sides = {"long": beam.length, "high": beam.height, "thick": beam.thickness}
     for word, side in sides.items():
@@ -180,21 +169,7 @@ def check_beam(beam: Beam) -> None:
 
 
 def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
-    """Loads, each once.
-
-    Parameters
-    ----------
-    loads : iterable of str
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    ValueError
-        If there are none, or one cannot be predicted.
-    """
+    """Loads, each once."""
     if isinstance(loads, str) or not isinstance(loads, Iterable):
         raise ValueError(f"loads: {loads!r} is no list of loads; give one such as {list(CASES)}")
     names = tuple(loads)
@@ -207,25 +182,7 @@ def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
 
 
 def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> References:
-    """References of loads.
-
-    Parameters
-    ----------
-    beam : Beam
-    material : Material
-    loads : iterable of str, optional
-        Of `PREDICTED`.
-
-    Returns
-    -------
-    dict of str to ReferenceSolution or str
-        For 1 N, by load; where there is none the reason.
-
-    Raises
-    ------
-    ValueError
-        If the beam is none, or a load cannot be predicted.
-    """
+    """References of loads."""
     check_beam(beam)
     found: dict[LoadKind, ReferenceSolution | str] = {}
     names = check_loads(loads)
@@ -341,16 +298,6 @@ def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -
 
     Errors that differ by less than the references are sure of are equal. Of these come springs alone first, then names
     in the order of the alphabet.
-
-    Parameters
-    ----------
-    choices : iterable of Choice
-    known : dict
-        References that their errors are against.
-
-    Returns
-    -------
-    list of Choice
     """
     return in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
 
@@ -392,22 +339,7 @@ def _on_shape(
 
 
 def only_load(shape: Shape, load: str | None) -> str:
-    """Load case of a shape, its only one where none is named.
-
-    Parameters
-    ----------
-    shape : Shape
-    load : str or None
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ValueError
-        If none is named of several.
-    """
+    """Load case of a shape, its only one where none is named."""
     if load is not None:
         return load
     if len(shape.loads) != 1:
@@ -422,15 +354,6 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
     """References of the quantities of interest of a shape under a load case.
 
     One that has none, such as the stress at a corner, does not cost the others theirs.
-
-    Parameters
-    ----------
-    statement : ShapeStatement
-
-    Returns
-    -------
-    dict of str to QuantityReference or str
-        By quantity; where there is none the reason.
     """
     from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
@@ -453,17 +376,8 @@ class TriedShape:
 
     Parameters
     ----------
-    statement : ShapeStatement
-        Of linear kinematics.
     known : dict
         What `shape_references` gave.
-    among : iterable of str, optional
-        As of `TriedMesh`.
-
-    Attributes
-    ----------
-    names, same, failures
-        As of `TriedMesh`.
     """
 
     def __init__(self, statement: ShapeStatement, known: ShapeReferences, among: Iterable[str] | None = None) -> None:
@@ -483,18 +397,7 @@ class TriedShape:
         return self._springs[name]
 
     def error(self, name: str, quantity: str) -> float | str:
-        """Error of a definition in a quantity [1]; NaN where that has no reference, why the network has no values.
-
-        Parameters
-        ----------
-        name : str
-            Of `names`.
-        quantity : str
-
-        Returns
-        -------
-        float or str
-        """
+        """Error of a definition in a quantity [1]; NaN where that has no reference, why the network has no values."""
         if name not in self._values:
             self._values[name] = self._solved(self._springs[name])
         values, known = self._values[name], self.known[quantity]
@@ -536,12 +439,6 @@ class TriedShape:
 def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
     """Displacement of a load for a force of the springs' reference stiffness times a metre, linear kinematics.
 
-    Parameters
-    ----------
-    sheet : Sheet
-    springs : Springs
-    kind : LoadKind
-
     Returns
     -------
     float or str
@@ -557,15 +454,6 @@ def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | s
 def error_of(displacement: float | str, springs: Springs, load: str, known: ReferenceSolution | str) -> float | str:
     """Error of springs under a load: what `Choice.errors` has, and the header of a `springtune.SpringNet`.
 
-    Parameters
-    ----------
-    displacement : float or str
-        As of `displacement_of`.
-    springs : Springs
-    load : str
-    known : ReferenceSolution or str
-        Reference of 1 N, or why there is none.
-
     Returns
     -------
     float or str
@@ -580,16 +468,6 @@ def error_of(displacement: float | str, springs: Springs, load: str, known: Refe
 
 class TriedMesh:
     """A mesh on which definitions are solved; networks that differ in their reference stiffness alone once.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    beam : Beam
-    material : Material
-    known : dict
-        References of the loads that count.
-    among : iterable of str, optional
-        Definitions that are asked for; all without.
 
     Attributes
     ----------
@@ -616,32 +494,11 @@ class TriedMesh:
         self.names = list(self._springs)
 
     def springs(self, name: str) -> Springs:
-        """Springs of a definition.
-
-        Parameters
-        ----------
-        name : str
-            Of `names`.
-
-        Returns
-        -------
-        Springs
-        """
+        """Springs of a definition."""
         return self._springs[name]
 
     def error(self, name: str, load: str) -> float | str:
-        """Error of a definition under a load [1]; NaN where that has no reference; why the network has none.
-
-        Parameters
-        ----------
-        name : str
-            Of `names`.
-        load : str
-
-        Returns
-        -------
-        float or str
-        """
+        """Error of a definition under a load [1]; NaN where that has no reference; why the network has none."""
         springs, kind = self._springs[name], LOADS[load].kind
         key = kind, key_of(springs)
         if key not in self._displacements:
@@ -649,17 +506,7 @@ class TriedMesh:
         return error_of(self._displacements[key], springs, load, self.known[load])
 
     def choice(self, name: str) -> Choice:
-        """What a definition is worth.
-
-        Parameters
-        ----------
-        name : str
-            Of `names`.
-
-        Returns
-        -------
-        Choice
-        """
+        """What a definition is worth."""
         springs = self._springs[name]
         found = {load: self.error(name, load) for load in self.known}
         errors: dict[str, Number] = {load: nan if isinstance(error, str) else error for load, error in found.items()}
@@ -686,17 +533,7 @@ class TriedMesh:
         )
 
     def failed(self, name: str) -> Choice:
-        """Choice of a definition that gives no springs here.
-
-        Parameters
-        ----------
-        name : str
-            Of `failures`.
-
-        Returns
-        -------
-        Choice
-        """
+        """Choice of a definition that gives no springs here."""
         return _failed(name, self.known, self.failures[name])
 
 
@@ -734,23 +571,7 @@ def _failed(name: str, known: Iterable[str], failures: dict[str, str]) -> Choice
 
 
 def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
-    """Stiffness of sides inside and on the outline, and in words what else there is.
-
-    Parameters
-    ----------
-    sheet : Sheet
-    material : Material or None
-        None where there are several.
-    name : str
-        Of the definition.
-    springs : Springs
-
-    Returns
-    -------
-    inside, outline : float
-        As of `Choice`.
-    extra : str
-    """
+    """Stiffness of sides inside and on the outline, and in words what else there is."""
     mesh = sheet.mesh
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1
     inside, at_outline, diagonals = (

@@ -258,20 +258,6 @@ class MeshSearch:
 def asked_error(value: float | str) -> float:
     """Error that is to be kept [1].
 
-    Parameters
-    ----------
-    value : float or str
-        A fraction such as 0.01, or a text such as ``"1 %"``.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If it is none above 0 and below 1.
-
     Examples
     --------
     >>> asked_error("1 %"), asked_error(0.01)
@@ -762,28 +748,10 @@ def find_shape_mesh(
 
     Parameters
     ----------
-    shape : Shape
-        With an outline.
-    material : Material, AnisotropicMaterial or mapping of str to those
-    error : float or str
-        Largest size of an error to keep, a fraction or a text such as ``"1 %"``.
     load : str, optional
         Of the shape; its only one without.
     make : callable, optional
         From a mesh size [m] to a mesh; `springtune.mesh_shape` of the shape without.
-    most : int, optional
-        Particles of the largest mesh that may be tried, about.
-
-    Returns
-    -------
-    MeshSearch
-        Its ``loads`` are the quantities of interest, and its one mesh type is ``"free"``.
-
-    Raises
-    ------
-    ValueError
-        If an argument is none or unknown, the shape is that of a file, a quantity has no reference, or the error is
-        below what the reference's own error estimate allows.
 
     Examples
     --------

@@ -29,30 +29,12 @@ MAX_ITERATIONS = 50
 
 
 def box(mesh: Mesh, sides: Iterable[Side]) -> GroupedMesh:
-    """Groups of the mesh of a box.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    sides : iterable of Side
-        Those that are wanted.
-
-    Returns
-    -------
-    GroupedMesh
-        Edges either way round.
-    """
+    """Groups of the mesh of a box."""
     return GroupedMesh(mesh, {side.name: side_edges(mesh, side) for side in dict.fromkeys(sides)})
 
 
 def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
     """Edges on a side of a box with its lower left corner at the origin.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    side : Side
 
     Returns
     -------
@@ -64,29 +46,15 @@ def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
 def loaded_edges(mesh: Mesh, kind: LoadKind) -> tuple[np.ndarray, int]:
     """Edges of the loaded side of a box.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    kind : LoadKind
-
     Returns
     -------
     edges : ndarray of int, shape (n, 2)
-    along : int
-        Axis along the side.
     """
     return side_edges(mesh, kind.loaded), kind.along
 
 
 def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Directions that a kind of load holds, see `springtune.problem.loads`.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    kind : LoadKind
 
     Returns
     -------
@@ -98,12 +66,6 @@ def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Weight of each particle in an even distribution over the loaded side, along the force: the pattern of a load.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    kind : LoadKind
-
     Returns
     -------
     ndarray of float, shape (n_points, 2)
@@ -114,12 +76,6 @@ def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 
 def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Weights of the displacements that make the displacement of a load.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Of a box with its lower left corner at the origin.
-    kind : LoadKind
 
     Returns
     -------
@@ -138,21 +94,11 @@ def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
     """Directions that a load case holds, and by how much they are moved.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    case : LoadCase
-
     Returns
     -------
     held : ndarray of bool, shape (n_points, 2)
     given : ndarray of float, shape (n_points, 2)
         Prescribed displacements [m]; zero in all other directions.
-
-    Raises
-    ------
-    ValueError
-        If a group is not there, or two supports want different displacements of one particle.
     """
     points = grouped.mesh.points
     held, given = np.zeros(points.shape, dtype=bool), np.zeros(points.shape)
@@ -177,23 +123,10 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
 def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
     """Weights of an even distribution over a group, by length: each edge gives half of its share to either particle.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    group : str
-        Sides; or a point, which has all of it.
-    axis : int
-        Direction: 0 for x, 1 for y.
-
     Returns
     -------
     ndarray of float, shape (n_points, 2)
         Sum 1 along the direction, zero across.
-
-    Raises
-    ------
-    ValueError
-        If the group is not there.
     """
     mesh, field = grouped.mesh, np.zeros(grouped.mesh.points.shape)
     if group not in grouped.sides:
@@ -217,24 +150,15 @@ def forces(
 
     Parameters
     ----------
-    grouped : GroupedMesh
-    case : LoadCase
     thickness : float, optional
         Of the sheet [m].
     densities : mapping of str to float, optional
         Density of each part [kg/m3], of the main one at ``""``; for gravity.
-    followers : bool, optional
-        Whether pressures that follow their sides count.
 
     Returns
     -------
     ndarray of float, shape (n_points, 2)
         [N]
-
-    Raises
-    ------
-    ValueError
-        If a group is not there, or a part has no density under gravity.
     """
     field = np.zeros(grouped.mesh.points.shape)
     for traction in case.tractions:
@@ -257,8 +181,6 @@ def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tu
 
     Parameters
     ----------
-    grouped : GroupedMesh
-    case : LoadCase
     thickness : float, optional
         Of the sheet [m].
 
@@ -281,7 +203,6 @@ def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[s
 
     Parameters
     ----------
-    grouped : GroupedMesh
     thickness : float
         Of the sheet [m].
     densities : mapping of str to float
@@ -291,11 +212,6 @@ def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[s
     -------
     ndarray of float, shape (n_points,)
         [kg]
-
-    Raises
-    ------
-    ValueError
-        If a part has no density.
     """
     points, labels = grouped.mesh.points, part_names(grouped)
     masses = np.zeros(len(points))
@@ -314,10 +230,6 @@ def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[s
 def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
     """Part of each cell, by number of corners: ``""`` where it is in none.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-
     Returns
     -------
     dict of int to ndarray of str, shape (n_cells,)
@@ -334,21 +246,10 @@ def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
 def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray:
     """Weights of the displacements that make a quantity: the mean one of sides, or that of a point.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    quantity : Quantity
-        Of kind ``"displacement"``.
-
     Returns
     -------
     ndarray of float, shape (n_points, 2)
         Sum 1.
-
-    Raises
-    ------
-    ValueError
-        If the group is not there, or the point not in the mesh.
     """
     axis = "xy".index(quantity.component)
     if quantity.of in grouped.sides:
@@ -365,21 +266,9 @@ def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -
     Where sides of two groups hold a particle in the same direction, its force belongs to each by its share in their
     lengths; a point on sides that are held so has none of it, as in a continuum.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    case : LoadCase
-    quantity : Quantity
-        Of kind ``"reaction"``.
-
     Returns
     -------
     ndarray of float, shape (n_points, 2)
-
-    Raises
-    ------
-    ValueError
-        If no support holds the group along the component.
     """
     axis = "xy".index(quantity.component)
     holding = [one for one in case.supports if (one.x, one.y)[axis] is not None]
@@ -415,19 +304,9 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
 def sides_of(grouped: GroupedMesh, group: str) -> np.ndarray:
     """Edges of a group.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    group : str
-
     Returns
     -------
     ndarray of int, shape (n, 2)
-
-    Raises
-    ------
-    ValueError
-        If there is no such group of sides.
     """
     if group not in grouped.sides:
         raise ValueError(f"group: {group!r} is no group of sides; {nearest(group, grouped.sides)}")
@@ -437,19 +316,9 @@ def sides_of(grouped: GroupedMesh, group: str) -> np.ndarray:
 def particles_of(grouped: GroupedMesh, group: str) -> np.ndarray:
     """Particles of a group of sides, some of them twice, or of a point.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    group : str
-
     Returns
     -------
     ndarray of int, shape (n,)
-
-    Raises
-    ------
-    ValueError
-        If there is no such group, or no particle at its point.
     """
     if group in grouped.sides:
         return grouped.sides[group].ravel()
@@ -475,21 +344,11 @@ def _shown(point: np.ndarray) -> str:
 def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Weights that interpolate a field at a named point: along the edge of the outline, or in the cell, that has it.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    name : str
-
     Returns
     -------
     particles : ndarray of int, shape (n,)
     weights : ndarray of float, shape (n,)
         Sum 1; exact at particles. Linear in triangles, bilinear in quadrilaterals.
-
-    Raises
-    ------
-    ValueError
-        If there is no such point, or it is not in the mesh.
     """
     mesh, point = grouped.mesh, _point(grouped, name)
     outline = mesh.edges[mesh.on_outline]
@@ -507,22 +366,10 @@ def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarr
 def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
     """Cell that a named point is in, or next to where a straight edge cuts off the arc that it is on.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    name : str
-
     Returns
     -------
-    corners, cell : int
-        Number of corners, and place among the cells of so many.
     weights : ndarray of float, shape (corners,)
         Those of the corners, by interpolation.
-
-    Raises
-    ------
-    ValueError
-        If there is no such point, or it is not in the mesh.
     """
     mesh, point = grouped.mesh, _point(grouped, name)
     slack, found = ON_POINT * np.ptp(mesh.points, axis=0).max(), None

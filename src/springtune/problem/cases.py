@@ -14,18 +14,6 @@ if TYPE_CHECKING:
 def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
     """Refuse a load case that a mesh does not have the groups for, or that leaves cells free to move.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    case : LoadCase
-
-    Raises
-    ------
-    ValueError
-        If a name is not that of a group of the kind that it is used for; a point that is supported or loaded is no
-        particle, or any other is not in the body; two supports give one particle different displacements; or cells that
-        hang together are not held against all rigid motions.
-
     Examples
     --------
     >>> import springtune as st

@@ -25,10 +25,6 @@ def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarr
     ----------
     displacement, reference : array_like of float
         Displacement of network and reference [m].
-
-    Returns
-    -------
-    ndarray of float
     """
     displacement, reference = np.asarray(displacement), np.asarray(reference)
     return (displacement - reference) / np.abs(reference)
@@ -36,11 +32,6 @@ def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarr
 
 def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float]:
     """Error of each quantity of interest, as `deformation_error`.
-
-    Parameters
-    ----------
-    values, known : mapping of str to float
-        Of network and reference by name, in SI units.
 
     Returns
     -------
@@ -69,8 +60,6 @@ class Best:
     status : Status
         Solved; unstable where the curve meets the reference where it is unstable alone; not converged where it may in a
         gap; failed where it does not, or there is no reference.
-    message : str
-        Why there is none; empty where there is one.
     """
 
     stiffness: float
@@ -103,11 +92,6 @@ def best_stiffness(
         Displacement of the reference [m].
     solve : callable
         Displacement [m] of the stable equilibrium at a stiffness [N/m], NaN where there is none.
-
-    Returns
-    -------
-    Best
-        The stiffest where the curve meets the reference more than once.
     """
     if not np.isfinite(reference):
         return Best(np.nan, Status.FAILED, "the reference has no displacement")

@@ -20,8 +20,6 @@ def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -
         [m]
     sides : tuple of float
         Its length and height [m].
-    what : str
-        What the message calls it.
     """
     smaller = min(sides)
     if thickness > smaller:
@@ -99,13 +97,8 @@ def beam_label(name: str, length: float, height: float) -> str:
 
     Parameters
     ----------
-    name : str
     length, height : float
         [m]; NaN where they are not known, then it is the name alone.
-
-    Returns
-    -------
-    str
     """
     long, high = (round(1e3 * side, 9) for side in (length, height))
     if long != long or high != high:

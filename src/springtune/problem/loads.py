@@ -40,8 +40,6 @@ class Side:
 
     Attributes
     ----------
-    axis : int
-        Axis across the side: 0 for x, 1 for y.
     far : bool
         Whether it is the side of the larger coordinate.
     """
@@ -78,10 +76,6 @@ class LoadKind:
     ----------
     name : str
         Label in tasks and in the keys of stored results.
-    loaded : Side
-        Side over which the force is spread evenly.
-    axis : int
-        Axis of the force: 0 for x, 1 for y.
     held : tuple of (Side, tuple of int)
         Sides that are held, and along which axes: ``(0, 1)`` is a clamp, ``(1,)`` are rollers on a horizontal side.
     pressed : bool

@@ -616,10 +616,6 @@ def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> Engineer
     angle : float, optional
         By which the axes are turned from x and y, counter-clockwise [rad].
 
-    Returns
-    -------
-    EngineeringConstants
-
     Examples
     --------
     >>> found = engineering_constants(Material(1.0, 0.25).plane_stress, 0.3)
@@ -670,10 +666,6 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
     c11, c22, c12, c66, c16, c26 : float
         [Pa]
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> indefinite(9e9, 4e9, 7e9, 2e9)
@@ -701,14 +693,6 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
 def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
     """Material of its fields, as `dataclasses.asdict` gives them.
 
-    Parameters
-    ----------
-    fields : mapping of str to float, str or None
-
-    Returns
-    -------
-    Material, Rubber or AnisotropicMaterial
-
     Examples
     --------
     >>> from dataclasses import asdict
@@ -724,20 +708,6 @@ def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
 
 def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     """The material, refused where it is not isotropic.
-
-    Parameters
-    ----------
-    material : Material or AnisotropicMaterial
-    remedy : str
-        For the message.
-
-    Returns
-    -------
-    Material
-
-    Raises
-    ------
-    ValueError
 
     Examples
     --------

@@ -39,14 +39,6 @@ class OutlineSide:
     ----------
     start, end : tuple of float
         [m]
-    centre : tuple of float or None
-        As of `Segment`.
-    group : str
-
-    Raises
-    ------
-    ValueError
-        If it has no length, or no such arc goes through both ends.
 
     Examples
     --------
@@ -262,7 +254,6 @@ class Round:
 
     Attributes
     ----------
-    sides : tuple of OutlineSide
     inner, outer : str or None
         Part of the body on the left and on the right; None where there is nothing.
     around : int or None
@@ -323,10 +314,6 @@ def winds_about(sides: Sequence[OutlineSide], point: Point) -> bool:
 
 def meeting(rounds: Sequence[Sequence[OutlineSide]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
     """Where two sides meet that are not neighbours in a round, or neighbours away from their corner.
-
-    Parameters
-    ----------
-    rounds : sequence of sequences of OutlineSide
 
     Returns
     -------

@@ -30,36 +30,12 @@ MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"
 
 
 def shown_order(name: str, value: float) -> float:
-    """Rank of a value of a swept parameter: where only one can be shown, it is the last of those that are there.
-
-    Parameters
-    ----------
-    name : str
-        Key of `SWEPT`.
-    value : float
-
-    Returns
-    -------
-    float
-        Larger is later; of a factor on the stiffness, what changes it least.
-    """
+    """Rank of a value of a swept parameter: where only one can be shown, it is the last of those that are there."""
     return -abs(value - 1) if name == "stiffness_scale" else value
 
 
 def with_unit(name: str, value: float, digits: int = 4) -> str:
     r"""A value of a swept parameter as it is read, of words that stay on a line.
-
-    Parameters
-    ----------
-    name : str
-        Key of `SWEPT`.
-    value : float
-        In SI units.
-    digits : int, optional
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -8,24 +8,6 @@ from difflib import get_close_matches
 def quantity(value: float | str, kind: str, name: str) -> float:
     """Number in SI units of a text with its unit, or of a number that is in SI units already.
 
-    Parameters
-    ----------
-    value : str or float
-        E.g. ``"200 mm"`` or ``0.2``.
-    kind : str
-        Key of `springtune.units.QUANTITY_KINDS`.
-    name : str
-        What it is, for messages.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        If it is no finite quantity of that kind; the message says what to give instead.
-
     Examples
     --------
     >>> quantity("200 mm", "length", "length"), quantity(0.2, "length", "length")
@@ -48,22 +30,7 @@ def quantity(value: float | str, kind: str, name: str) -> float:
 
 
 def positive(value: float | str, kind: str, name: str) -> float:
-    """As `quantity`, of one that has to be above zero.
-
-    Parameters
-    ----------
-    value, kind, name
-        As of `quantity`.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        As `quantity`, and if it is not above zero or beyond all measure.
-    """
+    """As `quantity`, of one that has to be above zero."""
     number = quantity(value, kind, name)
     if not number > 0:
         raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")
@@ -77,19 +44,7 @@ LEAST, MOST = 1e-40, 1e40
 
 
 def beyond(number: float, kind: str) -> bool:
-    """Whether a quantity is so small or large that nothing can be computed with it.
-
-    Parameters
-    ----------
-    number : float
-        In SI units.
-    kind : str
-        Key of `springtune.units.QUANTITY_KINDS`.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a quantity is so small or large that nothing can be computed with it."""
     return kind != "force" and not LEAST <= number <= MOST
 
 
@@ -108,15 +63,6 @@ MOST_WORDS = 50
 
 def nearest(word: str, words: Iterable[str]) -> str:
     """``did you mean ...?`` if one of the words is near, and all of them.
-
-    Parameters
-    ----------
-    word : str
-    words : iterable of str
-
-    Returns
-    -------
-    str
 
     Examples
     --------

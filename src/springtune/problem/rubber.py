@@ -38,13 +38,6 @@ class TensileTest:
         Length over the one at rest [1], ascending.
     stress : ndarray of float, shape (n,)
         Force over the cross-section at rest [Pa].
-    name : str
-        What it is called in messages.
-
-    Raises
-    ------
-    TestDataError
-        If there are fewer than three points at different stretches, or one with a stress of the wrong sign.
     """
 
     stretch: np.ndarray
@@ -75,20 +68,6 @@ class TensileTest:
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
         """Test data of a CSV file: stretch, and nominal stress with its unit in the head of its column.
-
-        Parameters
-        ----------
-        path : str or Path
-            Lines that begin with # are left out.
-
-        Returns
-        -------
-        TensileTest
-
-        Raises
-        ------
-        TestDataError
-            If the file cannot be read, its head has no unit of stress, or a line no two numbers; the message names it.
 
         Examples
         --------
@@ -145,12 +124,6 @@ def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
     ----------
     columns : ndarray of float, shape (n, n_terms)
         Stress for a coefficient of 1 at each stretch of the test.
-    test : TensileTest
-
-    Returns
-    -------
-    tuple of float
-        To ten digits, so that keys of stored results do not depend on the machine.
     """
     weights = _weights(test)
     scaled = columns * weights[:, None]

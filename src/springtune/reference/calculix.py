@@ -57,12 +57,8 @@ def side_weights(points: np.ndarray, normal: int, along: int, value: float, quad
     ----------
     points : ndarray of float, shape (n_points, 2)
         [m]
-    normal, along : int
-        Axes across and along the side.
     value : float
         Coordinate of the side [m].
-    quadratic : bool
-        Whether the elements are quadratic, so that middles carry four times the share of corners.
 
     Returns
     -------
@@ -143,27 +139,17 @@ def solve(
         [m]
     elements : ndarray of int, shape (n_elements, 3 or 8)
         Numbers of points.
-    kind : str
-        CalculiX's name of the elements: ``"CPS3"`` or ``"CPS8"``.
-    material : Material
     thickness : float
         [m]
     load : ndarray of float, shape (n_points, 2)
         Forces [N].
     held : ndarray of bool, shape (n_points, 2)
         Directions that are held.
-    finite : bool
-        Whether strains are finite.
 
     Returns
     -------
     ndarray of float, shape (n_points, 2)
         [m]
-
-    Raises
-    ------
-    RuntimeError
-        If the program fails.
     """
     with tempfile.TemporaryDirectory() as folder:
         deck = _deck(points, elements, kind, material, thickness, load, held, finite)

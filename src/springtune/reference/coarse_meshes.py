@@ -60,10 +60,6 @@ class Side:
 
     Attributes
     ----------
-    groups : tuple of str
-        That it belongs to.
-    arc : OutlineSide or None
-        That it lies on; straight without.
     span : tuple of float
         Parameters of the arc at the corner of the lower number and at the other one.
     """
@@ -84,12 +80,6 @@ class CoarseMesh:
         Counter-clockwise.
     parts : ndarray of int, shape (n,)
         Number of the part that each is in.
-    names : tuple of str
-        Of the parts.
-    sides : dict of tuple of int to Side
-        By the points at their ends, the lower number first.
-    named : dict of str to int
-        Points of names that are corners of triangles.
     """
 
     def __init__(
@@ -136,13 +126,7 @@ class CoarseMesh:
         self.parts = np.concatenate([np.delete(self.parts, rows), np.array(parts)])
 
     def bisect(self, first: int, second: int) -> None:
-        """Split a side, and the triangles at it, in the middle.
-
-        Parameters
-        ----------
-        first, second : int
-            Points at its ends.
-        """
+        """Split a side, and the triangles at it, in the middle."""
         new = len(self.points)
         where = self._cut_side(first, second, 0.5, new)
         self.points = np.concatenate([self.points, where[None]])
@@ -161,7 +145,6 @@ class CoarseMesh:
 
         Parameters
         ----------
-        name : str
         where : ndarray of float, shape (2,)
             [m]
         """
@@ -187,12 +170,7 @@ class CoarseMesh:
         return _triangles_at(self.triangles, self.sides)
 
     def isolate(self, corners: Iterable[int]) -> None:
-        """Bisect sides until no triangle has two of some corners.
-
-        Parameters
-        ----------
-        corners : iterable of int
-        """
+        """Bisect sides until no triangle has two of some corners."""
         chosen = np.array(sorted(corners), dtype=int)
         while True:
             among = np.isin(self.triangles, chosen)
@@ -208,12 +186,7 @@ class CoarseMesh:
             self.bisect(first, second)
 
     def grade(self, corners: Iterable[int]) -> None:
-        """Cut the triangles at corners, of which no triangle has two, once.
-
-        Parameters
-        ----------
-        corners : iterable of int
-        """
+        """Cut the triangles at corners, of which no triangle has two, once."""
         for corner in sorted(corners):
             rows = np.flatnonzero((self.triangles == corner).any(axis=1))
             cuts: dict[int, int] = {}
@@ -345,22 +318,10 @@ def outline_mesh(
 
     Parameters
     ----------
-    shape : Shape
-    grouped : GroupedMesh or None
-        The mesh of one that is that of a file: the polygon around its cells, and those around its parts, are followed.
     points : mapping of str to tuple of float
         Named points that are to be corners of triangles [m].
     largest_turn : float
         Of the direction of a side along an arc [rad].
-
-    Returns
-    -------
-    CoarseMesh
-
-    Raises
-    ------
-    MeshError
-        If netgen fails.
     """
     if grouped is None:
         names = ("", *shape.parts)
@@ -500,12 +461,8 @@ class Corner:
 
     Attributes
     ----------
-    what : str
-        What it is, in words.
     rough : bool
         Whether a solution is not smooth enough there for triangles of even size.
-    infinite : bool
-        Whether its stress is known to be infinite.
     """
 
     what: str
@@ -523,20 +480,6 @@ def corners_of(
 
     Sides that are not held give way to an infinite stress where the outline is re-entrant, at more than half a turn
     (Williams 1952); a side beyond which the solution goes on as its mirror image doubles the angle.
-
-    Parameters
-    ----------
-    mesh : CoarseMesh
-    condition : callable
-        What holds on a side, supports and loads; nothing where it is empty.
-    held : callable
-        Whether a side has a support.
-    mirror : callable
-        Whether the solution goes on beyond a side, of a direction, as its mirror image.
-
-    Returns
-    -------
-    dict of int to Corner
     """
     at_sides = mesh.part_sides()
     at_corner: dict[int, list[_Ends]] = {}

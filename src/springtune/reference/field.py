@@ -56,14 +56,8 @@ def field_error(mesh: "Mesh", displacements: np.ndarray, reference: np.ndarray) 
 
     Parameters
     ----------
-    mesh : Mesh
     displacements, reference : ndarray of float, shape (n_points, 2)
         Displacements of the particles [m].
-
-    Returns
-    -------
-    float
-        Integrals are sums over the particles, each with its share of the area of its cells.
     """
     difference, size = (
         mesh.particle_areas @ (field**2).sum(axis=1) for field in (displacements - reference, reference)

@@ -120,26 +120,8 @@ def solve_neo_hooke(
 
     Parameters
     ----------
-    beam : Beam
-    material : Material
     force : float
         Force [N], positive outwards.
-    kind : LoadKind
-    plane : str
-        ``"stress"`` or ``"strain"``.
-    follower : bool
-        Whether the load is a pressure that follows the loaded side.
-
-    Returns
-    -------
-    FiniteStrainSolution
-
-    Raises
-    ------
-    IncompressibleError
-        For an incompressible material in plane strain, which displacements alone cannot describe.
-    FiniteStrainError
-        If Newton's method does not converge in small load steps.
     """
     nu = material.poisson_ratio
     if plane == "strain" and nu >= 0.5:
@@ -152,24 +134,7 @@ def solve_neo_hooke(
 def solve_yeoh(
     beam: Beam, material: Rubber, force: float, kind: LoadKind = FACE, follower: bool = False
 ) -> FiniteStrainSolution:
-    """Displacements of a beam of Yeoh's law in plane stress under a load.
-
-    Parameters
-    ----------
-    beam : Beam
-    material : Rubber
-    force, kind, follower
-        As of `solve_neo_hooke`.
-
-    Returns
-    -------
-    FiniteStrainSolution
-
-    Raises
-    ------
-    FiniteStrainError
-        If Newton's method does not converge in small load steps.
-    """
+    """Displacements of a beam of Yeoh's law in plane stress under a load."""
     return _solve(beam, material, force, kind, Yeoh(material), follower)
 
 
@@ -498,10 +463,6 @@ class _PlaneLaw(ABC):
         strain : ndarray of float, shape (..., 3)
             xx, yy and 2 xy [1].
 
-        Returns
-        -------
-        Response
-
         Notes
         -----
         The energy is one of the trace t and the determinant d of C = 1 + 2 E in the plane. With the cofactor a of C,
@@ -528,12 +489,7 @@ class _PlaneLaw(ABC):
 
 
 class Yeoh(_PlaneLaw):
-    """Yeoh's law of an incompressible sheet in plane stress, with E = 1.
-
-    Parameters
-    ----------
-    material : Rubber
-    """
+    """Yeoh's law of an incompressible sheet in plane stress, with E = 1."""
 
     def __init__(self, material: Rubber) -> None:
         self.coefficients = [one / material.young_modulus for one in material.coefficients]
@@ -556,8 +512,6 @@ class NeoHooke(_PlaneLaw):
     ----------
     nu : float
         Poisson's ratio at small strain [1].
-    plane : str
-        ``"stress"`` or ``"strain"``.
     """
 
     def __init__(self, nu: float, plane: str) -> None:

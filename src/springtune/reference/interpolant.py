@@ -83,7 +83,6 @@ class Interpolant:
 
     Attributes
     ----------
-    kind : LoadKind
     aspect_range, nu_range : tuple of float
         First and last aspect ratio and Poisson's ratio of the box [1].
     values : ndarray of float, shape (4, n_aspect, n_nu)
@@ -118,29 +117,12 @@ class Interpolant:
 
         Parameters
         ----------
-        kind : LoadKind
-            With supports that are symmetric, see `LoadKind.mirrored`.
         aspect_range : tuple of float
             First and last aspect ratio [1]; an interpolant of one that is first and last is a function of the other.
         nu_range : tuple of float
             First and last Poisson's ratio [1], -1 < nu <= 0.5.
         tolerance : float, optional
             Largest relative error estimate to accept [1].
-        most : int, optional
-            Most solves that are worth it.
-        solve : callable, optional
-            Of an aspect ratio, Poisson's ratio, the kind of load and a tolerance: the solution of a unit problem.
-
-        Returns
-        -------
-        Interpolant
-
-        Raises
-        ------
-        ValueError
-            If a range is none, or not one of aspect ratios or Poisson's ratios.
-        NotCertifiedError
-            If a solve does not converge, or the error estimate stays above the tolerance.
 
         Examples
         --------
@@ -171,11 +153,6 @@ class Interpolant:
         -------
         Answers
             Arrays of their shape.
-
-        Raises
-        ------
-        ValueError
-            If one of them is outside the box.
         """
         aspects, nus = np.broadcast_arrays(np.asarray(aspect_ratio, float), np.asarray(nu, float))
         places = _place(np.log(aspects), np.log(self.aspect_range)), _place(nus, self.nu_range)
@@ -195,13 +172,7 @@ class Interpolant:
         return Answers(np.exp(found[0]), np.exp(found[1]), np.expm1(found[2]) * strain, strain, self.error_estimate)
 
     def arrays(self) -> dict[str, Any]:
-        """Numbers and arrays that `from_arrays` takes, such as a file holds.
-
-        Returns
-        -------
-        dict
-            The attributes; `kind` by its name.
-        """
+        """Numbers and arrays that `from_arrays` takes, such as a file holds."""
         return {
             "kind": self.kind.name,
             "aspect_range": np.array(self.aspect_range),
@@ -213,18 +184,7 @@ class Interpolant:
 
     @classmethod
     def from_arrays(cls, kind: LoadKind, arrays: Mapping[str, Any]) -> Self:
-        """Interpolant of what `arrays` gave.
-
-        Parameters
-        ----------
-        kind : LoadKind
-        arrays : mapping
-            Of `arrays`; its kind is not looked at.
-
-        Returns
-        -------
-        Interpolant
-        """
+        """Interpolant of what `arrays` gave."""
         (first, last), (least, largest) = (np.asarray(arrays[name]).tolist() for name in ("aspect_range", "nu_range"))
         error_estimate, solves = float(arrays["error_estimate"]), int(arrays["solves"])
         return cls(kind, (first, last), (least, largest), np.asarray(arrays["values"]), error_estimate, solves)
@@ -324,10 +284,6 @@ def _well_behaved(answers: np.ndarray) -> np.ndarray:
 def chebyshev_points(count: int) -> np.ndarray:
     """Chebyshev points from 1 to -1, both included; one is in the middle.
 
-    Parameters
-    ----------
-    count : int
-
     Returns
     -------
     ndarray of float, shape (count,)
@@ -346,8 +302,6 @@ def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
     ----------
     places : ndarray of float, shape (n,)
         From -1 to 1.
-    count : int
-        Number of points.
 
     Returns
     -------

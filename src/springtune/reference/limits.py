@@ -31,10 +31,6 @@ def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray)
         Coordinates of a grid [m], ascending.
     displacements : ndarray of float, shape (n_x, n_y, 2)
         Displacements there [m].
-
-    Returns
-    -------
-    rotation, strain : float
     """
     middle = [(displacements[:, 1:] + displacements[:, :-1]) / 2, (displacements[1:] + displacements[:-1]) / 2]
     by_x = np.diff(middle[0], axis=0) / np.diff(x)[:, None, None]
@@ -52,10 +48,6 @@ def most_rotation_and_strain(gradients: np.ndarray, areas: np.ndarray) -> tuple[
         By component of the displacement, then by coordinate [1].
     areas : ndarray of float, shape (n,)
         That they stand for [m2].
-
-    Returns
-    -------
-    rotation, strain : float
     """
     by_x, by_y = gradients[..., 0], gradients[..., 1]
     rotation = np.abs(by_x[..., 1] - by_y[..., 0]) / 2
@@ -79,10 +71,6 @@ def elastica(load: float) -> float:
     ----------
     load : float
         :math:`\alpha = F L^2 / (E I)` [1], at least 0.
-
-    Returns
-    -------
-    float
 
     Notes
     -----
@@ -112,11 +100,6 @@ def rotation_effect(rotation: float) -> float:
     ----------
     rotation : float
         [rad]
-
-    Returns
-    -------
-    float
-        Relative to the deflection in small strain, negative; about -16/35 times the rotation squared.
     """
     load = 2 * abs(rotation)
     return 3 * elastica(load) / load - 1 if load else 0.0
@@ -129,12 +112,6 @@ def beyond_linear(rotation: float, strain: float) -> str:
     ----------
     rotation, strain : float
         Of the reference, see `rotation_and_strain` [rad, 1].
-
-    Returns
-    -------
-    str
-        Empty where it applies: where finite rotation would change the deflection of a cantilever by at most 1 %, and
-        strains are at most 15 %.
     """
     reasons = []
     effect = rotation_effect(rotation)
@@ -151,17 +128,8 @@ def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
 
     Parameters
     ----------
-    result : dict
-        A stored reference of small strain, for 1 N, see `springtune.studies.kinds.scenes.any_reference.read`.
     force : float
         Force on the network [N].
-    kinematics : str
-        Of the network.
-
-    Returns
-    -------
-    str
-        Empty where there is no objection.
     """
     if "displacement" not in result:
         return f"no reference: {result['message']}"

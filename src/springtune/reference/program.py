@@ -7,13 +7,7 @@ PROGRAM = "ccx"
 
 
 def program() -> str:
-    """Which CalculiX is on the machine: another one, or none, gives other results.
-
-    Returns
-    -------
-    str
-        Size and time of its file; empty without.
-    """
+    """Which CalculiX is on the machine: another one, or none, gives other results."""
     found = shutil.which(PROGRAM)
     if found is None:
         return ""

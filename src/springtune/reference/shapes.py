@@ -62,10 +62,6 @@ class ShapeReference:
         Strain energy [J].
     rotation, strain : float
         Rotation [rad] and strain [1] by which the solution is judged, see `springtune.reference.limits`.
-    unknowns : int
-        Number of unknowns of the finest level.
-    degree : int
-        Of its polynomials.
     negligible : tuple of str
         Quantities that are less than a thousandth of what is largest of their kind: an error relative to such a one is
         large where the solution is good.
@@ -117,16 +113,7 @@ class ShapeReference:
         return self._factor * self._level.stresses(points)
 
     def scaled(self, factor: float) -> "ShapeReference":
-        """The solution under so many times the load, prescribed displacements included: small strain is linear.
-
-        Parameters
-        ----------
-        factor : float
-
-        Returns
-        -------
-        ShapeReference
-        """
+        """The solution under so many times the load, prescribed displacements included: small strain is linear."""
         values = {
             name: value * (factor**2 if self._kinds[name] == "energy" else factor)
             for name, value in self.values.items()
@@ -152,26 +139,10 @@ def solve_shape(
 
     Parameters
     ----------
-    shape : Shape
-    load : LoadCase
-    materials : Material or mapping of str to Material
-        By part; that of the main part is ``""``.
     grouped : GroupedMesh, optional
         The mesh as read, of a shape whose body is that of a file: the polygon around its cells is then the geometry.
     tolerance : float
         Largest relative error estimate to accept [1]; ten times as much of stresses.
-
-    Returns
-    -------
-    ShapeReference
-
-    Raises
-    ------
-    ValueError
-        If a group or part has no support, side, point or material that it needs, supports contradict each other or
-        leave the body free to move, or a quantity has no finite value.
-    ReferenceNotConvergedError
-        If an estimate of the last level does not meet the tolerance.
 
     Notes
     -----
@@ -204,13 +175,6 @@ def solve_each(
     ----------
     shape, load, materials, grouped
         As in `solve_shape`.
-
-    Returns
-    -------
-    references : list of ShapeReference
-        One where all quantities converge together.
-    lacking : dict of str to str
-        Why others have none, by name; by ``""`` where the load asks for none.
     """
     try:
         return [solve_shape(shape, load, materials, grouped)], {}
@@ -241,17 +205,6 @@ def converge(
     ----------
     shape, load, materials, grouped, tolerance
         As in `solve_shape`.
-    tractions, displacements : mapping of str to callable, optional
-        By group: vectors of points and outward normals, instead of those that the load has there.
-
-    Returns
-    -------
-    ShapeReference
-
-    Raises
-    ------
-    ValueError, ReferenceNotConvergedError
-        As `solve_shape`.
     """
     problem = _Problem(shape, load, materials, grouped, tractions or {}, displacements or {})
     names = [quantity.name for quantity in load.quantities]
@@ -314,10 +267,6 @@ def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
         Relative [1].
     before, last : float
         Sizes of the last two steps from level to level, over the same [1].
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -10,29 +10,12 @@ from ..problem.materials import Material
 
 
 def unit_problem(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float, LoadKind]:
-    """Aspect ratio [1], Poisson's ratio [1] and kind of load.
-
-    Parameters
-    ----------
-    beam : Beam
-    material : Material
-    kind : LoadKind
-
-    Returns
-    -------
-    tuple of float, float and LoadKind
-        The aspect ratio to twelve digits, so that it is the same for .2 over .04 and for .1 over .02.
-    """
+    """Aspect ratio [1], Poisson's ratio [1] and kind of load."""
     return float(f"{beam.length / beam.height:.12g}"), material.poisson_ratio, kind
 
 
 def unit_scales(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float]:
     """What lengths and displacements of the unit problem are multiplied with.
-
-    Parameters
-    ----------
-    beam, material, kind
-        As in `unit_problem`.
 
     Returns
     -------

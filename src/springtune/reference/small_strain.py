@@ -118,10 +118,6 @@ class ReferenceSolution:
             What displacements are multiplied with [1].
         length : float, optional
             What the sizes of the beam are multiplied with [1].
-
-        Returns
-        -------
-        ReferenceSolution
         """
         names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
         names |= {"rotation": abs(factor) / length, "strain": abs(factor) / length}
@@ -158,19 +154,6 @@ def solve_small_strain(
         Force [N], spread evenly over the loaded side; axial ones are positive in tension.
     tolerance : float
         Largest relative error estimate to accept [1].
-    kind : LoadKind
-        With supports that are symmetric, see `LoadKind.mirrored`.
-
-    Returns
-    -------
-    ReferenceSolution
-
-    Raises
-    ------
-    ValueError
-        If Poisson's ratio is outside its range, or the supports of the load are not symmetric.
-    ReferenceNotConvergedError
-        If the last level does not meet the tolerance.
 
     Notes
     -----
@@ -215,20 +198,8 @@ def solve_unit(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float 
         Length over height [1].
     nu : float
         Poisson's ratio [1].
-    kind : LoadKind
-        With supports that are symmetric, see `LoadKind.mirrored`.
     tolerance : float
         Largest relative error estimate to accept [1].
-
-    Returns
-    -------
-    ReferenceSolution
-        In units of half the height and of the traction over Young's modulus.
-
-    Raises
-    ------
-    ReferenceNotConvergedError
-        If the last level does not meet the tolerance.
     """
     level, estimate = _converge(aspect_ratio, nu, kind, tolerance)
     x, y, field = level.field()
@@ -301,10 +272,6 @@ class UnitLevel:
         Length over half the height [1].
     nu : float
         Poisson's ratio [1].
-    degree : int
-        Level: degree of the polynomials along each axis, and number of layers at a corner.
-    kind : LoadKind
-        With supports that are symmetric, see `LoadKind.mirrored`.
 
     Attributes
     ----------
@@ -314,8 +281,6 @@ class UnitLevel:
         The displacement of the load: as `displacement`, of a pressed side that of its middle.
     round_off : float
         Bound on the relative rounding error of both [1].
-    unknowns : int
-        Number of unknowns.
 
     Notes
     -----

@@ -18,16 +18,7 @@ CORNER_GRADIENTS = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
 
 
 def function_counts(degree: int) -> tuple[int, int]:
-    """Number of shape functions of a side and of the inside of a triangle.
-
-    Parameters
-    ----------
-    degree : int
-
-    Returns
-    -------
-    sides, inside : int
-    """
+    """Number of shape functions of a side and of the inside of a triangle."""
     return degree - 1, (degree - 1) * (degree - 2) // 2
 
 
@@ -46,8 +37,6 @@ def side_functions(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     Parameters
     ----------
-    degree : int
-        At least 2.
     along : ndarray of float, shape (n,)
         From -1 at the corner of the lower number to 1.
 
@@ -68,8 +57,6 @@ def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Parameters
     ----------
-    degree : int
-        At least 2.
     points : ndarray of float, shape (n, 2)
         In the triangle of the corners (0, 0), (1, 0) and (0, 1).
 
@@ -112,11 +99,6 @@ def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.nda
 def triangle_rule(exact: int) -> tuple[np.ndarray, np.ndarray]:
     """Points and weights of a quadrature in the reference triangle, by Gauss's rules in a square folded onto it.
 
-    Parameters
-    ----------
-    exact : int
-        Degree of the polynomials that it integrates.
-
     Returns
     -------
     points : ndarray of float, shape (n, 2)
@@ -138,10 +120,6 @@ def tabulated(degree: int, exact: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     ----------
     degree, exact : int
         Of the shape functions, and of what is integrated.
-
-    Returns
-    -------
-    points, weights, values, gradients : ndarray of float
     """
     points, weights = triangle_rule(exact)
     return points, weights, *shape_functions(degree, points)
@@ -150,10 +128,6 @@ def tabulated(degree: int, exact: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
 @lru_cache(maxsize=64)
 def side_fit(degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points on a side at which a curve is met, and what takes the values there to those of the side's functions.
-
-    Parameters
-    ----------
-    degree : int
 
     Returns
     -------

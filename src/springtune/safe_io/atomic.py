@@ -20,13 +20,7 @@ written within seconds."""
 
 
 def writer() -> str:
-    """Who writes, as names of files say it: the number of this process, at a machine, since others have it, too.
-
-    Returns
-    -------
-    str
-        Without a dot.
-    """
+    """Who writes, as names of files say it: the number of this process, at a machine, since others have it, too."""
     return f"{os.getpid()}@{platform.node().replace('.', '-')}"
 
 
@@ -35,19 +29,6 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
     """Context in which a file is written under another name; it gets its own when all is written.
 
     Nothing is left of it after an error, and a file of before stays.
-
-    Parameters
-    ----------
-    path : str or Path
-        Folders are made where they are missing.
-    synced : bool, optional
-        Whether the content shall be on the disk, not in its cache, before the file has its name: a machine that loses
-        its power leaves the file of before, or the new one.
-
-    Yields
-    ------
-    Path
-        Where to write.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -66,15 +47,6 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
 def check_folder(path: str | Path) -> None:
     """Refuse a file whose folder is not there: who misspells one is not to get another.
 
-    Parameters
-    ----------
-    path : str or Path
-        Of a file that a user names.
-
-    Raises
-    ------
-    ValueError
-
     Examples
     --------
     >>> check_folder("nowhere/net.csv")
@@ -91,12 +63,6 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
     """Remove what writers that were killed have left in a folder; what a process that lives is writing stays.
 
     Of a process on another machine that is what was written to within the last hour.
-
-    Parameters
-    ----------
-    folder : str or Path
-    below : bool, optional
-        Whether to look into folders below it, too.
 
     Examples
     --------
@@ -122,24 +88,13 @@ def _is_written(path: Path) -> bool:
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write a file; folders are made where they are missing.
-
-    Parameters
-    ----------
-    path : str or Path
-    content : bytes
-    """
+    """Write a file; folders are made where they are missing."""
     with replacing(path) as unfinished:
         unfinished.write_bytes(content)
 
 
 def write_text(path: str | Path, text: str) -> None:
     """Write a text in UTF-8; folders are made where they are missing.
-
-    Parameters
-    ----------
-    path : str or Path
-    text : str
 
     Examples
     --------
@@ -154,12 +109,6 @@ def write_text(path: str | Path, text: str) -> None:
 
 def write_json(path: str | Path, content: Any) -> None:
     """Write JSON; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-    content : object
-        Dicts, lists, numbers and texts.
 
     Examples
     --------

@@ -12,14 +12,6 @@ PUNCTUATION = re.compile(r"([^\w\s]|_)")
 def shown(text: object) -> str:
     r"""Return a text as one line whose control characters can be read and do nothing.
 
-    Parameters
-    ----------
-    text : object
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> print(shown("12 faults\x1b[2K\r0 faults\n"))
@@ -30,15 +22,6 @@ def shown(text: object) -> str:
 
 def rst(text: str) -> str:
     r"""Return reStructuredText that says a text.
-
-    Parameters
-    ----------
-    text : str
-        One line.
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -52,15 +35,6 @@ def rst(text: str) -> str:
 def markdown(text: object) -> str:
     r"""Return Markdown that says a text, also in a cell of a table.
 
-    Parameters
-    ----------
-    text : str
-        One line.
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> print(markdown("a | b <script>"))
@@ -71,14 +45,6 @@ def markdown(text: object) -> str:
 
 def no_mathematics(text: str) -> str:
     r"""Return a text of a figure in which a dollar sign is one.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -33,15 +33,6 @@ class BeyondBound(MemoryError):
 def fault(path: str | Path) -> str:
     """Why a file is not opened: it is not there, or no regular file. A pipe may block, and a device never ends.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    str
-        Empty where the file may be opened.
-
     Examples
     --------
     >>> fault("nothing.csv"), fault("/"), fault("/dev/null")
@@ -57,23 +48,7 @@ def fault(path: str | Path) -> str:
 
 
 def read(path: str | Path, most: int) -> bytes:
-    """Content of a regular file.
-
-    Parameters
-    ----------
-    path : str or Path
-    most : int
-        Bytes of the largest file that is read.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    ValueError
-        That says why it is not read, as `fault` does, or that it is too large.
-    """
+    """Content of a regular file."""
     why = fault(path)
     if not why:
         try:
@@ -104,17 +79,6 @@ def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
     A damaged file may state any number of points. The bound of memory is one of the process, so other threads share
     it; that of seconds is kept in the main thread alone. Where the system has no such bound there is none, and one of
     memory that is tighter already stays.
-
-    Parameters
-    ----------
-    memory : float
-    seconds : float, optional
-        0 for no bound.
-
-    Raises
-    ------
-    BeyondBound
-        In place of a MemoryError that this bound has caused, and after these seconds.
     """
     with _bounds, _timed(seconds):
         used = virtual_memory()
@@ -159,19 +123,7 @@ def _timed(seconds: float) -> Iterator[None]:
 
 
 def check_alone(path: str | Path) -> None:
-    """Refuse an HDF5 file whose data are elsewhere: in another file of the machine, whatever that is.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Raises
-    ------
-    DataElsewhere
-        That names the link or dataset, and where it points.
-    OSError
-        If it is not an HDF5 file.
-    """
+    """Refuse an HDF5 file whose data are elsewhere: in another file of the machine, whatever that is."""
     import h5py
 
     names: dict[str, str] = {}

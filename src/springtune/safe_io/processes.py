@@ -8,12 +8,7 @@ SAME_START = 2.0
 
 
 def this_host() -> str:
-    """Name of the machine, or the container, in which a process's number says something.
-
-    Returns
-    -------
-    str
-    """
+    """Name of the machine, or the container, in which a process's number says something."""
     try:
         return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
     except OSError:
@@ -21,20 +16,7 @@ def this_host() -> str:
 
 
 def lives(pid: int, start: float | None = None) -> bool:
-    """Whether a process lives.
-
-    Parameters
-    ----------
-    pid : int
-        Its number.
-    start : float, optional
-        When it began, seconds since the epoch; a number is given to others when its process is gone.
-
-    Returns
-    -------
-    bool
-        False for what nobody waits for and stays in the list of processes: a container may have nobody.
-    """
+    """Whether a process lives."""
     import psutil  # here: hardly ever is there something to ask
 
     try:

@@ -34,17 +34,8 @@ def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> 
 
     Parameters
     ----------
-    sheet : Sheet
-    kind : LoadKind
-    kinematics : str
-        ``"linear"`` or ``"nonlinear"``.
     loads : ndarray of float, shape (n,)
         Force over stiffness, all of one sign [m].
-
-    Returns
-    -------
-    LinearPath or StablePath
-        Of the displacement of the load.
     """
     problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
     return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
@@ -56,19 +47,12 @@ def meeting(path: LinearPath | StablePath, force: float, stiffness: np.ndarray, 
 
     Parameters
     ----------
-    path : LinearPath or StablePath
     force : float
         [N]
     stiffness, displacement, stable : ndarray, shape (n,)
         The curve [N/m, m], and whether its equilibria are stable.
     reference : float
         Displacement of the reference [m].
-    objection : str
-        Why the network is not to be fitted to it; empty where it is.
-
-    Returns
-    -------
-    Best
     """
     if objection:
         return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")

@@ -16,22 +16,7 @@ FILLED = 1e-6
 
 
 def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str) -> None:
-    """Refuse an argument of another type.
-
-    Parameters
-    ----------
-    value : object
-    wanted : type or tuple of type
-        The first one is named in the message.
-    name : str
-        Of the argument.
-    example : str
-        How one is made.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse an argument of another type."""
     if wanted is Material and isinstance(value, AnisotropicMaterial):
         only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
@@ -51,17 +36,7 @@ A_BEAM, A_MESH, A_MATERIAL = (
 
 
 def check_filled(mesh: Mesh, beam: Beam) -> None:
-    """Refuse a mesh that does not fill its beam exactly once, as its reference does.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    beam : Beam
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse a mesh that does not fill its beam exactly once, as its reference does."""
     low, high, box = mesh.points.min(axis=0), mesh.points.max(axis=0), np.array([beam.length, beam.height])
     remedy = "make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
     if np.abs(np.concatenate([low, high - box])).max() > FILLED * box.max():

@@ -102,12 +102,7 @@ class Moduli:
 
 
 class MeshModuli:
-    """Patch tests of many definitions on one mesh; networks that differ in reference stiffness alone once.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    """
+    """Patch tests of many definitions on one mesh; networks that differ in reference stiffness alone once."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.sheet = Sheet(mesh, 1.0)

@@ -20,20 +20,10 @@ def motion_of(
 
     Parameters
     ----------
-    sheet : Sheet
-    kind : LoadKind
-        Which directions are held, and where the force acts.
-    springs : Springs
     density : float
         Of the material [kg/m3].
     force : float, optional
         With its sign [N].
-    **options
-        As `springtune.mechanics.dynamics.Motion` takes them, in the place of the load, too.
-
-    Returns
-    -------
-    Motion
 
     Examples
     --------
@@ -58,12 +48,8 @@ def stable_steps(
 
     Parameters
     ----------
-    sheet : Sheet
-    springs : Springs
     inertia : ndarray of float, shape (n_points,)
         Masses of the particles [kg].
-    integrators : iterable of str
-        Of `springtune.mechanics.integrators.INTEGRATORS`.
     held : ndarray of bool, shape (n_points, 2), optional
         Which directions are held; none without.
 

@@ -99,20 +99,6 @@ def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
 def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
     """Refuse a mesh that is of another shape, or has groups that are not the shape's: the reference is on the outline.
 
-    Parameters
-    ----------
-    shape : Shape
-        Of an outline; the body of any other one is the mesh.
-    grouped : GroupedMesh
-    materials : mapping of str to Material or AnisotropicMaterial
-        By part; where parts of one material meet is no matter.
-
-    Raises
-    ------
-    ValueError
-        If particles of its outline, or between materials, are on no side, a side has none, or a group or named point is
-        elsewhere.
-
     Examples
     --------
     >>> import springtune as st

@@ -77,15 +77,6 @@ def definition_of(definition: AnyDefinition) -> Definition | OwnDefinition:
     definition : str, Definition or callable
         Key of `springtune.springs.DEFINITIONS`, or (mesh, material, thickness) -> Springs.
 
-    Returns
-    -------
-    Definition or OwnDefinition
-
-    Raises
-    ------
-    ValueError
-        If there is no definition of that name.
-
     Examples
     --------
     >>> definition_of("lattice").name
@@ -99,38 +90,14 @@ def definition_of(definition: AnyDefinition) -> Definition | OwnDefinition:
 
 
 def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
-    """Entry of a mapping, or an error that says what there is.
-
-    Parameters
-    ----------
-    known : mapping
-    name : str
-    what : str
-        What is chosen, for the message.
-
-    Raises
-    ------
-    ValueError
-        If there is no such entry.
-    """
+    """Entry of a mapping, or an error that says what there is."""
     if isinstance(name, str) and name in known:
         return known[name]
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
 def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -> None:
-    """Refuse a definition that lacks the uniform stiffness that it is told, or has one that it does not use.
-
-    Parameters
-    ----------
-    definition : Definition or OwnDefinition
-    stiffness : float, str or None
-        What is given.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse a definition that lacks the uniform stiffness that it is told, or has one that it does not use."""
     if (definition.needs == "stiffness") == (stiffness is not None):
         return
     if stiffness is None:
@@ -145,17 +112,7 @@ def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -
 
 @contextmanager
 def named(definition: Definition | OwnDefinition) -> Iterator[None]:
-    """Context in which a definition that refuses a mesh or material is named.
-
-    Parameters
-    ----------
-    definition : Definition or OwnDefinition
-
-    Raises
-    ------
-    DefinitionError
-        As raised within, with the name ahead of it.
-    """
+    """Context in which a definition that refuses a mesh or material is named."""
     try:
         yield
     except DefinitionError as error:
@@ -168,8 +125,6 @@ class Loading:
 
     Attributes
     ----------
-    key : tuple
-        What tells it from others on the mesh.
     held : ndarray of bool, shape (n_points, 2)
         Directions that cannot move, or move as they are told.
     pattern : ndarray of float, shape (n_points, 2)
@@ -196,13 +151,8 @@ class Solution:
 
     Attributes
     ----------
-    problem : StaticProblem
     load : float
         Force over the reference stiffness [m].
-    equilibrium : Equilibrium
-    status : Status
-    message : str
-        Why it is not solved; empty where it is.
     negative_pivots : int or float
         Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
     displacement : float
@@ -225,17 +175,10 @@ def solved(
 
     Parameters
     ----------
-    problem : StaticProblem
     load : float
         Force over the reference stiffness [m].
-    kinematics : str
-        ``"linear"`` or ``"nonlinear"``.
     displacement : callable
         What is read from displacements of the particles [m], shape (n_points, 2).
-
-    Returns
-    -------
-    Solution
     """
     found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
     status, message, pivots = problem.judge(load, found)
@@ -251,13 +194,8 @@ class Sheet:
 
     Parameters
     ----------
-    mesh : Mesh
     thickness : float
         Of the sheet [m].
-    networks : int, optional
-        Networks that are kept.
-    like : Sheet, optional
-        A sheet whose numbering networks take over if its mesh has the same cells, wherever their corners are.
 
     Attributes
     ----------
@@ -304,25 +242,11 @@ class Sheet:
 
         Parameters
         ----------
-        definition : str, Definition or callable
-            See `definition_of`.
-        material : Material or AnisotropicMaterial
         stiffness : float, optional
             Uniform stiffness [N/m], for definitions that are told one.
         case : tuple of LoadKind, float and ndarray, optional
             For definitions that are told cases: load, force [N] and displacements for 1 N that the network should have
             [m/N], shape (n_points, 2), or None where there are none; even tension and shear of the mesh itself without.
-
-        Returns
-        -------
-        springs : Springs
-        seconds : float
-            That deriving them took, now or before.
-
-        Raises
-        ------
-        DefinitionError
-            If the definition cannot live on the mesh or with the material, or is not told what it needs.
         """
         definition = definition_of(definition)
         key: tuple[object, ...] = definition, material, stiffness
@@ -347,28 +271,8 @@ class Sheet:
 
         Parameters
         ----------
-        definition : Definition
-        materials : mapping of str to Material or AnisotropicMaterial
-            By part, the main one at ``""``.
-        grouped : GroupedMesh
-            Of this mesh.
         stiffness : float, optional
             Uniform stiffness [N/m], for definitions that are told one.
-        cases : list of Case, optional
-            For definitions that are told cases.
-        case_key : tuple, optional
-            What tells these from others on the mesh.
-
-        Returns
-        -------
-        springs : Springs
-        seconds : float
-            That deriving them took, now or before.
-
-        Raises
-        ------
-        DefinitionError
-            If the definition cannot live on the mesh or with a material, or is not told what it needs.
         """
         given = cases if definition.needs == "cases" else stiffness
         key = definition, grouped, tuple(materials.items()), stiffness, case_key if definition.needs == "cases" else ()
@@ -401,11 +305,6 @@ class Sheet:
         ----------
         directions : ndarray of bool, shape (n_points, 2)
             True where a particle cannot move in x or y.
-        springs : Springs
-
-        Returns
-        -------
-        Network
         """
         return self._known(directions, springs)[0]
 
@@ -435,19 +334,7 @@ class Sheet:
         return pattern
 
     def problem(self, kind: LoadKind, springs: Springs, follower: bool = False) -> StaticProblem:
-        """Static problem of springs under a load.
-
-        Parameters
-        ----------
-        kind : LoadKind
-        springs : Springs
-        follower : bool, optional
-            Whether the force turns and grows with the side that it acts on.
-
-        Returns
-        -------
-        StaticProblem
-        """
+        """Static problem of springs under a load."""
         network, problems = self._known(self.held(kind), springs)
         label = (kind, springs.lateral, follower)
         if label not in problems:
@@ -456,17 +343,7 @@ class Sheet:
         return problems[label]
 
     def stated(self, loading: Loading, springs: Springs) -> StaticProblem:
-        """Static problem of springs under any loading; at ``s = 1 / springs.reference`` it is the whole load.
-
-        Parameters
-        ----------
-        loading : Loading
-        springs : Springs
-
-        Returns
-        -------
-        StaticProblem
-        """
+        """Static problem of springs under any loading; at ``s = 1 / springs.reference`` it is the whole load."""
         network, problems = self._known(loading.held, springs)
         label = loading.key, None if loading.given is None else springs.reference
         if label not in problems:
@@ -481,18 +358,8 @@ class Sheet:
 
         Parameters
         ----------
-        kind : LoadKind
-        springs : Springs
         force : float
             With its sign [N].
-        kinematics : str
-            ``"linear"`` or ``"nonlinear"``.
-        follower : bool, optional
-            As of `problem`.
-
-        Returns
-        -------
-        Solution
         """
         problem = self.problem(kind, springs, follower)
         return solved(problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved))

@@ -568,37 +568,12 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class SceneSprings(Springs):
-    """Springs of a scene, which knows what their numbers are of.
-
-    Attributes
-    ----------
-    scene : Scene
-    """
+    """Springs of a scene, which knows what their numbers are of."""
 
     scene: Scene | None = field(default=None, repr=False)
 
     def write(self, path: str | Path, **options: Any) -> list[Path]:
-        """Write the springs for another program, see `springtune.SpringNet`.
-
-        Parameters
-        ----------
-        path : str or Path
-            Ending in ``.csv``, ``.json``, ``.vtu`` or ``.h5``, or in one of those for simulators, see
-            `springtune.SpringNet.write`.
-        **options
-            ``mesh_name``, what the header calls the mesh, ``errors``, whether it says the expected errors, and
-            ``mujoco``, see `springtune.SpringNet.write`.
-
-        Returns
-        -------
-        list of Path
-            What was written.
-
-        Raises
-        ------
-        ValueError
-            If the name has another ending, or its folder is not there.
-        """
+        """Write the springs for another program, see `springtune.SpringNet`."""
         written: list[Path] = hook("writing").write_springs(path, self.scene, self, **options)
         return written
 

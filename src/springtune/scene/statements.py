@@ -50,23 +50,10 @@ A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
 class BeamStatement:
     """A beam under a load.
 
-    Parameters
-    ----------
-    beam : Beam
-    mesh : Mesh
-    material : Material
-    load : str
-    force : float, str or None
-    kinematics : str
-
     Attributes
     ----------
-    kind : LoadKind
     force : float
         With the sign that its load gives it [N].
-    follower : bool
-    label : str
-        In words.
     """
 
     body: str
@@ -180,30 +167,10 @@ class ShapeStatement:
 
     Parameters
     ----------
-    shape : Shape
-    grouped : GroupedMesh
-    material : Material, AnisotropicMaterial or mapping of str to those
-        By part, the main one at ``""``; or of all.
     load : str
         Key of the shape's loads.
     scale : float
         Factor on all that the load case prescribes [1].
-    kinematics : str
-
-    Attributes
-    ----------
-    case : LoadCase
-        Scaled.
-    by_part : dict of str to Material
-    materials : list of Material
-        Each once.
-    label : str
-        In words.
-
-    Raises
-    ------
-    ValueError
-        If an argument is none, a name is unknown, a part lacks its material, or nothing is loaded.
     """
 
     load: str
@@ -439,18 +406,7 @@ Statement = BeamStatement | ShapeStatement
 
 
 def scaled(case: LoadCase, scale: float) -> LoadCase:
-    """Load case with all that it prescribes times a factor.
-
-    Parameters
-    ----------
-    case : LoadCase
-    scale : float
-
-    Returns
-    -------
-    LoadCase
-        What others expect of quantities is scaled as in linear elasticity, too.
-    """
+    """Load case with all that it prescribes times a factor."""
     if scale == 1:
         return case
 
@@ -523,15 +479,8 @@ def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float)
 
     Parameters
     ----------
-    beam : Beam
-    material : Material
-    kind : LoadKind
     force : float
         [N]
-
-    Returns
-    -------
-    ReferenceSolution
     """
     from ..reference.similarity import unit_problem, unit_scales
 

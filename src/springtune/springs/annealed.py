@@ -21,21 +21,7 @@ MAX_EVALUATIONS = 1000
 def springs(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
-    """Stiffness of each spring by simulated annealing on a scene's reference displacements.
-
-    Parameters
-    ----------
-    mesh, material, thickness
-        As in `springtune.springs.lattice.springs`.
-    cases : sequence of Case
-        What to match.
-    evaluations : int, optional
-        Solves that the search may take.
-
-    Returns
-    -------
-    Springs
-    """
+    """Stiffness of each spring by simulated annealing on a scene's reference displacements."""
     from scipy.optimize import dual_annealing  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)

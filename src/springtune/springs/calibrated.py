@@ -25,11 +25,6 @@ def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
     -------
     float
         Their mean [N/m].
-
-    Raises
-    ------
-    ValueError
-        If a curve has no best stiffness: a mean over some sizes would not say so.
     """
     curves = list(curves)
     if not curves:

@@ -47,19 +47,8 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
 
     Parameters
     ----------
-    mesh : Mesh
-    material : Material or AnisotropicMaterial
     thickness : float
         Thickness of the sheet [m].
-
-    Returns
-    -------
-    list of Case
-
-    Raises
-    ------
-    DefinitionError
-        If the mesh has parts that no edge joins.
     """
     from ..mechanics.moduli import free_body, outline_forces  # here: see `springtune.springs`
 
@@ -115,15 +104,7 @@ def _start(mesh: Mesh, material: AnyMaterial, thickness: float) -> tuple[float, 
 
 
 class Misfit:
-    """Misfit of networks that differ in stiffness, its gradient, and how often it was asked.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    material : Material or AnisotropicMaterial
-    thickness : float
-    cases : sequence of Case
-    """
+    """Misfit of networks that differ in stiffness, its gradient, and how often it was asked."""
 
     def __init__(self, mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]):
         from ..mechanics.network import Network  # here: see `springtune.springs`

@@ -34,19 +34,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Parameters
     ----------
-    mesh : Mesh
-    material : Material
     thickness : float
         Thickness t of the sheet [m].
-
-    Returns
-    -------
-    Springs
-
-    Raises
-    ------
-    DefinitionError
-        If the mesh has quadrilaterals other than rectangles, or rectangles slender enough for a negative stiffness.
     """
     return Springs(COEFFICIENT * material.young_modulus * thickness, half_weight(mesh))
 
@@ -78,12 +67,8 @@ def predicted_stiffness(material: Material, beam: Beam, mesh_size: float, load: 
 
     Parameters
     ----------
-    material : Material
-    beam : Beam
     mesh_size : float
         Edge length a [m].
-    load : str, optional
-        Key of `springtune.problem.loads.LOADS`.
 
     Returns
     -------

@@ -16,16 +16,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float, stiffness: floa
 
     Parameters
     ----------
-    mesh : Mesh
-    material : Material or AnisotropicMaterial
-        Not used: the stiffness is stated, not derived.
-    thickness : float
-        Not used.
     stiffness : float
         Stiffness of every spring [N/m].
-
-    Returns
-    -------
-    Springs
     """
     return Springs(stiffness, uniform(mesh))

@@ -59,10 +59,6 @@ class Derives(Protocol):
 def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
     """Cells of each part, the main one's among them.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh
-
     Returns
     -------
     dict of str to dict of int to ndarray of bool, shape (n_cells,)
@@ -90,17 +86,6 @@ def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
 
 def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
     """Refuse materials that do not go with the parts of a body.
-
-    Parameters
-    ----------
-    grouped : GroupedMesh
-    materials : mapping of str to Material or AnisotropicMaterial
-        By part; ``""`` is the main one.
-
-    Raises
-    ------
-    DefinitionError
-        If a part has no material, or there is a material of no part.
 
     Examples
     --------
@@ -134,23 +119,8 @@ def derive_by_parts(
 
     Parameters
     ----------
-    definition : Definition
-    grouped : GroupedMesh
-    materials : mapping of str to Material or AnisotropicMaterial
-        By part; ``""`` is the main one.
     thickness : float
         Of the sheet [m].
-    given : float or sequence of Case, optional
-        What the definition `needs`, where all parts are of one material.
-
-    Returns
-    -------
-    Springs
-
-    Raises
-    ------
-    DefinitionError
-        If a part has no material, the definition cannot live on a part, or it is told one thing for the whole body.
 
     Examples
     --------

@@ -110,11 +110,6 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 def outline_tests(mesh: Mesh) -> np.ndarray:
     """Forces on the particles of tests under polynomial stresses, each of unit work, none on the others' displacements.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Of triangles.
-
     Returns
     -------
     ndarray of float, shape (n_tests, n_points, 2)

@@ -48,24 +48,7 @@ class SpringLaw:
 
     @classmethod
     def fitted(cls, test: TensileTest | str | Path, terms: int = 3) -> "SpringLaw":
-        """Law fitted to a uniaxial test along a row, as far as the lattice does not lie flat.
-
-        Parameters
-        ----------
-        test : TensileTest, str or Path
-            Or its CSV file, see `TensileTest.read`; stretches from `FLAT` on are left out.
-        terms : int, optional
-            1 to 3.
-
-        Returns
-        -------
-        SpringLaw
-
-        Raises
-        ------
-        TestDataError
-            If the test cannot be read, has too few points below `FLAT`, or the fitted law is unstable along it.
-        """
+        """Law fitted to a uniaxial test along a row, as far as the lattice does not lie flat."""
         test = told(test)
         check_terms(terms, len(LAW_POWERS))
         below = test.stretch < FLAT

@@ -40,36 +40,7 @@ def write(
     chosen: Mapping[str, bool] | None = None,
     tell: "Callable[[Contents], None] | None" = None,
 ) -> str:
-    """Write the archive of a study, which appears whole or not at all.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where its results are, as named from this folder: ``results/<study>`` of the checkout.
-    target : Path
-        Zip file to write.
-    store : bool, optional
-        Whether what the stages stored is packed, too: meshes, references, curves, solutions.
-    untracked : bool, optional
-        Whether files of the packed folders are packed that git does not know.
-    chosen : dict of str to bool, optional
-        What is left out or not, as of `springtune.studies.runs.rerun.untold`.
-    tell : callable, optional
-        Called with the contents before anything is written.
-
-    Returns
-    -------
-    str
-        SHA-256 of the archive: the same for the same study, program and results.
-
-    Raises
-    ------
-    ArchiveError
-        If the study is not finished, files are not as they were made, or the archive could not be run elsewhere.
-    OSError
-        If it cannot be written; nothing is left of it then.
-    """
+    """Write the archive of a study, which appears whole or not at all."""
     try:
         atomic.check_folder(target)
     except ValueError as error:
@@ -89,17 +60,7 @@ def write(
 
 
 def check_limits(packed: "Mapping[str, Packed]") -> None:
-    """Refuse what `springtune verify` would not read.
-
-    Parameters
-    ----------
-    packed : dict of str to Packed
-        All files of an archive by name.
-
-    Raises
-    ------
-    ArchiveError
-    """
+    """Refuse what `springtune verify` would not read."""
     texts = max(packed[name].size for name in (METADATA, SUMS))
     if len(packed) > MOST_FILES or texts > MOST_TEXT:
         raise ArchiveError(

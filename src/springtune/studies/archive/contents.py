@@ -81,13 +81,6 @@ class Packed:
 
     Attributes
     ----------
-    name : str
-        In the archive.
-    source : Path or bytes
-        Where it is, or what it is.
-    sha256 : str
-    size : int
-        [B]
     original : str
         SHA-256 of the file that it was made from, where it is another one.
     """
@@ -110,18 +103,12 @@ class Code:
 
     Attributes
     ----------
-    files : dict of str to Path
-        By their names from the checkout on.
-    commit : str
-        Empty where there is no git.
     diff : str
         What of the package, the rules and the study differs from it.
     new : tuple of str
         Files that are packed and that git does not know.
     left : tuple of str
         Files of the same folders that are not packed.
-    texts : dict of str to str
-        Files that are packed as committed.
     """
 
     files: dict[str, Path]
@@ -143,18 +130,8 @@ class Contents:
 
     Attributes
     ----------
-    study : Study
-    plan : Plan
-    jobs : dict of str to Job
-    files : dict of str to Packed
-        By name.
-    config : str
-        Name of the study's file.
     inputs : tuple of str
         Names of the files that it is made from besides.
-    code : Code
-    attributes : dict of str to str
-        Of the dataset, without the machine's name.
     machine : dict of str to str
         On which all of it was computed; empty where that is not this one.
     departures : dict of str to tuple of str
@@ -204,24 +181,7 @@ def gather(
     untracked: bool = False,
     chosen: Mapping[str, bool] | None = None,
 ) -> Contents:
-    """What an archive of a study is to consist of.
-
-    Parameters
-    ----------
-    study, folder, store, untracked, chosen
-        As of `springtune.studies.archive.archive.write`.
-    scratch : Path
-        Folder for files that are made to be packed.
-
-    Returns
-    -------
-    Contents
-
-    Raises
-    ------
-    ArchiveError
-        As there.
-    """
+    """What an archive of a study is to consist of."""
     checkout = _checkout(folder)
     checked = verified(study, folder)
     if checked.faults or checked.stale:
@@ -391,25 +351,7 @@ def _is_made(name: str) -> bool:
 
 
 def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Path, str]:
-    """Names in the archive of the files that a study is made from, which see each other as before.
-
-    Parameters
-    ----------
-    study : Study
-    given : set of Path
-        Its own file among them.
-    checkout : Path
-
-    Returns
-    -------
-    dict of Path to str
-        By the whole path.
-
-    Raises
-    ------
-    ArchiveError
-        If the study names a file by a path of this machine, or one that is too far away.
-    """
+    """Names in the archive of the files that a study is made from, which see each other as before."""
     config, files = study.path.resolve(), {file.resolve() for file in given}
     for path in files - {config}:
         if str(path) in study.text:

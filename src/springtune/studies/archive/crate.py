@@ -81,22 +81,7 @@ class CitationError(ValueError):
 
 
 def citation(path: Path) -> dict[str, Any]:
-    """What a citation file says of authors, licence and keywords.
-
-    Parameters
-    ----------
-    path : Path
-        ``CITATION.cff``.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    CitationError
-        If it cannot be read, or names neither authors nor a licence.
-    """
+    """What a citation file says of authors, licence and keywords."""
     import yaml
 
     try:
@@ -119,19 +104,7 @@ def _name(one: dict[str, Any]) -> str:
 
 
 def metadata(found: "Contents", cited: dict[str, Any]) -> str:
-    """Text of ``ro-crate-metadata.json``.
-
-    Parameters
-    ----------
-    found : Contents
-    cited : dict
-        As of `citation`.
-
-    Returns
-    -------
-    str
-        The same for the same contents.
-    """
+    """Text of ``ro-crate-metadata.json``."""
     made = _Crate(found, cited).crate.metadata.generate()
     first = {METADATA: 0, "./": 1}
     made["@graph"].sort(key=lambda one: (first.get(one["@id"], 2), one["@id"]))

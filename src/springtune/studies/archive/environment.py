@@ -20,18 +20,7 @@ def minor(version: str) -> str:
 
 
 def locked(path: Path) -> dict[str, str]:
-    """Versions that a lock file asks for on this machine.
-
-    Parameters
-    ----------
-    path : Path
-        Requirements with ``==``, as `make lock` writes them.
-
-    Returns
-    -------
-    dict of str to str
-        By the normalised name of the distribution; those for other systems or versions of Python are left out.
-    """
+    """Versions that a lock file asks for on this machine."""
     from packaging.requirements import InvalidRequirement, Requirement
     from packaging.utils import canonicalize_name
 
@@ -50,17 +39,7 @@ def locked(path: Path) -> dict[str, str]:
 
 
 def departures(lock: Path) -> dict[str, tuple[str, str]]:
-    """What is installed here otherwise than a lock file asks for.
-
-    Parameters
-    ----------
-    lock : Path
-
-    Returns
-    -------
-    dict of str to tuple of str
-        By distribution: the version that is locked, and the one that is here, "none" where there is none.
-    """
+    """What is installed here otherwise than a lock file asks for."""
     from ..runs.keys import installed
 
     here = {name: (version, installed(name)) for name, version in locked(lock).items()}
@@ -68,12 +47,7 @@ def departures(lock: Path) -> dict[str, tuple[str, str]]:
 
 
 def machine() -> dict[str, str]:
-    """What numbers and times depend on besides the software; neither the machine's name nor its user's.
-
-    Returns
-    -------
-    dict of str to str
-    """
+    """What numbers and times depend on besides the software; neither the machine's name nor its user's."""
     found = {"architecture": platform.machine(), "system": platform.system(), "cores": str(os.cpu_count())}
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

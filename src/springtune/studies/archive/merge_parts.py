@@ -59,13 +59,7 @@ ELSEWHERE = f"{TASKS}/elsewhere.json"
 
 
 class MergeError(Exception):
-    """Results that do not fit together; the message names them and the remedy.
-
-    Parameters
-    ----------
-    *lines : str
-        Lines of the message.
-    """
+    """Results that do not fit together; the message names them and the remedy."""
 
     def __init__(self, *lines: str) -> None:
         super().__init__("\n".join(map(shown, lines)))
@@ -94,17 +88,7 @@ class _OnlyStored(Spent):
 
 @dataclass(frozen=True)
 class Site:
-    """Results of a part.
-
-    Attributes
-    ----------
-    folder : Path
-        Where they are.
-    study : Study
-        What the part asks for.
-    attributes : dict of str to str
-        Of its dataset.
-    """
+    """Results of a part."""
 
     folder: Path
     study: "Study"
@@ -121,12 +105,8 @@ class Merged:
 
     Attributes
     ----------
-    folder : Path
-        Of the study's results.
     files, written : int
         Files that the parts have, and those of them that were written.
-    missing : list of str
-        What is still to be computed, and why.
     left : int
         Jobs of the study that are still to run before its dataset.
     """
@@ -143,26 +123,6 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
 
     Nothing is written before all is compared, and no file is ever half written: a merge that was killed is called
     again. What the folder holds already stays.
-
-    Parameters
-    ----------
-    study : Study
-        The whole one.
-    folders : sequence of Path
-        Results of its parts.
-    incomplete : bool, optional
-        Whether to merge what is there where parts are missing, unfinished, damaged or computed in another way.
-
-    Returns
-    -------
-    Merged
-
-    Raises
-    ------
-    MergeError
-        If results are of another study, disagree, or, unless `incomplete`, do not make up all of it.
-    LockedError
-        If a run computes one of the folders.
     """
     target = Path("results", study.name)
     locks.check_claim(target, study.path)
@@ -190,26 +150,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
 
 
 def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path) -> int:
-    """Add stored files to a study's results; nothing is written before all are compared.
-
-    Parameters
-    ----------
-    study : Study
-    places : dict of Path to sequence of Path
-        Files by their name in any folder of results; they are whole.
-    target : Path
-        Where the study's results are.
-
-    Returns
-    -------
-    int
-        Files that were written.
-
-    Raises
-    ------
-    MergeError
-        If results differ that should not.
-    """
+    """Add stored files to a study's results; nothing is written before all are compared."""
     names = {scene_key(study, scene): study.name_of(scene) for scene in study.scenes}
     found = {place: _union(target / place, paths, names) for place, paths in sorted(places.items())}
     makes = {place: make for place, make in found.items() if make}
@@ -225,13 +166,7 @@ def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path)
 
 
 def _site(study: "Study", folder: Path) -> Site:
-    """What a folder holds.
-
-    Raises
-    ------
-    MergeError
-        If it is no folder of a part of this study.
-    """
+    """What a folder holds."""
     path = folder / rerun.DATASET
     if not folder.is_dir():
         raise MergeError(f"{folder}: there is no such folder; give the folders of results of all parts")
@@ -326,17 +261,7 @@ def _examined(site: Site) -> tuple[list[Path], list[str]]:
 
 
 def is_stored(place: Path) -> bool:
-    """Whether a job's file holds results by keys; others, such as calibrated stiffnesses, are made of these.
-
-    Parameters
-    ----------
-    place : Path
-        Its name in a folder of results.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a job's file holds results by keys; others, such as calibrated stiffnesses, are made of these."""
     return place.suffix == STORED or place.parent.name == MESHES
 
 
@@ -360,17 +285,7 @@ def _otherwise(site: Site) -> str:
 
 
 def keys_of(content: Any) -> Iterator[str]:
-    """Keys of results, and of what they are made from, in what a job is to do.
-
-    Parameters
-    ----------
-    content : dict, list or str
-        Of a job's tasks, or a part of it.
-
-    Yields
-    ------
-    str
-    """
+    """Keys of results, and of what they are made from, in what a job is to do."""
     if isinstance(content, str):
         if HASH.fullmatch(content):
             yield content
@@ -384,13 +299,7 @@ def keys_of(content: Any) -> Iterator[str]:
 
 
 def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Callable[[], None] | None:
-    """What writes a file of the study from those of parts; None where nothing is to be written.
-
-    Raises
-    ------
-    MergeError
-        If they disagree.
-    """
+    """What writes a file of the study from those of parts; None where nothing is to be written."""
     if target.parent.name == MESHES:
         return _mesh(target, paths)
     before = store.contents(target) if store.stored(target) else {}
@@ -442,21 +351,7 @@ def _as_text(value: Any) -> Any:
 
 
 def adopt(study: "Study", folder: Path, cores: int) -> int:
-    """Record the jobs of a study whose results are all stored as done; those that are keep their records.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where its results are.
-    cores : int
-        As of `springtune.studies.runs.plan.plan`.
-
-    Returns
-    -------
-    int
-        Number of the other jobs.
-    """
+    """Record the jobs of a study whose results are all stored as done; those that are keep their records."""
     planned = plan(study, folder, cores)
     planned.write()
     left = 0

@@ -33,16 +33,7 @@ class PackError(Exception):
 
 
 def pack(folder: Path, done: Sequence[Path], output: Path) -> None:
-    """Pack what jobs have made; the same results make the same bytes.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the study's results are.
-    done : sequence of Path
-        Records of the jobs.
-    output : Path
-    """
+    """Pack what jobs have made; the same results make the same bytes."""
     made: dict[str, list[object] | None] = {}
     for record in done:
         made |= checked_json.demand(record)["products"]
@@ -62,24 +53,7 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
 
 
 def unpack(path: Path, folder: Path) -> list[Path]:
-    """Unpack a pack.
-
-    Parameters
-    ----------
-    path : Path
-    folder : Path
-        Where its files go.
-
-    Returns
-    -------
-    list of Path
-        Names of the files in the folder.
-
-    Raises
-    ------
-    PackError
-        If it is not what was packed.
-    """
+    """Unpack a pack."""
     remedy = "publish it again from where the study was run"
     try:
         with tarfile.open(path, "r:") as archive:
@@ -102,24 +76,7 @@ def _content(archive: tarfile.TarFile, member: tarfile.TarInfo) -> bytes:
 
 
 def fetch(config: str, packs: Sequence[Path]) -> str:
-    """Add what packs hold to a study's results, and record its jobs as done whose results are all there.
-
-    Parameters
-    ----------
-    config : str
-        YAML file of the study.
-    packs : sequence of Path
-
-    Returns
-    -------
-    str
-        What was done, in words.
-
-    Raises
-    ------
-    PackError, MergeError
-        If a pack is not whole, or has other results than are here; nothing is added then.
-    """
+    """Add what packs hold to a study's results, and record its jobs as done whose results are all there."""
     study = load_study(config)
     folder = Path("results", study.name)
     place = folder / UNPACKED
@@ -143,14 +100,7 @@ def copy(output: Sequence[Path], files: Sequence[Path]) -> None:
 
 
 def main(what: str, *arguments: str) -> None:
-    """Do what a rule asks for.
-
-    Parameters
-    ----------
-    what : str
-        ``pack FOLDER OUTPUT RECORDS``, ``fetch CONFIG PACKS`` or ``copy OUTPUTS FILES``.
-    *arguments : str
-    """
+    """Do what a rule asks for."""
     try:
         if what == "pack":
             folder, output, *done = map(Path, arguments)

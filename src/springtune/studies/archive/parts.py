@@ -23,10 +23,6 @@ class Written:
 
     Attributes
     ----------
-    path : Path
-        Its file.
-    study : Study
-        What it asks for.
     share : float
         Of the expected seconds of the whole study [1].
     """
@@ -37,29 +33,7 @@ class Written:
 
 
 def write_parts(study: "Study", count: int, by: str, folder: Path) -> list[Written]:
-    """Write the files of the parts of a study; all of them, or none.
-
-    Parameters
-    ----------
-    study : Study
-        The whole one.
-    count : int
-        Number of parts.
-    by : str
-        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
-    folder : Path
-        Where they go.
-
-    Returns
-    -------
-    list of Written
-
-    Raises
-    ------
-    StudyError
-        If the study is a part already, has fewer pieces than parts, names files that parts elsewhere would not find, or
-        other studies have their names.
-    """
+    """Write the files of the parts of a study; all of them, or none."""
     if study.part:
         which = f"part {study.part.number} of {study.part.of}"
         raise StudyError(f"{study.path}: is {which} of a study already; split the whole one")

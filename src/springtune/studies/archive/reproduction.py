@@ -56,17 +56,8 @@ class Checked:
 
     Attributes
     ----------
-    path : Path
-    sha256 : str
-        Of the archive itself.
-    files : int
-        Files whose checksums were compared.
-    faults : dict of str to str
-        By name, what is wrong with a file.
     title, study, config, dataset : str
         Of the study: its title, its name, and the names of its file and of its dataset in the archive.
-    version : str
-        Of the program.
     seconds : float
         That all jobs took together [s].
     machine : dict of str to str
@@ -87,22 +78,7 @@ class Checked:
 
 
 def check(path: Path) -> Checked:
-    """Compare all files of an archive with their checksums, and with what its metadata lists.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Checked
-
-    Raises
-    ------
-    ReproductionError
-        If it is no archive of a study, or not even its list of contents can be read.
-    OSError
-    """
+    """Compare all files of an archive with their checksums, and with what its metadata lists."""
     why = fault(path)
     if why:
         raise ReproductionError(f"{path}: cannot be read ({why}); give an archive")
@@ -281,48 +257,14 @@ class Reproduced:
 
 
 def own_environment(lock: Path, python: str) -> dict[str, tuple[str, str]]:
-    """What of this program's environment is not what an archive asks for.
-
-    Parameters
-    ----------
-    lock : Path
-        Its lock file.
-    python : str
-        Version that its dataset was made with.
-
-    Returns
-    -------
-    dict of str to tuple of str
-        As it is asked for, and as it is here; empty where this environment will do.
-    """
+    """What of this program's environment is not what an archive asks for."""
     found = environment.departures(lock)
     here, wanted = (environment.minor(version) for version in (sys.version.split()[0], python))
     return found | ({"python": (wanted, here)} if wanted != here else {})
 
 
 def reproduce(found: Checked, folder: Path, fresh: bool, say: Callable[[str], None]) -> Reproduced:
-    """Compute the study of an archive again by the program in it, and compare the datasets.
-
-    Parameters
-    ----------
-    found : Checked
-        An archive without faults.
-    folder : Path
-        Empty folder to work in.
-    fresh : bool
-        Whether to set up an environment from the lock file even where this one is the same.
-    say : callable
-        Called with a line on each step.
-
-    Returns
-    -------
-    Reproduced
-
-    Raises
-    ------
-    ReproductionError
-        If the environment cannot be set up or the study cannot be run.
-    """
+    """Compute the study of an archive again by the program in it, and compare the datasets."""
     with zipfile.ZipFile(found.path) as archive:
         _unpack(archive, folder, without=str(PurePosixPath(found.dataset).parent) + "/", but=found.dataset)
     kept, code = folder / found.dataset, folder / CODE
@@ -385,18 +327,7 @@ def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) ->
 
 
 def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
-    """Compare the dataset of an archive with one that was computed here.
-
-    Parameters
-    ----------
-    kept, made : Path
-    machine : dict of str to str
-        That the first was computed on, as far as it is told.
-
-    Returns
-    -------
-    Reproduced
-    """
+    """Compare the dataset of an archive with one that was computed here."""
     from ..output.comparison import Tolerance, compare
 
     with reading.open(kept) as before, reading.open(made) as after:

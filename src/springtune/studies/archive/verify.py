@@ -72,10 +72,6 @@ class Again:
 
     Attributes
     ----------
-    labels : str
-        Of the scene.
-    before, after : str
-        Its status in the dataset, and now.
     difference : float
         Largest relative difference of its numbers [1].
     limit : float
@@ -114,18 +110,7 @@ class Files:
 
 
 def files(study: "Study", folder: Path) -> Files:
-    """Compare all files of a study with their checksums.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where its results are.
-
-    Returns
-    -------
-    Files
-    """
+    """Compare all files of a study with their checksums."""
     jobs, stale = rerun.jobs(study, plan(study, folder, 1)), []
     notes = [*sorted((folder / TASKS).glob("*_*.json")), *folder.glob(BUNDLES_FILE)]
     faults = [(path.stem, f"{path}{records.DAMAGED}") for path in notes if not SEALS[".json"](path)]
@@ -151,17 +136,7 @@ def files(study: "Study", folder: Path) -> Files:
 
 
 def set_aside(found: Files) -> list[Path]:
-    """Give damaged files another name, so that the next run makes them again.
-
-    Parameters
-    ----------
-    found : Files
-
-    Returns
-    -------
-    list of Path
-        Their names before.
-    """
+    """Give damaged files another name, so that the next run makes them again."""
     whys = dict.fromkeys(why for _, why in found.faults if why.endswith(records.DAMAGED))
     paths = [Path(why.removesuffix(records.DAMAGED)) for why in whys]
     for path in paths:
@@ -175,30 +150,7 @@ def left(folder: Path) -> list[Path]:
 
 
 def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]:
-    """Make scenes again that are drawn from a dataset, by its own config.
-
-    Parameters
-    ----------
-    folder : Path
-        With ``dataset.nc``.
-    beside : Path
-        Folder that files named in the config are seen from.
-    number : int
-        Of scenes; all of them where there are fewer.
-    seed : int
-        Of the drawing.
-
-    Yields
-    ------
-    Again
-
-    Raises
-    ------
-    ValueError, OSError
-        If there is no dataset.
-    StudyError
-        If its config cannot be read any more, such as where a file that it names is gone.
-    """
+    """Make scenes again that are drawn from a dataset, by its own config."""
     with reading.open(folder) as tree, tempfile.TemporaryDirectory() as temporary:
         before = {name: tree[name].to_dataset().load() for name in COMPARED if name == SCENES or name in tree.groups}
         root = before[SCENES]

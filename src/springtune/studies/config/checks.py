@@ -95,13 +95,7 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
 
 
 def most_scenes() -> int:
-    """Most scenes of a study.
-
-    Raises
-    ------
-    ValueError
-        If the environment gives something else than a whole number above zero.
-    """
+    """Most scenes of a study."""
     text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
     try:
         found = int(float(text))

@@ -34,17 +34,7 @@ def groups_of(grid: GridConfig) -> list[tuple[str, ...]]:
 
 
 def check_groups(name: str, grid: GridConfig, content: Mapping[str, Any], problems: Problems) -> None:
-    """Whether parameters that go together have as many values, and others each value once.
-
-    Parameters
-    ----------
-    name : str
-        Of the grid.
-    grid : GridConfig
-    content : mapping
-        The grid as the file holds it.
-    problems : Problems
-    """
+    """Whether parameters that go together have as many values, and others each value once."""
     for group in groups_of(grid):
         if len(group) == 1:
             _check_repeats(name, group[0], grid, content, problems)
@@ -104,20 +94,7 @@ def count(grid: GridConfig) -> tuple[int, dict[str, int]]:
 
 
 def combinations(name: str, grid: GridConfig, problems: Problems) -> Iterator[Combination]:
-    """Combinations of a grid.
-
-    Parameters
-    ----------
-    name : str
-        Of the grid.
-    grid : GridConfig
-    problems : Problems
-        An exclusion that matches nothing is added to it.
-
-    Yields
-    ------
-    dict
-    """
+    """Combinations of a grid."""
     parts = factors(grid)
     names = [*chain.from_iterable(group for group, _ in parts)]
     left_out = [_given(one) for one in grid.exclude]

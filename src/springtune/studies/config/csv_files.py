@@ -12,30 +12,7 @@ from .messages import Key, Problems, unseen
 def read_lines(
     path: Path, where: Sequence[Key], problems: Problems, own: Problems, remedy: str
 ) -> Iterator[tuple[int, list[str]]]:
-    """Lines of a CSV file; empty ones and those that begin with # are left out.
-
-    Parameters
-    ----------
-    path : Path
-    where : sequence of str or int
-        Keys of the study that name the file.
-    problems : Problems
-        Of the study.
-    own : Problems
-        Of the file.
-    remedy : str
-        What to do where the file cannot be read.
-
-    Yields
-    ------
-    int, list of str
-        Number of the line, and its cells.
-
-    Raises
-    ------
-    StudyError
-        If the file cannot be read.
-    """
+    """Lines of a CSV file; empty ones and those that begin with # are left out."""
     try:
         text = read(path, LARGEST_CSV).decode("utf-8-sig")
     except ValueError as error:

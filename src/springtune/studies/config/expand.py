@@ -92,8 +92,6 @@ class Declared:
 
     Attributes
     ----------
-    beams : dict of str to Beam
-    materials : dict of str to Material or AnisotropicMaterial
     folder : Path
         Folder that the names of the study's files are seen from.
     """
@@ -104,18 +102,7 @@ class Declared:
 
 
 def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
-    """What a study declares.
-
-    Parameters
-    ----------
-    config : StudyConfig
-    folder : Path, optional
-        As of `Declared`.
-
-    Returns
-    -------
-    Declared
-    """
+    """What a study declares."""
     return Declared(
         {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
         {name: material.material(name, folder) for name, material in config.materials.items()},
@@ -163,17 +150,7 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
 
 
 def swept(config: StudyConfig) -> tuple[str, ...]:
-    """Parameters that are dimensions: those that a grid gives values of its own, and a force that has several.
-
-    Parameters
-    ----------
-    config : StudyConfig
-
-    Returns
-    -------
-    tuple of str
-        Of `SWEPT`.
-    """
+    """Parameters that are dimensions: those that a grid gives values of its own, and a force that has several."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
     several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
     several += [grid.pressure for grid in config.grids.values() if grid.pressure]

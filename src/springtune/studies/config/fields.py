@@ -33,19 +33,7 @@ FEW_NAMES = 5
 
 
 class Scalar:
-    """Annotation of a field.
-
-    Parameters
-    ----------
-    read : callable
-        From the field's text to its value.
-    schema : dict
-        JSON schema.
-    words : str
-        What is expected, for messages and the manual.
-    short : str, optional
-        What messages say in the place of long words.
-    """
+    """Annotation of a field."""
 
     def __init__(self, read: Callable[[str], Any], schema: dict[str, Any], words: str, short: str = "") -> None:
         self.read, self.schema, self.words, self.short = read, schema, words, short or words
@@ -181,13 +169,7 @@ MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a mat
 
 
 class OneOrMore:
-    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one.
-
-    Parameters
-    ----------
-    repeats : bool, optional
-        Whether a value may be listed twice, as one of parameters that are zipped may; who allows it checks the others.
-    """
+    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
 
     def __init__(self, repeats: bool = False) -> None:
         self.repeats = repeats
@@ -229,18 +211,6 @@ RANGE_DIGITS = 12
 def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
     """Values of a range, both ends as they are.
 
-    Parameters
-    ----------
-    first, last : float
-    points : int
-        At least two.
-    spacing : str
-        Of `SPACINGS`.
-
-    Returns
-    -------
-    list of float
-
     Examples
     --------
     >>> spaced(1e-3, 4e-3, 3, "linear"), spaced(1e-3, 4e-3, 3, "logarithmic")
@@ -255,13 +225,7 @@ def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
 
 
 class Values(OneOrMore):
-    """Annotation of numbers: a single one, a list, or a range, such as ``{from: 1 mm, to: 5 mm, points: 9}``.
-
-    Parameters
-    ----------
-    words : str
-        What one of them is, for messages and the manual.
-    """
+    """Annotation of numbers: a single one, a list, or a range, such as ``{from: 1 mm, to: 5 mm, points: 9}``."""
 
     def __init__(self, words: str) -> None:
         super().__init__(repeats=True)
@@ -343,15 +307,7 @@ class PerBeam:
 
 
 class Named:
-    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one.
-
-    Parameters
-    ----------
-    what : str
-        What is named, for messages.
-    for_files : bool, optional
-        Whether the names become parts of file names.
-    """
+    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one."""
 
     def __init__(self, what: str, for_files: bool = True) -> None:
         self.what, self.for_files = what, for_files
@@ -382,13 +338,7 @@ class Named:
 
 
 class Groups:
-    """Annotation of groups of names, each at least two of them and each name once; a single group may stand alone.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names that there are.
-    """
+    """Annotation of groups of names, each at least two of them and each name once; a single group may stand alone."""
 
     words = "a list of parameters such as [mesh_size, force], or several such lists"
 

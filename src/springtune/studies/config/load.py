@@ -22,26 +22,7 @@ from .yaml_lines import read_study
 
 
 def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = None) -> Study:
-    """Read, validate and expand a study.
-
-    Parameters
-    ----------
-    path : str or Path
-        YAML file.
-    kinds : tuple of Kind
-        Study kinds that it may have.
-    beside : Path, optional
-        Folder that the names of its files are seen from; its own without.
-
-    Returns
-    -------
-    Study
-
-    Raises
-    ------
-    StudyError
-        If anything is wrong with the file; nothing else is raised.
-    """
+    """Read, validate and expand a study."""
     path, file = Path(path), str(path)
     beside = beside or path.parent
     text, content, lines = read_study(path)

@@ -45,15 +45,6 @@ class StudyError(ValueError):
 class Problems:
     """Collects what is wrong with a file and raises it as one `StudyError`.
 
-    Parameters
-    ----------
-    file : str
-        The file as its user named it.
-    lines : dict of tuple to int, optional
-        Line of each path of keys.
-    folder : Path, optional
-        Folder that the names of its files are seen from.
-
     Examples
     --------
     >>> problems = Problems("study.yaml", {("beams",): 3})
@@ -70,17 +61,7 @@ class Problems:
         self._found: list[tuple[int, str]] = []
 
     def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
-        """Note what is wrong.
-
-        Parameters
-        ----------
-        path : iterable of str or int
-            Keys that lead to it; its line, or that of what holds it, is part of the message.
-        message : str
-            What is wrong, and the remedy.
-        line : int, optional
-            Where it is, if no path leads there.
-        """
+        """Note what is wrong."""
         path = tuple(path)
         # What is missing has no line of its own; that of what should hold it helps.
         above = (path[:size] for size in range(len(path), 0, -1))
@@ -90,15 +71,7 @@ class Problems:
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
 
     def located(self, path: tuple[Key, ...], place: str) -> None:
-        """Tell where a value stands that comes from another file.
-
-        Parameters
-        ----------
-        path : tuple of str or int
-            Keys that lead to it.
-        place : str
-            File and line.
-        """
+        """Tell where a value stands that comes from another file."""
         self._places[path] = place
 
     @property
@@ -107,13 +80,7 @@ class Problems:
         return not self._found
 
     def stop(self) -> None:
-        """Raise if anything was found.
-
-        Raises
-        ------
-        StudyError
-            With the first of them, in the file's order.
-        """
+        """Raise if anything was found."""
         if not self._found:
             return
         messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
@@ -123,32 +90,12 @@ class Problems:
 
 
 def refuse(message: str, *path: Key) -> PydanticCustomError:
-    """Error of a validator.
-
-    Parameters
-    ----------
-    message : str
-    *path : str or int
-        Leads from the validated value to the culprit inside it.
-
-    Returns
-    -------
-    PydanticCustomError
-        To be raised.
-    """
+    """Error of a validator."""
     return PydanticCustomError("study", "{message}", {"message": message, "path": path})
 
 
 def show(value: object) -> str:
     """A value of the file, for a message.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -33,13 +33,10 @@ class MeshSpec:
 
     Attributes
     ----------
-    beam : Beam
     mesh_type : str
         Key of `springtune.mesh.MESH_TYPES`, or the name of meshes from files.
     mesh_size : float
         Asked length of an edge [m].
-    file : Path or None
-        The file that it is read from.
     unit : float
         Unit of the coordinates in the file [m].
     """
@@ -74,16 +71,8 @@ class SceneSpec:
 
     Attributes
     ----------
-    mesh : MeshSpec
-    material : Material
-    load : str
-        Key of `springtune.problem.loads.LOADS`.
     force : float
         Force on the loaded side, tension positive [N].
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    kinematics : str
-        One of `springtune.problem.loads.KINEMATICS`.
     stiffness_scale : float
         Factor on all stiffnesses of the definition [1].
     """
@@ -133,14 +122,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Grid:
-    """What one grid of a study asks for, whether or not other grids ask for it, too.
-
-    Attributes
-    ----------
-    name : str
-    scenes : tuple of SceneSpec
-    curves : tuple of CurveSpec
-    """
+    """What one grid of a study asks for, whether or not other grids ask for it, too."""
 
     name: str
     scenes: tuple[SceneSpec, ...]
@@ -153,10 +135,6 @@ class PrintedCell:
 
     Attributes
     ----------
-    table : int
-        Number of the table.
-    beam, mesh_type, material, load : str
-        Labels of the cell.
     mesh_size : float
         Length of an edge [m].
     force : float
@@ -191,12 +169,8 @@ class Part:
 
     Attributes
     ----------
-    number, of : int
-        Which one, from 1 on, of how many.
     by : str
         What stays together, of `springtune.studies.config.sections.DEALT_BY`.
-    study : str
-        SHA-256 of the text of the whole study.
     """
 
     number: int
@@ -214,48 +188,24 @@ class Study:
 
     Attributes
     ----------
-    name : str
-        Stem of the file.
-    path : Path
-        The file.
-    text : str
-        The file as read.
-    title : str
-    meshes : tuple of MeshSpec
-    scenes : tuple of SceneSpec
-    curves : tuple of CurveSpec
-    references : tuple of Reference
     mesh_files : dict
         `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
-    outputs : tuple of str
-        What is made from the dataset.
-    further_references : tuple of str
-        Of `FURTHER_REFERENCES`.
-    materials : dict of str to Material or AnisotropicMaterial
-        All that the study declares, by name.
     parts : dict
         What further study kinds ask for, by their names; nothing where the study does not have them.
     limits : dict
         ``seconds`` of the processor and ``memory`` [byte] that one task may take.
-    grids : tuple of Grid
-        In the order of the file.
     stiffness_ratios : tuple of float
         k / (E t) along every curve, ascending [1].
     stiffness_table : dict
         Stiffness [N/m] of the definition ``paper`` by (mesh type, material).
     calibration : tuple of str or None
         Beam and load whose curves calibrate the definition ``calibrated``.
-    printed : tuple of PrintedCell
-    printed_path : Path or None
-        File of the printed values.
     axes : dict of str to tuple
         Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
     swept : tuple of str
         Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
     test_files : tuple of Path
         Of the tests of rubber that materials are fitted to or compared with.
-    row_files : tuple of Path
-        Of rows of parameters that grids name.
     part : Part or None
         Which part of a study this is. Its scenes, curves, meshes, references and `parts` are its own; grids, axes and
         all else are those of the whole study.
@@ -290,19 +240,6 @@ class Study:
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.
 
-        Parameters
-        ----------
-        name : str
-
-        Returns
-        -------
-        Material or AnisotropicMaterial
-
-        Raises
-        ------
-        ValueError
-            If there is none of that name.
-
         Examples
         --------
         >>> import springtune as st
@@ -315,19 +252,6 @@ class Study:
 
     def shape(self, name: str) -> Shape:
         """A shape that the study declares, with its loads.
-
-        Parameters
-        ----------
-        name : str
-
-        Returns
-        -------
-        Shape
-
-        Raises
-        ------
-        ValueError
-            If there is none of that name.
 
         Examples
         --------
@@ -348,17 +272,7 @@ class Study:
         return found
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
-        """Cell of the dataset that is of a scene, a curve or a reference.
-
-        Parameters
-        ----------
-        one : SceneSpec, CurveSpec or Reference
-
-        Returns
-        -------
-        dict of str to str or float
-            Its label of each dimension.
-        """
+        """Cell of the dataset that is of a scene, a curve or a reference."""
         found: dict[str, str | float]
         if isinstance(one, Reference):
             beam = one.beam
@@ -382,38 +296,14 @@ class Study:
         return found
 
     def name_of(self, scene: SceneSpec) -> str:
-        """Readable name of a scene, unique in the study.
-
-        Parameters
-        ----------
-        scene : SceneSpec
-
-        Returns
-        -------
-        str
-            Such as ``"200x40_structured_5mm_steel_traction_lattice_nonlinear"``.
-        """
+        """Readable name of a scene, unique in the study."""
         labels = self.labels(scene) | {"mesh_size": f"{1e3 * scene.mesh.mesh_size:g}mm"}
         words = (f"{name}={label:.9g}" if isinstance(label, float) else label for name, label in labels.items())
         return "_".join(words)
 
 
 def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -> float:
-    """Value of a parameter that is a dimension.
-
-    Parameters
-    ----------
-    one : SceneSpec, CurveSpec or Reference
-    beam : Beam
-        Its beam.
-    name : str
-        Key of `springtune.problem.parameters.SWEPT`.
-
-    Returns
-    -------
-    float
-        In SI units; of a force its magnitude.
-    """
+    """Value of a parameter that is a dimension."""
     if name == "force":
         return abs(one.force)
     if name == "thickness":

@@ -35,29 +35,12 @@ def digest_of(text: str) -> str:
 
 
 def part_text(text: str, part: Part) -> str:
-    """Text of a file that asks for a part of a study.
-
-    Parameters
-    ----------
-    text : str
-        Of the study.
-    part : Part
-
-    Returns
-    -------
-    str
-    """
+    """Text of a file that asks for a part of a study."""
     return f"{text}{PART_BELOW}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
 
 
 def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | None:
-    """Part of a study that a file asks for; None where it asks for all.
-
-    Raises
-    ------
-    StudyError
-        If the study in it is not the one that was split.
-    """
+    """Part of a study that a file asks for; None where it asks for all."""
     if config.part is None:
         return None
     part = Part(config.part.number, config.part.of, config.part.by, config.part.study)
@@ -72,20 +55,7 @@ def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | 
 
 
 def named_files(text: str, path: Path) -> list[Path]:
-    """Files that a study names, whichever key it is that names them.
-
-    Parameters
-    ----------
-    text : str
-        Of the study.
-    path : Path
-        Of its file, which names of others are seen from.
-
-    Returns
-    -------
-    list of Path
-        Absolute.
-    """
+    """Files that a study names, whichever key it is that names them."""
     content, _ = read_yaml(text, str(path))
     found = {value for value in _texts(content) if value.strip() and len(value) < LONGEST_NAME}
     files = (path.parent / value for value in sorted(found))

@@ -31,25 +31,7 @@ _PRINTED_COLUMNS = {
 
 
 def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> tuple[PrintedCell, ...]:
-    """Cells of a CSV file of printed values; lines that begin with # are comments.
-
-    Parameters
-    ----------
-    path : Path
-    mesh_types : sequence of str
-        Those that the study knows.
-    problems : Problems
-        Of the study that names the file.
-
-    Returns
-    -------
-    tuple of PrintedCell
-
-    Raises
-    ------
-    StudyError
-        If anything is wrong with the file.
-    """
+    """Cells of a CSV file of printed values; lines that begin with # are comments."""
     file_problems = Problems(str(path))
     cells: dict[tuple[Any, ...], tuple[int, PrintedCell]] = {}
     header: list[str] | None = None

@@ -14,17 +14,7 @@ Answer = TypeVar("Answer")
 
 
 def once_a_study(*names: str) -> "Callable[[Callable[[Study], Answer]], Callable[[Study], Answer]]":
-    """Decorator of a function of a study that is called once as long as some of its parts are the same objects.
-
-    Parameters
-    ----------
-    *names : str
-        Attributes of a study that the answer depends on. Comparing 100,000 scenes is no way to know a study.
-
-    Returns
-    -------
-    callable
-    """
+    """Decorator of a function of a study that is called once as long as some of its parts are the same objects."""
 
     def decorate(function: "Callable[[Study], Answer]") -> "Callable[[Study], Answer]":
         # Parts by their places in memory, and the parts themselves, so that no other objects come to be there.

@@ -16,25 +16,7 @@ HEAD = re.compile(r"\s*(?P<name>\w*)\s*(\[(?P<unit>[^\]]*)\])?\s*")
 
 
 def with_rows(content: Any, folder: Path, problems: Problems) -> Any:
-    """Content of a study, each grid that names a file of rows with what the file holds.
-
-    Parameters
-    ----------
-    content : dict
-        As read; it stays as it is.
-    folder : Path
-        That names of files are seen from.
-    problems : Problems
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    StudyError
-        If a file cannot be read or is no such table.
-    """
+    """Content of a study, each grid that names a file of rows with what the file holds."""
     grids = content.get("grids") if isinstance(content, dict) else None
     if not isinstance(grids, dict):
         return content

@@ -533,13 +533,7 @@ def _beams_or(alone: Iterable[str]) -> dict[str, Any]:
 
 
 class Later(NamedTuple):
-    """Type of a field that is imported for studies that have it: sections cost milliseconds each.
-
-    Attributes
-    ----------
-    module, name : str
-        Where it is.
-    """
+    """Type of a field that is imported for studies that have it: sections cost milliseconds each."""
 
     module: str
     name: str
@@ -550,19 +544,7 @@ class Later(NamedTuple):
 
 
 def study_model(kinds: Sequence[StudyKind], given: Container[object] | None = None) -> type[StudyConfig]:
-    """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids.
-
-    Parameters
-    ----------
-    kinds : tuple of Kind
-    given : container of str, optional
-        Keys of the study that is to be read: what others hold is left out of the model. All without.
-
-    Returns
-    -------
-    type
-        Subclass of `StudyConfig`.
-    """
+    """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
     # Of each field its type and pydantic's description.
     grid_fields: dict[str, Any] = {}
     study_fields: dict[str, Any] = {}
@@ -604,18 +586,7 @@ def study_model(kinds: Sequence[StudyKind], given: Container[object] | None = No
 
 
 def sections(model: type[Section], place: str = "") -> dict[str, type[Section]]:
-    """Model of each section of a study, by its place.
-
-    Parameters
-    ----------
-    model : type
-        Of the section at `place`.
-    place : str, optional
-
-    Returns
-    -------
-    dict of str to type
-    """
+    """Model of each section of a study, by its place."""
     found = {place: model}
     for name, field in model.model_fields.items():
         for inside, ending in _models(field.annotation):

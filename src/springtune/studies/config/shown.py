@@ -15,16 +15,7 @@ SHOWING = ("deformed", "paraview")
 
 
 def keeps_fields(study: "Study") -> bool:
-    """Whether a study's dataset has whole fields, its group `/fields`.
-
-    Parameters
-    ----------
-    study : Study
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a study's dataset has whole fields, its group `/fields`."""
     return any(name in study.outputs for name in SHOWING)
 
 
@@ -32,17 +23,6 @@ def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[S
     """Scenes that are shown where not all can be.
 
     Of each beam, mesh type, material and load those on the coarsest mesh; of what is swept one value of each.
-
-    Parameters
-    ----------
-    scenes : collection of SceneSpec
-    swept : iterable of str
-        Keys of `springtune.problem.parameters.SWEPT`: the largest force, under it the largest thickness, and so on, see
-        `springtune.problem.parameters.shown_order`.
-
-    Returns
-    -------
-    frozenset of SceneSpec
     """
     names, coarsest = tuple(swept), dict[tuple[str, ...], float]()
     for scene in scenes:

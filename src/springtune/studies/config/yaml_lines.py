@@ -27,23 +27,7 @@ _values = yaml.constructor.SafeConstructor()
 
 
 def read_study(path: str | Path) -> tuple[str, Any, dict[tuple[Key, ...], int]]:
-    """Text of a study, its content and the line of each path of keys: all that can be told without its models.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    text : str
-    content, lines
-        As of `read_yaml`.
-
-    Raises
-    ------
-    StudyError
-        If the file cannot be read, is too large, is not UTF-8 or is not YAML.
-    """
+    """Text of a study, its content and the line of each path of keys: all that can be told without its models."""
     example = "give the path of a study such as config/paper.yaml"
     try:
         found = read(path, LARGEST_STUDY)
@@ -68,23 +52,6 @@ def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
 
     Scalars stay the texts they are, so that names such as ``1e3`` or ``no`` are no numbers or booleans, and messages
     show what the file holds.
-
-    Parameters
-    ----------
-    text : str
-    file : str
-        Its name, for messages.
-
-    Returns
-    -------
-    content : dict, list, str or None
-    lines : dict of tuple to int
-        Counted from 1.
-
-    Raises
-    ------
-    StudyError
-        If the text is not YAML, gives a key twice, or holds more than a study may.
 
     Examples
     --------

@@ -23,24 +23,7 @@ if TYPE_CHECKING:
 
 
 def run(config: str | Path, folder: str | Path, output: str | Path, untold: Collection[str] = ()) -> list[Path]:
-    """Build the dataset of a study from its stored results.
-
-    Parameters
-    ----------
-    config : str or Path
-        YAML file of the study.
-    folder : str or Path
-        Where the study's results are.
-    output : str or Path
-        NetCDF file to write; the summary goes beside it.
-    untold : collection of str, optional
-        Attributes to leave empty, see `springtune.studies.runs.rerun.BLANKED`.
-
-    Returns
-    -------
-    list of Path
-        Both.
-    """
+    """Build the dataset of a study from its stored results."""
     return _collected(load_study(config), config, Path(folder), Path(output), untold)
 
 
@@ -59,19 +42,7 @@ def _collected(
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str, *untold: str) -> None:
-    """Build a dataset and write the record of it.
-
-    Parameters
-    ----------
-    config, folder, output
-        As of `run`.
-    record : str
-        Record to write.
-    digest : str
-        Of what is asked for.
-    *untold : str
-        Attributes to leave empty.
-    """
+    """Build a dataset and write the record of it."""
     study = load_study(config)
     OURS.recall(Path(folder).parent / CODE_FILE)
     chosen = {option: name in untold for option, name in rerun.BLANKED.items()}
@@ -82,19 +53,7 @@ def main(config: str, folder: str, output: str, record: str, digest: str, *untol
 
 
 def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
-    """Groups of the dataset of a study, of what its stages stored.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where its results are.
-
-    Returns
-    -------
-    dict of str to xarray.Dataset
-        By path in the dataset.
-    """
+    """Groups of the dataset of a study, of what its stages stored."""
     groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:

@@ -48,27 +48,7 @@ class Division:
 
 
 def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, list[Name]]]]:
-    """Pieces of a study, dealt out.
-
-    Parameters
-    ----------
-    study : Study
-        The whole one.
-    count : int
-        Number of parts.
-    by : str
-        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
-
-    Returns
-    -------
-    list of tuple
-        Of each part its share of the expected seconds, and names of pieces by kind.
-
-    Raises
-    ------
-    StudyError
-        If the study has fewer pieces than parts.
-    """
+    """Pieces of a study, dealt out."""
     found = _pieces(study, Division(by, 0.0))
     total = sum(found.values())
     most = total / count
@@ -94,22 +74,7 @@ def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, li
 
 
 def part_of(study: "Study") -> "Study":
-    """The part of a study that it says it is.
-
-    Parameters
-    ----------
-    study : Study
-        With a `part`, and all that the whole study asks for.
-
-    Returns
-    -------
-    Study
-
-    Raises
-    ------
-    StudyError
-        If there is no such part.
-    """
+    """The part of a study that it says it is."""
     if study.part is None:
         return study
     _, share = dealt(study, study.part.of, study.part.by)[study.part.number - 1]
@@ -117,18 +82,7 @@ def part_of(study: "Study") -> "Study":
 
 
 def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
-    """What a study asks for with some of its pieces alone.
-
-    Parameters
-    ----------
-    study : Study
-    share : mapping of str to list of tuple
-        Names of pieces by kind, see `dealt`.
-
-    Returns
-    -------
-    Study
-    """
+    """What a study asks for with some of its pieces alone."""
     for kind in kinds():
         if not study.parts[kind.name]:
             continue

@@ -18,14 +18,10 @@ class Axis:
 
     Attributes
     ----------
-    name : str
     labels : ndarray, shape (n,)
         Numbers in order, texts as the first dataset has them and then what others add; places where there are none.
     places : tuple of ndarray
         For each dataset, where its own labels are among them.
-    units : str
-    labelled : bool
-        Whether the dimension has labels.
     """
 
     name: str
@@ -54,21 +50,6 @@ class Axis:
 
 def axis(name: str, datasets: Sequence[xr.Dataset]) -> Axis:
     """One axis of a dimension of several datasets.
-
-    Parameters
-    ----------
-    name : str
-    datasets : sequence of xarray.Dataset
-        What has the dimension; what has not has no places.
-
-    Returns
-    -------
-    Axis
-
-    Raises
-    ------
-    ValueError
-        If labels are texts here and numbers there, or one is there twice.
 
     Examples
     --------

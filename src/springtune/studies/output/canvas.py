@@ -28,17 +28,7 @@ COMPRESSION = 1
 
 
 def png_and_pdf(figure: Figure) -> dict[str, bytes]:
-    """A figure in both formats. Without dates in them the same figure gives the same files.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-
-    Returns
-    -------
-    dict of str to bytes
-        Content of the file by its ending.
-    """
+    """A figure in both formats. Without dates in them the same figure gives the same files."""
     with matplotlib.rc_context(SETTINGS):
         width, height = figure.get_size_inches()
         dpi = matplotlib.rcParams["savefig.dpi"]

@@ -64,14 +64,8 @@ class Change:
 
     Attributes
     ----------
-    group, variable : str
-    labels : dict
-        Of the cell, by dimension.
-    point : dict
-        Of the place along the curve or in the field.
     before, after : float or str
         NaN, or an empty text, where there is none.
-    units : str
     excess : float
         Difference over the tolerance; infinite where there is nothing to subtract.
     """
@@ -95,17 +89,7 @@ class Change:
 
 @dataclass(frozen=True)
 class VariableChanges:
-    """Changes of one variable.
-
-    Attributes
-    ----------
-    name : str
-    compared : int
-        Cells that both datasets have.
-    changed : int
-    rows : list of Change
-        The largest first, as many as were asked for.
-    """
+    """Changes of one variable."""
 
     name: str
     compared: int
@@ -127,21 +111,8 @@ class GroupChanges:
 
     Attributes
     ----------
-    name : str
-        Its path.
-    axes : dict of str to Axis
     cells : tuple of Alone
         Cells that are asked for in one dataset alone.
-    both : int
-        Cells that are asked for in both.
-    variables : tuple of list
-        Names that one dataset has alone.
-    unlike : dict of str to str
-        Variables that cannot be compared, and why.
-    flags : list of VariableChanges
-        Of statuses.
-    values : list of VariableChanges
-        Of all others.
     """
 
     name: str
@@ -181,14 +152,8 @@ class Comparison:
 
     Attributes
     ----------
-    groups : list of GroupChanges
-        Of groups that both have.
-    alone : tuple of list
-        Paths of groups that one dataset has alone.
     attributes : dict of str to tuple
         Attributes that differ, before and after; they make no difference of results.
-    config : list of str
-        Unified diff of the studies' files.
     """
 
     groups: list[GroupChanges]
@@ -228,31 +193,9 @@ def compare(
 
     Parameters
     ----------
-    before, after : xarray.DataTree
-    tolerance : Tolerance, optional
-    groups : collection of str, optional
-        Names of groups to compare; all without.
-    ignored : collection of str, optional
-        Names of variables to leave out besides, or patterns such as ``reference_*``.
-    most : int, optional
-        Most rows that are kept of each variable, and of cells of one side; all without.
     own : mapping of str to Tolerance, optional
         Of variables that have one of their own, by `variable_name`; ``""`` is that of all others. A variable `OF_CELLS`
         of a group of the first dataset is the relative tolerance of its cells, where it is not NaN.
-    part : bool, optional
-        Whether the first dataset is a part: groups and variables that it does not have are not compared, and of what it
-        has more dimensions than the other, that one has the same along them.
-    block : int, optional
-        Bytes of an array that are compared at once.
-
-    Returns
-    -------
-    Comparison
-
-    Raises
-    ------
-    ValueError
-        If neither dataset has a group that is asked for, or a variable that is ignored, or labels are none.
 
     Examples
     --------
@@ -556,17 +499,6 @@ def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> 
     """Dimensions of cells; along others lie the points of a curve or a field.
 
     A cell is what a message, or a status where there is none, tells of, and what has a text for a label.
-
-    Parameters
-    ----------
-    pair : sequence of xarray.Dataset
-        A group of datasets.
-    roots : sequence of xarray.Dataset
-        Their roots.
-
-    Returns
-    -------
-    set of str
     """
     found: set[str] = set()
     for data, root in zip(pair, roots):

@@ -40,8 +40,6 @@ class Group:
 
     Attributes
     ----------
-    name : str
-        Path in the file, ``"/"`` for the root.
     variables : dict of str to tuple
         By name: dimensions, units, long name, and what a cell without a value holds.
     dimensions : dict of str to str or tuple
@@ -59,19 +57,7 @@ class Group:
     further: dict[str, dict[str, object]] = field(default_factory=dict)
 
     def empty(self, axes: Mapping[str, Sequence[Label]], names: Collection[str] | None = None) -> xr.Dataset:
-        """Dataset whose cells hold nothing yet.
-
-        Parameters
-        ----------
-        axes : dict of str to tuple
-            Labels of each dimension.
-        names : collection of str, optional
-            Variables to make; all of them without.
-
-        Returns
-        -------
-        xarray.Dataset
-        """
+        """Dataset whose cells hold nothing yet."""
         chosen = {name: row for name, row in self.variables.items() if names is None or name in names}
         data, used = {}, set()
         for name, (dimensions, units, long_name, nothing) in chosen.items():
@@ -98,19 +84,7 @@ class Group:
         return xr.Dataset(data, coordinates)
 
     def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
-        """Group whose variables have further dimensions.
-
-        Parameters
-        ----------
-        further : dict of str to sequence of str
-            Dimensions that a variable gets, by its name: after those that groups share, before its own.
-        without : collection of str
-            Variables that are left out.
-
-        Returns
-        -------
-        Group
-        """
+        """Group whose variables have further dimensions."""
         variables = {}
         for name, (dimensions, units, long_name, nothing) in self.variables.items():
             shared = [one for one in dimensions if one in DIMENSIONS]
@@ -121,13 +95,7 @@ class Group:
 
 
 class Filler:
-    """Writes single cells of a dataset by label.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        That is written into.
-    """
+    """Writes single cells of a dataset by label."""
 
     def __init__(self, data: xr.Dataset) -> None:
         self.data = data
@@ -145,15 +113,7 @@ class Filler:
             array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
 
     def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
-        """Write values of many cells, as `put` does those of one, a variable at a time.
-
-        Parameters
-        ----------
-        values : sequence of dict
-            Of each cell, by the names of variables; not all cells need have all of them.
-        labels : sequence of dict
-            Of each cell, each with the same dimensions.
-        """
+        """Write values of many cells, as `put` does those of one, a variable at a time."""
         places = {
             dimension: np.array([known[one[dimension]] for one in labels])
             for dimension, known in self._places.items()
@@ -221,21 +181,7 @@ TEXTS = 128
 
 
 def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
-    """Write a dataset; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-    groups : dict of str to xarray.Dataset
-        Dataset of each group, ``"/"`` for the root.
-    attributes : dict of str to str
-        Attributes of the root.
-
-    Raises
-    ------
-    OSError
-        If there is no room for it, or no permission; nothing is left of it then, and a file of before stays.
-    """
+    """Write a dataset; the file appears whole or not at all."""
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = dict(attributes)
     # What groups share with the root is written there alone.

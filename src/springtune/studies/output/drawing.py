@@ -23,18 +23,10 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 
     Parameters
     ----------
-    ax : matplotlib.axes.Axes or None
-        Where to draw; on new axes without.
-    mesh : Mesh
     displacements : ndarray of float, shape (n_points, 2)
         [m]
     forces : ndarray of float, shape (n_edges,)
         [N]
-    title : str
-
-    Returns
-    -------
-    matplotlib.axes.Axes
     """
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2), layout="constrained")
     largest = float(np.abs(forces).max()) or 1.0
@@ -53,18 +45,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 
 @style.styled
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
-    """Draw the deformation error over uniform stiffness, and where it is nothing.
-
-    Parameters
-    ----------
-    ax : matplotlib.axes.Axes or None
-        Where to draw; on new axes without.
-    curve : springtune.scene.curve.Curve
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-    """
+    """Draw the deformation error over uniform stiffness, and where it is nothing."""
     figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.5))
     place: dict[str, Any] = {"left": 0.5, "right": 0.08, "bottom": 0.66, "top": 0.28}
     style.arrange(figure, axes, **place)

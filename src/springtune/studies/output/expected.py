@@ -53,26 +53,6 @@ def accepted(
 ) -> xr.DataTree:
     """Values of a dataset that are to be kept as right.
 
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        Dataset of a study.
-    variables : sequence of str, optional
-        Names of variables, of others than the root's with their group's, such as ``sensitivity/displacement``; without,
-        `DEFAULTS`. Status goes with them.
-    tolerances : mapping of str to Tolerance, optional
-        By such names; ``""`` is that of all others.
-
-    Returns
-    -------
-    xarray.DataTree
-        With the variables alone, in memory.
-
-    Raises
-    ------
-    ValueError
-        If there is no such variable, it is a text, or there is nothing to accept.
-
     Examples
     --------
     >>> kept = accepted(tree, ["deformation_error"])
@@ -142,17 +122,7 @@ def _is_kept(name: str, array: xr.DataArray, data: xr.Dataset) -> bool:
 
 
 def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
-    """Cells of a dataset that are asked for and not solved.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Returns
-    -------
-    list of tuple
-        Group, labels, status and message of each.
-    """
+    """Cells of a dataset that are asked for and not solved."""
     found = []
     for node in tree.subtree:
         data = node.to_dataset()
@@ -173,30 +143,12 @@ def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
 
 
 def tolerances(tree: xr.DataTree) -> dict[str, Tolerance]:
-    """Tolerances of expected values by the name of a variable, see `accepted`.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Returns
-    -------
-    dict of str to Tolerance
-    """
+    """Tolerances of expected values by the name of a variable, see `accepted`."""
     return {name: Tolerance(**one) for name, one in json.loads(tree.attrs.get(TOLERANCES, "{}")).items()}
 
 
 def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
-    """Expected values with the tolerances of former ones, those of cells among them, as far as they have a value here.
-
-    Parameters
-    ----------
-    tree, former : xarray.DataTree
-
-    Returns
-    -------
-    xarray.DataTree
-    """
+    """Expected values of this dataset, with the tolerances of the former ones."""
     held = {
         variable_name(node.path, str(name))
         for node in tree.subtree
@@ -259,24 +211,7 @@ def is_expected(path: str | Path) -> bool:
 
 
 def read(path: str | Path) -> xr.DataTree:
-    """Read expected values.
-
-    Parameters
-    ----------
-    path : str or Path
-        As `write` has written it, edited or not.
-
-    Returns
-    -------
-    xarray.DataTree
-
-    Raises
-    ------
-    OSError
-        If there is no such file.
-    ValueError
-        If it is none of expected values; the message names the line.
-    """
+    """Read expected values."""
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there are no expected values; call `springtune accept results/<study>` first")
@@ -290,20 +225,7 @@ def read(path: str | Path) -> xr.DataTree:
 
 
 def write(path: str | Path, tree: xr.DataTree) -> None:
-    """Write expected values; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-        Ending in ``.yaml``, to be reviewed, a line a scene or curve, or in ``.nc``.
-    tree : xarray.DataTree
-        As of `accepted`.
-
-    Raises
-    ------
-    ValueError
-        If the ending is another one, or there is too much for YAML.
-    """
+    """Write expected values; the file appears whole or not at all."""
     path = Path(path)
     if path.suffix == ".nc":
         groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}

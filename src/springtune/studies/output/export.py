@@ -37,11 +37,6 @@ class Column:
 
     Attributes
     ----------
-    name : str
-        Of the variable or dimension.
-    units : str
-        ``"1"`` where it has none.
-    long_name : str
     values : ndarray, shape (n_rows,)
     """
 
@@ -63,28 +58,6 @@ def table(
     selection: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Column]:
     """Long table of a group: one row a cell that was asked for, one column a dimension or variable.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-    group : str, optional
-        Its name; the root without.
-    variables : sequence of str, optional
-        Names of variables; without, all whose dimensions the cells have.
-    selection : mapping of str to sequence of str, optional
-        Labels to keep by dimension, numbers in SI units or with a unit.
-
-    Returns
-    -------
-    list of Column
-        Dimensions first, then the coordinates that the cells have besides, such as the parameters of samples, then
-        variables; flags as words. Cells are those of `status`, where there is one, and rows those that are requested;
-        elsewhere the cells of the variables chosen, and rows those that have a value.
-
-    Raises
-    ------
-    ValueError
-        If there is no such group, variable, dimension or label; the message says what there is.
 
     Examples
     --------
@@ -215,13 +188,7 @@ def _column(name: str, array: xr.DataArray, values: np.ndarray) -> Column:
 
 
 def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
-    """Write a long table as CSV, units in the names of the columns, numbers with all their digits.
-
-    Parameters
-    ----------
-    path : str or Path
-    columns : sequence of Column
-    """
+    """Write a long table as CSV, units in the names of the columns, numbers with all their digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([column.title for column in columns])
@@ -232,19 +199,7 @@ def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
 
 
 def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[str, object]) -> None:
-    """Write a long table as Parquet, units and long names with its columns and the dataset's attributes with the table.
-
-    Parameters
-    ----------
-    path : str or Path
-    columns : sequence of Column
-    attributes : mapping of str to object
-
-    Raises
-    ------
-    ValueError
-        If what writes it is not installed.
-    """
+    """Write a long table as Parquet, with units, long names and the dataset's attributes."""
     try:
         import pyarrow as pa
         import pyarrow.parquet
@@ -262,18 +217,7 @@ def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attri
 
 
 def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
-    """Write a whole dataset as a Zarr store, a folder; it appears whole or not at all, in the place of one of before.
-
-    Parameters
-    ----------
-    path : str or Path
-    tree : xarray.DataTree
-
-    Raises
-    ------
-    ValueError
-        If what writes it is not installed.
-    """
+    """Write a dataset as a Zarr store; the folder is replaced as a whole or not at all."""
     try:
         import zarr  # noqa: F401
     except ImportError:
@@ -316,26 +260,10 @@ def export(
 
     Parameters
     ----------
-    tree : xarray.DataTree
     path : str or Path
         Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh, ``.vtu`` one
         scene of it for ParaView, and ``.pvd`` a collection of all that are chosen; of shapes those of the group
         `shape_fields`.
-    group, variables, selection
-        As of `table`; a Zarr store has the whole tree.
-    force : bool, optional
-        Whether what is there may be replaced.
-
-    Returns
-    -------
-    str
-        What was written.
-
-    Raises
-    ------
-    ValueError
-        As of `table`, and if the format is unknown, the file is there, its folder is not, or what writes it is not
-        installed.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -427,22 +355,7 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
 def write_scenes(
     tree: xr.DataTree, path: Path, scenes: Sequence[Mapping[str, str | float]] | None = None
 ) -> list[Path]:
-    """Write scenes of the group of fields as a collection for ParaView.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        With the group `fields`.
-    path : Path
-        Ending in ``.pvd``; files of its scenes are in a folder of its name without that.
-    scenes : sequence of dict, optional
-        Labels of each; all that have fields without.
-
-    Returns
-    -------
-    list of Path
-        What was written, the collection first.
-    """
+    """Write scenes of the group of fields as a collection for ParaView."""
     from springtune.handover.paraview import pieces_of, series
 
     files = _SceneFiles(tree)
@@ -619,20 +532,6 @@ def _write_shape(tree: xr.DataTree, fields: xr.Dataset, path: Path, labels: Mapp
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:
     """Labels by dimension, of texts such as ``beam=200x40,load=traction``.
-
-    Parameters
-    ----------
-    text : sequence of str
-        Several labels of a dimension are several pairs.
-
-    Returns
-    -------
-    dict of str to list of str
-
-    Raises
-    ------
-    ValueError
-        If a pair has no ``=``.
 
     Examples
     --------

@@ -22,18 +22,7 @@ LINE = 1.22 * SMALL / POINTS
 
 @cache
 def width(text: str, size: float = SMALL) -> float:
-    """Width of the longest line of a text in the style's font [inch].
-
-    Parameters
-    ----------
-    text : str
-    size : float
-        [pt]
-
-    Returns
-    -------
-    float
-    """
+    """Width of the longest line of a text in the style's font [inch]."""
     font = get_font(findfont(FontProperties()))
     font.set_size(size, POINTS)
     found = 0.0
@@ -70,19 +59,6 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: fl
 
     The sum of the squared moves is the smallest there is for their order (pools of adjacent violators), before all are
     moved between the ends.
-
-    Parameters
-    ----------
-    wanted : sequence of float
-        Places of their middles.
-    sizes : sequence of float
-        Of each, along the same axis.
-    low, high : float
-        Ends of what there is; where they do not fit they stand out evenly at both.
-
-    Returns
-    -------
-    ndarray of float, in the order given
     """
     if not len(wanted):
         return np.zeros(0)
@@ -107,14 +83,6 @@ def name_lines(panel: Axes, ends: Iterable[tuple[float, float, str, str]], share
     """Names of lines to the right of their ends, no two on each other, within the panel, which is widened for them.
 
     Call it when the panel has its place and its limits.
-
-    Parameters
-    ----------
-    panel : matplotlib.axes.Axes
-    ends : iterable of tuple
-        Of each line where it ends, x and y, its name, and its colour.
-    share : float
-        Largest share of the panel's width for names; longer ones take several lines.
     """
     lines = [end for end in ends if np.isfinite(end[0]) and np.isfinite(end[1])]
     if not lines:
@@ -150,15 +118,7 @@ def name_lines(panel: Axes, ends: Iterable[tuple[float, float, str, str]], share
 
 
 def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
-    """Names of curves that are one line to the eye: lists, in order.
-
-    Parameters
-    ----------
-    curves : dict of str to ndarray
-        As drawn: logarithms where the axis is logarithmic.
-    within : float
-        Largest difference.
-    """
+    """Names of curves that are one line to the eye: lists, in order."""
     groups: list[list[str]] = []
     for name, values in curves.items():
         for group in groups:
@@ -197,10 +157,7 @@ def settle(figure: Figure | SubFigure | None, axes: np.ndarray, place: Mapping[s
 
     Parameters
     ----------
-    figure : Figure, SubFigure or None
     axes : (nrows, ncols) ndarray of Axes
-    place : dict
-        What `arrange` is told; ``across`` is what there is between columns besides those texts.
     """
     left = max(room_left(panel) for panel in axes[:, 0])
     between = max((room_left(panel) for panel in axes[:, 1:].flat if panel.get_visible()), default=0.0)
@@ -208,15 +165,7 @@ def settle(figure: Figure | SubFigure | None, axes: np.ndarray, place: Mapping[s
 
 
 def say(panel: Axes, text: str, bare: bool = True) -> None:
-    """Words in the middle of a panel that has nothing to show: what is missing, and why.
-
-    Parameters
-    ----------
-    panel : matplotlib.axes.Axes
-    text : str
-    bare : bool
-        Whether the panel loses the texts of its ticks, which say nothing without anything drawn.
-    """
+    """Words in the middle of a panel that has nothing to show: what is missing, and why."""
     room = panel.get_window_extent().width / panel.figure.dpi
     panel.text(
         0.5, 0.5, wrapped(text, 0.9 * room, 8), transform=panel.transAxes, ha="center", va="center", fontsize=8,

@@ -51,18 +51,7 @@ class _Store(NetCDF4DataStore):
 
 
 def opened(path: Path, most: float) -> xr.DataTree:
-    """The tree of a file.
-
-    Parameters
-    ----------
-    path : Path
-    most : float
-        Bytes that texts of one array may take.
-
-    Returns
-    -------
-    xarray.DataTree
-    """
+    """The tree of a file."""
     root = _Store.open(str(path))  # type: ignore[no-untyped-call]
     root.most = most
     found = {}

@@ -15,18 +15,7 @@ OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE)
 
 
 def of_own_law(finite: "xr.Dataset") -> "xr.Dataset | None":
-    """A group of references at finite strain, with those in plane stress of each material's own law.
-
-    Parameters
-    ----------
-    finite : xarray.Dataset
-        With ``reference`` among its dimensions, and ``reference_displacement``.
-
-    Returns
-    -------
-    xarray.Dataset or None
-        Without that dimension; None where there is no such reference.
-    """
+    """A group of references at finite strain, with those in plane stress of each material's own law."""
     neo_hooke, tested = (
         finite.sel(reference=kind, drop=True) if kind in finite.reference.values else None
         for kind in (FINITE_STRAIN_REFERENCE, TESTED_REFERENCE)

@@ -24,18 +24,7 @@ COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "
 
 
 def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
-    """Write one CSV file a table and a page with all of them.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-    folder : str or Path
-
-    Returns
-    -------
-    list of str
-        Names of the files written.
-    """
+    """Write one CSV file a table and a page with all of them."""
     tables = [table for kind in kinds() if kind.tables for table in kind.module("tables").tables(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
@@ -211,19 +200,7 @@ def _objections(rows: list[Mapping[str, Any]], kinematics: list[str]) -> list[st
 
 
 def shown(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table of any columns as it is shown: heads with units, and texts.
-
-    Parameters
-    ----------
-    table : mapping
-        Its ``stem``, ``title``, ``note`` and ``rows``.
-
-    Returns
-    -------
-    dict
-        These, ``heads``, ``lines`` of texts, ``words`` (places of the columns that are no numbers), and ``beyond``:
-        what it says of rows that are not shown.
-    """
+    """A table of any columns as it is shown: heads with units, and texts."""
     rows = table["rows"]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     texts, words = {}, []

@@ -23,20 +23,7 @@ MANY_PANELS = 16
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
-    """Draw the figures of outputs into ``folder/figures``, and write their tables and other files into their folders.
-
-    Parameters
-    ----------
-    dataset : str or Path
-    folder : str or Path
-    *names : str
-        Keys of `springtune.studies.kinds.outputs`.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-    """
+    """Draw the figures of outputs into ``folder/figures``, and write their tables and other files."""
     made: list[Path] = []
     figures = Path(folder) / "figures"
     # Arrays are read when something is shown of them: most are not.
@@ -55,17 +42,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
 
 
 def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
-    """Make outputs and write the record of it.
-
-    Parameters
-    ----------
-    dataset, folder, *names
-        As of `run`.
-    record : str
-        Record to write.
-    digest : str
-        Of what is asked for.
-    """
+    """Make outputs and write the record of it."""
     read = records.checksum(dataset)
     records.write(record, digest, run(dataset, folder, *names), read=read)
 

@@ -92,12 +92,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
 @contextmanager
 def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
-    """Context of a dataset of which small arrays are in memory, and of large ones is read what is asked of them.
-
-    Parameters
-    ----------
-    path : str or Path
-    """
+    """Context of a dataset of which small arrays are in memory, and of large ones is read what is asked of them."""
     from .lazy import LARGE_ARRAY
 
     with open(path) as tree:
@@ -113,14 +108,6 @@ def check_opens(path: str | os.PathLike[str]) -> None:
 
     Commands can afford to know that; `open` cannot, in a process with threads and data of its user. Nothing is checked
     where processes cannot be forked.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Raises
-    ------
-    ValueError
     """
     if not hasattr(os, "fork"):
         return
@@ -149,16 +136,6 @@ def check_links(path: Path) -> None:
 
     So it does on some whose head is damaged, and where another program has changed the attributes by which arrays and
     dimensions know each other. HDF5's own library says so in some milliseconds.
-
-    Parameters
-    ----------
-    path : Path
-        A dataset.
-
-    Raises
-    ------
-    ValueError
-        If it is such a file, its data are in another one, or it says that it holds more than it can.
     """
     import h5py
 
@@ -217,16 +194,6 @@ def most_of(path: Path) -> float:
 @contextmanager
 def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
     """Context in which a dataset that is not as springtune writes it is refused, whatever is tripped over.
-
-    Parameters
-    ----------
-    path : str or Path
-        Its file.
-
-    Raises
-    ------
-    ValueError
-        In place of errors that tell of code, not of the file; those for people pass as they are.
 
     Examples
     --------

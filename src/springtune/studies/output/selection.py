@@ -16,25 +16,7 @@ if TYPE_CHECKING:
 
 
 def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.Dataset:
-    """Dataset of a group: ``data`` itself unless it is a tree.
-
-    Parameters
-    ----------
-    data : xarray.DataTree or xarray.Dataset
-    name : str
-        Such as ``"sensitivity"``; ``"/"`` is the root.
-    alone : bool
-        Whether the group is enough for what is plotted.
-
-    Returns
-    -------
-    xarray.Dataset
-
-    Raises
-    ------
-    ValueError
-        If the tree has no such group, or there is no tree and the group is not enough.
-    """
+    """Dataset of a group: ``data`` itself unless it is a tree."""
     if not isinstance(data, xr.DataTree):
         if not alone:
             raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
@@ -51,25 +33,7 @@ def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.D
 
 
 def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
-    """Labels that a figure is of: those given, and those that leave no choice.
-
-    Parameters
-    ----------
-    present : xarray.DataArray of bool
-        Cells that the study has.
-    **selection
-        Label by dimension; None where none is given.
-
-    Returns
-    -------
-    dict
-        Label by dimension, in the order given; dimensions that ``present`` does not have are left out.
-
-    Raises
-    ------
-    ValueError
-        If a label is not there, or if none is given and several are there.
-    """
+    """Labels that a figure is of: those given, and those that leave no choice."""
     chosen = {name: label for name, label in selection.items() if name in present.dims}
     labels = {name: present[name].values.tolist() for name in chosen}
     there = present.values
@@ -97,20 +61,6 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
     """Of what a study sweeps, the last values that each beam, material and load has.
 
     A figure that shows no sweep shows these: the largest force, under it the largest thickness, and so on.
-
-    Parameters
-    ----------
-    present : xarray.DataArray of bool
-        Cells that the study has.
-    along : str, optional
-        Dimension that is shown: values under which it has most labels are taken before others; where it has one label
-        under each, each label has values of its own.
-
-    Returns
-    -------
-    dict of str to xarray.DataArray
-        Value of each dimension that is swept, over ``beam, material, load`` as far as these are dimensions, and over
-        `along` where its labels have values of their own; nothing where nothing is swept. `at` takes it.
     """
     names = [str(name) for name in present.dims if name in SWEPT and name != along]
     if not names:
@@ -138,34 +88,12 @@ OF_FIELDS = "shown_"
 
 
 def unswept(root: xr.Dataset) -> xr.Dataset:
-    """Root of a dataset without what the study sweeps: each beam, material and load at its last values.
-
-    Parameters
-    ----------
-    root : xarray.Dataset
-
-    Returns
-    -------
-    xarray.Dataset
-        As of a study that sweeps nothing; see `last_swept`.
-    """
+    """Root of a dataset without what the study sweeps: each beam, material and load at its last values."""
     return at(root, last_swept(root.status != 0))
 
 
 def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Of what a study sweeps, the values that its whole fields are of.
-
-    Parameters
-    ----------
-    fields : xarray.Dataset
-        Group of fields.
-    root : xarray.Dataset
-
-    Returns
-    -------
-    dict of str to xarray.DataArray
-        As `last_swept`, over ``beam, mesh_type, material, load`` as far as these are dimensions.
-    """
+    """Of what a study sweeps, the values that its whole fields are of."""
     names = [name for name in SWEPT if name in root.dims and f"{OF_FIELDS}{name}" in fields]
     coordinates = [name for name in root.dims if name in SWEPT]
     # Nothing is kept of what has no value: any will do.
@@ -174,19 +102,7 @@ def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]
 
 
 def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
-    """Dataset at values of what is swept, each beam, material and load at its own.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-    values : dict of str to xarray.DataArray
-        As `last_swept` gives them.
-
-    Returns
-    -------
-    xarray.Dataset
-        Without these dimensions; a force that was one is a variable, as where nothing is swept.
-    """
+    """Dataset at values of what is swept, each beam, material and load at its own."""
     chosen = {name: value for name, value in values.items() if name in data.dims}
     if not chosen:
         return data
@@ -220,18 +136,7 @@ def _listed(labels: Iterable[object]) -> str:
 
 
 def labelled_beam(data: xr.Dataset, name: str) -> str:
-    """A beam's name with what it measures, see `springtune.problem.geometry.beam_label`.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        Root of a dataset, or of that beam; the name alone where it does not say how long a beam is.
-    name : str
-
-    Returns
-    -------
-    str
-    """
+    """A beam's name with what it measures, see `springtune.problem.geometry.beam_label`."""
     if "beam_length" not in data:
         return str(name)
     found = data[["beam_length", "beam_height"]]

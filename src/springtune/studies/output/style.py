@@ -82,14 +82,7 @@ def line(number: int) -> dict[str, Any]:
 
 
 def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
-    """Numbers such as 0.5, 2 and 300 in place of powers on a logarithmic axis.
-
-    Parameters
-    ----------
-    panel : matplotlib.axes.Axes
-    *axes : str
-        ``"x"``, ``"y"``.
-    """
+    """Numbers such as 0.5, 2 and 300 in place of powers on a logarithmic axis."""
     for name in axes:
         chosen, (low, high) = getattr(panel, f"{name}axis"), sorted(getattr(panel, f"get_{name}lim")())
         chosen.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -139,31 +132,9 @@ def panels(
 ) -> tuple[Figure | SubFigure | None, np.ndarray]:
     """Axes to plot on, and the figure where that is to be arranged.
 
-    Parameters
-    ----------
-    ax : None, matplotlib Figure, Axes or array of Axes
-        None makes a figure, by pyplot, so that a notebook shows it. A figure is filled. Axes are taken as they are.
-    nrows, ncols : int
-        Panels of the plot.
-    figsize : tuple of float
-        Width and height of a figure that is made [inch].
-    layout : str, optional
-        Layout engine of a figure that is made.
-    sharex, sharey : bool, optional
-        Whether the panels of a figure share their axes.
-    ratios, widths : sequence of float, optional
-        Heights of its rows and widths of its columns, to each other.
-
     Returns
     -------
-    figure : Figure, SubFigure or None
-        None where Axes were given: their figure is their owner's to arrange.
     axes : (nrows, ncols) ndarray of Axes
-
-    Raises
-    ------
-    ValueError
-        If Axes were given and they are not as many as the panels.
     """
     if ax is None:
         # Here, since pyplot chooses a backend: who only imports, or plots on axes that are there, chooses none.
@@ -185,25 +156,10 @@ def multiples(
 ) -> tuple[Figure | SubFigure | None, np.ndarray, np.ndarray, float]:
     """Panels of small multiples: one of them a column wide, more of them in rows of a page.
 
-    Parameters
-    ----------
-    ax : None, matplotlib Figure, Axes or array of Axes
-        As of `panels`; Axes that are given stand in one row.
-    count, columns : int
-        Panels, and how many stand in a row.
-    height : float
-        Of a row [inch].
-    sharey : bool, optional
-        Whether the panels of a figure share the axis of ordinates.
-
     Returns
     -------
-    figure, axes
-        As of `panels`.
     used : (count,) ndarray of Axes
         Those that are not left over in the last row.
-    height : float
-        Of the figure without notes [inch].
     """
     rows = -(-count // columns)
     figsize = (COLUMN if columns == 1 else PAGE, 0.2 + height * rows)
@@ -238,14 +194,7 @@ def arrange(
 
     Parameters
     ----------
-    figure : Figure, SubFigure or None
-        None, as `panels` returns it, leaves everything as it is.
     axes : (nrows, ncols) ndarray of Axes
-    left, right, bottom, top : float
-        Margins [inch].
-    across, down : float
-        Gaps between columns and between rows [inch].
-    title : str, optional
     """
     if figure is None:
         return

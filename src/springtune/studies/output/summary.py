@@ -52,20 +52,7 @@ REFERRED = {"status", "reference_displacement", "reference_applies", "reference_
 
 
 def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
-    """What became of a study's cells.
-
-    Parameters
-    ----------
-    groups : dict of str to xarray.Dataset
-        Groups of its dataset by name.
-    title : str
-        Title of the study.
-
-    Returns
-    -------
-    str
-        Lines: counts, worst errors, and what is not solved by its labels and with its reason.
-    """
+    """What became of a study's cells."""
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
@@ -199,21 +186,7 @@ def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
 
 
 def ending(study: "Study", plan: Plan, since: float) -> str:
-    """What to say at the end of a run that finished.
-
-    Parameters
-    ----------
-    study : Study
-    plan : Plan
-        Of its stages.
-    since : float
-        When the run began, seconds since the epoch.
-
-    Returns
-    -------
-    str
-        The stored text, what was computed by this run, what it took and where the results are.
-    """
+    """What to say at the end of a run that finished."""
     new, took = _computed(study, plan, since), clock(time.time() - since)
     rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
     aside = [path for path in plan.folder.rglob(f"*{ASIDE}") if path.stat().st_ctime >= since]
@@ -223,17 +196,7 @@ def ending(study: "Study", plan: Plan, since: float) -> str:
 
 
 def broken(study: "Study", plan: Plan, since: float) -> str:
-    """What to say at the end of a run of which a job failed.
-
-    Parameters
-    ----------
-    study, plan, since
-        As of `ending`.
-
-    Returns
-    -------
-    str
-    """
+    """What to say at the end of a run of which a job failed."""
     _, logs = _undone(plan, since)
     lines = [f"{study.name} is not complete: a job failed or was stopped."]
     for path in logs:
@@ -243,18 +206,7 @@ def broken(study: "Study", plan: Plan, since: float) -> str:
 
 
 def beside(study: "Study", plan: Plan, since: float) -> str:
-    """What to say of a study that was run besides, for the paper.
-
-    Parameters
-    ----------
-    study, plan, since
-        As of `ending`.
-
-    Returns
-    -------
-    str
-        A line on what was computed, and of what is not made the logs.
-    """
+    """What to say of a study that was run besides, for the paper."""
     undone, logs = _undone(plan, since)
     lines = [f"new in {study.name}: {_computed(study, plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
@@ -286,18 +238,7 @@ def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
 
 
 def reminder(folder: Path) -> str:
-    """What to say of a study of which everything is made already.
-
-    Parameters
-    ----------
-    folder : Path
-        Where its results are.
-
-    Returns
-    -------
-    str
-        Lines; none where there is no summary.
-    """
+    """What to say of a study of which everything is made already."""
     try:
         lines = (folder / FILE).read_text().splitlines()
     except OSError:

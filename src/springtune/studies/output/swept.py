@@ -13,17 +13,7 @@ from .flags import nothing
 
 
 def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
-    """Datasets that have a dimension for each parameter that any of them sweeps.
-
-    Parameters
-    ----------
-    trees : sequence of xarray.DataTree
-
-    Returns
-    -------
-    list of xarray.DataTree
-        The same where nothing is missing; else in memory, each cell at the label that its study states.
-    """
+    """Datasets that have a dimension for each parameter that any of them sweeps."""
     made = [*trees]
     for name in SWEPT:
         sweeping = [tree for tree in trees if name in tree.dims]

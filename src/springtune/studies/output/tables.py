@@ -48,15 +48,6 @@ def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | N
     ----------
     values : iterable of float
         NaN where there is none.
-    digits : int
-        Significant digits.
-    most : int
-        Decimals from which on a column is better off with a power of ten in each number.
-
-    Returns
-    -------
-    int or None
-        None where no number of decimals serves: sizes differ too much, or are too small or too large.
     """
     sizes = np.abs(np.fromiter(values, dtype=float))
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
@@ -68,20 +59,7 @@ def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | N
 
 
 def number(value: float, places: int | None, sign: bool = False) -> str:
-    """A number with decimals as `decimals` finds them; "–" where there is none.
-
-    Parameters
-    ----------
-    value : float
-    places : int or None
-        None writes four significant digits.
-    sign : bool
-        Whether a plus is written.
-
-    Returns
-    -------
-    str
-    """
+    """A number with decimals as `decimals` finds them; "–" where there is none."""
     if not np.isfinite(value):
         return "–"
     text = f"{value:{'+' if sign else ''}{'.4g' if places is None else f'.{places}f'}}"

@@ -38,16 +38,6 @@ def bytes_text(number: float) -> str:
 def number_text(number: float, unit: str) -> str:
     """A number with its unit, lengths in mm.
 
-    Parameters
-    ----------
-    number : float
-    unit : str
-        ``"1"`` where it has none.
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
@@ -60,17 +50,6 @@ def number_text(number: float, unit: str) -> str:
 
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
     """A label of a dimension as people read it.
-
-    Parameters
-    ----------
-    dimension : str
-    label : str or float
-    unit : str, optional
-        Of a number.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -16,27 +16,18 @@ class Plot:
 
     Attributes
     ----------
-    title : str
     value : str
         Variable that is plotted: up the axis of lines, by colour on a map.
-    x : str
-        Dimension, or variable, along x.
     by : str
         Dimension with a line a label, or that of a map along y.
-    shows : str
-        ``"lines"``, ``"points"`` or ``"map"``.
     along : str
         Dimension whose points a line joins, where `x` is a variable.
     ascending : bool
         Whether a line joins them in the order of `x`.
     log : str
         Logarithmic axes: ``"x"``, ``"y"`` or ``"xy"``. What is along a logarithmic axis is shown without its sign.
-    equal : bool
-        Whether a length is the same along both axes.
     beside : tuple of tuple
         Further lines, each the variable or dimension along x, the variable up the axis, and a name.
-    selection : dict of str to str or float
-        Labels of other dimensions to begin with.
     """
 
     title: str
@@ -58,12 +49,6 @@ class View:
 
     Attributes
     ----------
-    group : str
-        Path of the group, ``"/"`` for the root.
-    title : str
-        Its name on the page.
-    note : str
-        What there is to see, in a sentence or two.
     plots : tuple of Plot
         Plots to choose from, the first of them at the beginning; one whose variables are not there is left out.
     columns : tuple of str

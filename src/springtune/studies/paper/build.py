@@ -23,22 +23,6 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
 
     The same datasets and source give the same bytes: only fonts that Typst brings along are used, and no date is
     written.
-
-    Parameters
-    ----------
-    source : str or Path
-        Folder with ``main.typ``, ``numbers.yaml``, ``printed.yaml`` and ``figures.yaml``.
-    folder : str or Path
-        Where numbers and figures go.
-    output : str or Path
-        PDF file to write.
-    *paths : str or Path
-        ``dataset.nc`` files.
-
-    Raises
-    ------
-    PaperError
-        If Typst is not installed, a text has typed numbers, a number is not there, or Typst refuses the source.
     """
     source, folder = Path(source), Path(folder)
     check_typst()
@@ -65,42 +49,14 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
 
 
 def main(source: str, folder: str, output: str, record: str, digest: str, *paths: str) -> None:
-    """Build a paper and write the record of it.
-
-    Parameters
-    ----------
-    source, folder, output, *paths
-        As of `run`.
-    record : str
-        Record to write.
-    digest : str
-        Of what is asked for.
-    """
+    """Build a paper and write the record of it."""
     checksums = [records.checksum(path) for path in paths]
     run(source, folder, output, *paths)
     records.write(record, digest, [output], read=checksums)
 
 
 def typeset(source: Path, folder: Path) -> bytes:
-    """Set a paper whose numbers and figures are there.
-
-    Parameters
-    ----------
-    source : Path
-        Folder with ``main.typ``.
-    folder : Path
-        Folder with ``numbers.json`` and the figures.
-
-    Returns
-    -------
-    bytes
-        The PDF.
-
-    Raises
-    ------
-    PaperError
-        If Typst refuses the source; the message says where.
-    """
+    """Set a paper whose numbers and figures are there."""
     import typst
 
     source, folder = source.resolve(), folder.resolve()
@@ -116,13 +72,7 @@ def typeset(source: Path, folder: Path) -> bytes:
 
 
 def check_typst() -> None:
-    """Whether Typst is installed.
-
-    Raises
-    ------
-    PaperError
-        If it is not.
-    """
+    """Whether Typst is installed."""
     if find_spec("typst") is None:
         raise PaperError('the paper is set with Typst, which is not installed: pip install "springtune[paper]"')
 

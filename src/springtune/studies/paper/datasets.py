@@ -24,8 +24,6 @@ class Dataset:
 
     Attributes
     ----------
-    path : Path
-    tree : xarray.DataTree
     sha256 : str
         Hash of the file's bytes: times and seconds in it count, too.
     """
@@ -55,23 +53,7 @@ class Dataset:
 
 
 def read(paths: Iterable[str | Path]) -> dict[str, Dataset]:
-    """Read datasets.
-
-    Parameters
-    ----------
-    paths : iterable of str or Path
-        Of ``dataset.nc`` files.
-
-    Returns
-    -------
-    dict of str to Dataset
-        By the names of their studies.
-
-    Raises
-    ------
-    PaperError
-        If one cannot be read.
-    """
+    """Read datasets."""
     found: dict[str, Dataset] = {}
     for path in map(Path, paths):
         try:
@@ -84,24 +66,7 @@ def read(paths: Iterable[str | Path]) -> dict[str, Dataset]:
 
 
 def chosen(datasets: Mapping[str, Dataset], study: str, what: str) -> Dataset:
-    """Dataset of a study.
-
-    Parameters
-    ----------
-    datasets : mapping of str to Dataset
-    study : str
-    what : str
-        What asks for it, for the message.
-
-    Returns
-    -------
-    Dataset
-
-    Raises
-    ------
-    PaperError
-        If it was not given.
-    """
+    """Dataset of a study."""
     if study not in datasets:
         raise PaperError(
             f"{what}: no dataset of the study '{study}' was given; there is {', '.join(datasets) or 'none'}: "

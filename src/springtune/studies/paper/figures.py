@@ -30,9 +30,6 @@ class Panel(BaseModel):
     ----------
     plot : str
         Public function of springtune that plots, such as ``plot_sensitivity``, or a sketch of `SKETCHES`.
-    study : str
-    at : dict
-        What it selects.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -49,9 +46,6 @@ class Drawing(BaseModel):
     ----------
     size : tuple of float, optional
         Width and height [inch]; may be left out where one panel is plotted as it is by itself.
-    columns : int
-        Panels side by side.
-    panels : list of Panel
     example : str
         In place of panels: stem of a script whose ``main`` leaves one figure open.
     """
@@ -67,28 +61,7 @@ class Drawing(BaseModel):
 def draw(
     declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: Path, examples: Path = Path("examples")
 ) -> dict[str, Any]:
-    """Draw the figures of a paper as PDF files.
-
-    Parameters
-    ----------
-    declared : mapping
-        Declarations by name, see `Drawing`.
-    datasets : mapping of str to Dataset
-    folder : Path
-        Where the files go.
-    examples : Path, optional
-        Folder of the scripts.
-
-    Returns
-    -------
-    dict of str to str
-        By name: selection and hash of the datasets, or the script, for the caption.
-
-    Raises
-    ------
-    PaperError
-        If a declaration is wrong or a dataset lacks what is to be plotted.
-    """
+    """Draw the figures of a paper as PDF files."""
     drawings = {name: checked(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
     for name, drawing in drawings.items():
         atomic.write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))

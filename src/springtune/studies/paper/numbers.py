@@ -58,24 +58,14 @@ class Number(BaseModel):
         Labels by dimension, a list of them for several; of a list of dicts the cells together count.
     over : str
         Variable of the same group that it is divided by.
-    minus : float
-        What is taken off after that.
     where : str
         A variable of flags and what it must be, or must not: ``status=unstable``, ``status!=not_requested``.
     reduce : str
         Key of `REDUCTIONS`, where the labels leave several cells.
-    absolute : bool
-        Whether cells count by their size.
     cells : int, optional
         How many cells must have a value, where a reduction over fewer would mislead.
     formula : str
         In place of a variable: of other numbers, in SI units.
-    unit : str
-        Key of `TEXT_UNITS`.
-    digits, figures : int
-        Digits after the point, or significant ones.
-    sign : bool
-        Whether a plus is written.
     optional : bool
         Whether the text has a branch for the case that it is not there.
     marks : dict of str to str
@@ -127,17 +117,7 @@ class Number(BaseModel):
 
 
 class Printed(BaseModel):
-    """A number that another publication prints.
-
-    Attributes
-    ----------
-    printed : str
-        As printed.
-    unit : str
-        Key of `TEXT_UNITS`.
-    where : str
-        Section, figure or sentence.
-    """
+    """A number that another publication prints."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -151,8 +131,6 @@ class Table(BaseModel):
 
     Attributes
     ----------
-    all : dict
-        Declaration that every cell begins with.
     rows, columns : list of dict
         Declarations that are put on top of it, with ``title`` and ``group``.
     """
@@ -165,21 +143,7 @@ class Table(BaseModel):
 
 
 def load(path: Path) -> dict[str, Any]:
-    """Content of a YAML file.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    PaperError
-        If it cannot be read.
-    """
+    """Content of a YAML file."""
     try:
         return yaml.safe_load(path.read_text(encoding="utf-8")) or {}
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -187,25 +151,7 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: Mapping[str, Dataset]) -> dict[str, Any]:
-    """All numbers of a paper.
-
-    Parameters
-    ----------
-    declared, printed : mapping
-        Declarations by name: of `Number` and of `Printed`.
-    datasets : mapping of str to Dataset
-
-    Returns
-    -------
-    dict of str to dict
-        ``text``, ``unit``, ``value`` in SI units and ``source``, by name; a number that is optional and not there has
-        the text None.
-
-    Raises
-    ------
-    PaperError
-        If a declaration is wrong, or a number is not there.
-    """
+    """All numbers of a paper."""
     twice = sorted(set(declared) & set(printed))
     if twice:
         raise PaperError(f"{', '.join(twice)}: declared twice, in numbers.yaml and printed.yaml; rename one")
@@ -240,21 +186,7 @@ def _read(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Datas
 
 
 def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
-    """A table of a paper: titles and formatted cells.
-
-    Parameters
-    ----------
-    declared : mapping
-        Declaration, see `Table`.
-    datasets : mapping of str to Dataset
-    name : str
-
-    Returns
-    -------
-    dict
-        ``columns`` with ``title`` and ``group``, ``rows`` with ``title``, ``unit`` and ``cells``, texts, and ``data``,
-        the datasets for the caption. A cell without a value is a dash.
-    """
+    """A table of a paper: titles and formatted cells."""
     made = checked(Table, declared, name)
     columns = [checked(Number, entry, name) for entry in made.columns]
     rows, studies = [], set()
@@ -271,24 +203,7 @@ def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: st
 
 
 def checked(model: type[Any], entry: object, name: str) -> Any:
-    """A declaration, validated.
-
-    Parameters
-    ----------
-    model : type
-    entry : object
-    name : str
-        For the message.
-
-    Returns
-    -------
-    instance of the model
-
-    Raises
-    ------
-    PaperError
-        If it is not one.
-    """
+    """A declaration, validated."""
     try:
         return model.model_validate(entry)
     except ValidationError as error:

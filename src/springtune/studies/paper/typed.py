@@ -39,16 +39,6 @@ def _blank(found: re.Match[str]) -> str:
 def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
     """Numbers that stand in a text.
 
-    Parameters
-    ----------
-    text : str
-        Source in Typst.
-
-    Yields
-    ------
-    tuple of int and str
-        Line, counted from 1, and what stands there.
-
     Examples
     --------
     >>> list(typed_numbers("The error is 3.4 %, see Table 1."))

@@ -50,14 +50,6 @@ REMEMBERED = 20
 class Costs:
     """What tasks cost on this machine.
 
-    Parameters
-    ----------
-    path : Path
-        File of `remember`; without it, costs are the usual ones.
-    usual : dict of str to tuple of float
-        Seconds of a task, in any case and per unit, before any was measured, by name; what a machine measures
-        multiplies them.
-
     Examples
     --------
     >>> Costs(Path("no such file"), {"linear": (5e-4, 1e-6)}).of("linear", 1000)
@@ -74,20 +66,7 @@ class Costs:
         self.memory: dict[str, float] = known.get("memory", {})
 
     def of(self, kind: str, units: float = 0.0) -> float:
-        """Seconds of a task.
-
-        Parameters
-        ----------
-        kind : str
-            Its name.
-        units : float, optional
-            Its particles, or what else its cost grows with.
-
-        Returns
-        -------
-        float
-            None of a task of no known cost.
-        """
+        """Seconds of a task."""
         return self.ratios.get(kind, 1.0) * _usual(self.usual, kind, 1, units) if kind in self.usual else 0.0
 
 
@@ -97,12 +76,8 @@ class Needs:
 
     Attributes
     ----------
-    seconds : float
-        That it is expected to work.
     memory : float
         Bytes that it is expected to need; 0 where nothing like it was measured.
-    most_memory : float
-        Bytes beyond which none of its tasks may go.
     """
 
     seconds: float
@@ -111,15 +86,6 @@ class Needs:
 
     def minutes(self, attempt: int) -> int:
         """Minutes after which the cluster may end the job.
-
-        Parameters
-        ----------
-        attempt : int
-            1 where it is new; each further one doubles them.
-
-        Returns
-        -------
-        int
 
         Examples
         --------
@@ -130,15 +96,6 @@ class Needs:
 
     def megabytes(self, attempt: int) -> int:
         """Memory beyond which the cluster may end the job [MB].
-
-        Parameters
-        ----------
-        attempt : int
-            As of `minutes`; a task that is within the study's limits fits in, however large it is.
-
-        Returns
-        -------
-        int
 
         Examples
         --------
@@ -156,17 +113,7 @@ def _usual(usual: Usual, kind: str, count: float, units: float) -> float:
 
 
 def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
-    """Add what the jobs of a run did to what is known of the machine.
-
-    Parameters
-    ----------
-    path : Path
-        Note: sums of usual and of measured seconds by kind, a job's imports, and its largest memory by stage.
-    done : iterable of Path
-        Records of jobs, with a `Spent.summary`; those older than the file at `path` are in it already.
-    usual : dict of str to tuple
-        As of `Costs`.
-    """
+    """Add what the jobs of a run did to what is known of the machine."""
     known = checked_json.read(path, kinds=dict)
     since = path.stat().st_mtime if known else 0.0
     known = known or {"kinds": {}}
@@ -204,24 +151,6 @@ def share_out(
 ) -> dict[str, list[str]]:
     """Bundles of about equal cost.
 
-    Parameters
-    ----------
-    costs : dict of str to float
-        Seconds of each task by name.
-    cores : int
-        As many bundles are made at least, unless start-up were most of their work.
-    start_up : float
-        Seconds of a job's start-up.
-    before : dict of str to list of str
-        Bundles made before; what they hold stays there.
-    lasting : float, optional
-        Seconds that a job is to last about; without, as few as keep its start-up a small share of it.
-
-    Returns
-    -------
-    dict of str to list of str
-        Names of the tasks of each bundle by its label.
-
     Examples
     --------
     >>> bundles = share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0}, 2, 0.5, {})
@@ -254,15 +183,6 @@ def share_out(
 
 def beside(kept: Mapping[str, list[str]], shared: Mapping[str, list[str]]) -> dict[str, list[str]]:
     """Bundles and others, which get labels that are free.
-
-    Parameters
-    ----------
-    kept, shared : dict of str to list of str
-        Names of the tasks of each bundle by its label.
-
-    Returns
-    -------
-    dict of str to list of str
 
     Examples
     --------

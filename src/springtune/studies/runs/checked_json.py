@@ -20,13 +20,6 @@ PREFIX, BETWEEN, SUFFIX = b'{"seal": "', b'",\n"content": ', b"\n}\n"
 def write(path: str | Path, content: Any) -> None:
     """Write a note; it appears whole or not at all.
 
-    Parameters
-    ----------
-    path : str or Path
-        Folders are made where they are missing.
-    content : object
-        Dicts, lists, numbers and texts.
-
     Examples
     --------
     >>> import tempfile
@@ -41,17 +34,6 @@ def write(path: str | Path, content: Any) -> None:
 
 def read(path: str | Path, **parts: type) -> Any:
     """Content of a note.
-
-    Parameters
-    ----------
-    path : str or Path
-    **parts
-        What it has at least, by name, and of which type: a note that is sound may be another one's.
-
-    Returns
-    -------
-    object
-        None where there is no such file, its checksum is not that of its content, or it lacks a part.
 
     Examples
     --------
@@ -76,21 +58,7 @@ def read(path: str | Path, **parts: type) -> Any:
 
 
 def demand(path: str | Path) -> Any:
-    """Content of a note that a job has written.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    object
-
-    Raises
-    ------
-    DamagedError
-        If there is no such file or its checksum is not that of its content.
-    """
+    """Content of a note that a job has written."""
     content = read(path)
     if content is None:
         raise DamagedError(path, "its checksum is not that of its content" if Path(path).exists() else "it is missing")

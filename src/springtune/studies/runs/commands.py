@@ -25,24 +25,6 @@ def refusal(config: Path, folder: Path, checkout: Path, python: Path, on_cluster
 
     Rules quote all that they give to a shell, so most paths are fine. What is refused is what libraries cannot have.
 
-    Parameters
-    ----------
-    config : Path
-        The study's file.
-    folder : Path
-        Where the run was called: ``results`` is in it.
-    checkout : Path
-        Where the Snakefile is.
-    python : Path
-        Interpreter of the jobs.
-    on_cluster : bool
-        Whether jobs run on other machines.
-
-    Returns
-    -------
-    str
-        The path, the reason and the remedy; empty where nothing is wrong.
-
     Examples
     --------
     >>> checkout, python = Path("/srv/springtune"), Path("/usr/bin/python3")
@@ -67,36 +49,12 @@ def refusal(config: Path, folder: Path, checkout: Path, python: Path, on_cluster
 
 
 def remember(folder: Path, jobs: Iterable[Mapping[str, Any]]) -> None:
-    """Note the jobs of a run.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the study that is run.
-    jobs : iterable of dict
-        Each with its ``rule``, ``wildcards``, ``output``, ``log`` and ``benchmark`` (files of
-        the rule), ``threads`` and
-        ``command``.
-    """
+    """Note the jobs of a run."""
     checked_json.write(folder / COMMANDS_FILE, list(jobs))
 
 
 def recall(folder: Path, rule: str, wildcards: Mapping[str, str]) -> Any:
     """What is noted of a job.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the study that is run.
-    rule : str
-        Name of its rule.
-    wildcards : dict of str to str
-        Of the job.
-
-    Returns
-    -------
-    dict or None
-        As of `remember`; None where there is no note of it: a job in a container may not see the folder.
 
     Examples
     --------

@@ -9,17 +9,7 @@ ASIDE = ".damaged"
 
 
 class DamagedError(Exception):
-    """A stored file is not what was written, or is not there.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    why : str
-        What is wrong with it.
-    whole : bool, optional
-        Whether what it holds is sound, if not what is asked for.
-    """
+    """A stored file is not what was written, or is not there."""
 
     def __init__(self, path: str | Path, why: str, whole: bool = False) -> None:
         super().__init__(f"{path}: {why}")
@@ -27,17 +17,7 @@ class DamagedError(Exception):
 
 
 def rename(path: Path) -> Path:
-    """Give a damaged file the name under which it is kept.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Path
-        That name.
-    """
+    """Give a damaged file the name under which it is kept."""
     aside = path.with_name(path.name + ASIDE)
     with suppress(FileNotFoundError):  # another job was quicker
         path.replace(aside)
@@ -48,10 +28,6 @@ def set_aside(error: DamagedError) -> None:
     """Give a damaged file another name and say so; what it held is computed again.
 
     One that is whole keeps its name: it gets what it lacks.
-
-    Parameters
-    ----------
-    error : DamagedError
     """
     told = "computed again"
     if error.path.exists() and not error.whole:

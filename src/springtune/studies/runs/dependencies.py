@@ -53,11 +53,8 @@ class Closure(NamedTuple):
 
     Attributes
     ----------
-    files : tuple of Path
     packages : tuple of str
         Names of packages from elsewhere, as they are imported.
-    digest : str
-        Hash of the code, wherever its files are.
     """
 
     files: tuple[Path, ...]
@@ -66,13 +63,7 @@ class Closure(NamedTuple):
 
 
 class Code:
-    """Files of code, each read once.
-
-    Parameters
-    ----------
-    package : Path, optional
-        Folder of the package whose imports are followed; those of others are its dependencies.
-    """
+    """Files of code, each read once."""
 
     def __init__(self, package: Path = PACKAGE) -> None:
         self.package = package
@@ -87,25 +78,13 @@ class Code:
         return frozenset(self._sources)
 
     def recall(self, path: Path) -> None:
-        """Take what was read before of files with the same content, which costs as much as half a plan.
-
-        Parameters
-        ----------
-        path : Path
-            Note of `remember`; nothing is taken where there is none, or one of other code.
-        """
+        """Take what was read before of files with the same content, which costs as much as half a plan."""
         note = checked_json.read(path, sources=dict)
         if note is not None and note.get("reader") == READER:
             self._known = note["sources"]
 
     def remember(self, path: Path) -> None:
-        """Write down what was read of files of the package, for `recall`.
-
-        Parameters
-        ----------
-        path : Path
-            It stays as it is where it has all that was read.
-        """
+        """Write down what was read of files of the package, for `recall`."""
         read_now = {
             _mark(file.read_bytes()): [source.digest, sorted(source.imports), source.face]
             for file, source in self._sources.items()
@@ -115,20 +94,7 @@ class Code:
             checked_json.write(path, {"reader": READER, "sources": read_now})
 
     def closure(self, start: Path, without: frozenset[Path] = frozenset(), counted: str = "") -> Closure:
-        """A file and all that it imports, directly or not.
-
-        Parameters
-        ----------
-        start : Path
-        without : frozenset of Path, optional
-            Files that are left out, with what they alone import.
-        counted : str, optional
-            Package of `NOT_COUNTED` that counts here.
-
-        Returns
-        -------
-        Closure
-        """
+        """A file and all that it imports, directly or not."""
         known = start, without, counted
         if known not in self._closures:
             found: set[Path] = set()
@@ -154,17 +120,7 @@ class Code:
         return self._closed(files, {package for one in found for package in one.packages})
 
     def of_text(self, text: str) -> Closure:
-        """What a text runs on that is in no file.
-
-        Parameters
-        ----------
-        text : str
-            Python, or a part of it of which nothing but itself is known.
-
-        Returns
-        -------
-        Closure
-        """
+        """What a text runs on that is in no file."""
         try:
             source = read(textwrap.dedent(text), self.package.name)
         except SyntaxError:
@@ -259,16 +215,6 @@ OURS = Code()
 def modules(*names: str) -> tuple[str, ...]:
     """Files that modules run on: their own and all that they import.
 
-    Parameters
-    ----------
-    *names : str
-        Modules, from the package on, such as ``"studies.kinds.collect"``.
-
-    Returns
-    -------
-    tuple of str
-        Paths, sorted.
-
     Examples
     --------
     >>> [Path(file).name for file in modules("studies.runs.hashing")]
@@ -278,51 +224,17 @@ def modules(*names: str) -> tuple[str, ...]:
 
 
 def stage_closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
-    """What modules run on, without definitions and mesh types that they may choose.
-
-    Parameters
-    ----------
-    *names : str
-        Modules, as `modules` takes them.
-    without : tuple of str, optional
-        Modules that they import for other results than those that are asked about.
-
-    Returns
-    -------
-    Closure
-    """
+    """What modules run on, without definitions and mesh types that they may choose."""
     return OURS.union(OURS.closure(_module(name), frozenset(map(_module, without))) for name in names)
 
 
 def definition_closure(name: str, code: Code = OURS) -> Closure:
-    """What a definition runs on: of this package, and from beside its file or elsewhere.
-
-    Parameters
-    ----------
-    name : str
-        Key of `springtune.springs.DEFINITIONS`.
-    code : Code, optional
-        What is read of files.
-
-    Returns
-    -------
-    Closure
-    """
+    """What a definition runs on: of this package, and from beside its file or elsewhere."""
     return _declared_closure(DEFINITIONS[name], code)
 
 
 def mesh_type_closure(name: str) -> Closure:
-    """What a mesh type runs on, as `definition_closure`.
-
-    Parameters
-    ----------
-    name : str
-        Key of `springtune.mesh.MESH_TYPES`.
-
-    Returns
-    -------
-    Closure
-    """
+    """What a mesh type runs on, as `definition_closure`."""
     return _declared_closure(MESH_TYPES[name], OURS)
 
 
@@ -347,16 +259,6 @@ def _declared_closure(one: Declared, code: Code) -> Closure:
 @cache
 def distribution(package: str) -> str:
     """Distribution that has a package.
-
-    Parameters
-    ----------
-    package : str
-        As it is imported.
-
-    Returns
-    -------
-    str
-        The package's own name where none has it.
 
     Examples
     --------

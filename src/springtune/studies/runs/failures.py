@@ -10,15 +10,6 @@ REFUSALS = (DefinitionError, MeshError)
 def own_reason(error: Exception) -> str:
     """Why a task has no result although the program is sound: it is a hole, and the others go on.
 
-    Parameters
-    ----------
-    error : Exception
-
-    Returns
-    -------
-    str
-        Empty where the program is broken.
-
     Examples
     --------
     >>> own_reason(ZeroDivisionError("division by zero"))

@@ -10,15 +10,6 @@ _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 def hash_of(*parts: Any) -> str:
     """Hash of what a result depends on.
 
-    Parameters
-    ----------
-    *parts : object
-        Nested dicts, lists, texts and numbers.
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})

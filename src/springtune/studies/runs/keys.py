@@ -33,20 +33,7 @@ def installed(distribution: str) -> str:
 
 @cache
 def stage_key(*modules: str, without: tuple[str, ...] = ()) -> str:
-    """What results of modules depend on besides their parameters: their code, and versions of the packages it uses.
-
-    Parameters
-    ----------
-    *modules : str
-        From the package on, such as ``"studies.kinds.scenes.solve"``.
-    without : tuple of str, optional
-        Modules that they import for other results than those that are asked about.
-
-    Returns
-    -------
-    str
-        Definitions and mesh types are not in it, see `definition_key` and `mesh_type_key`.
-    """
+    """What results of modules depend on besides their parameters: their code, and versions of the packages it uses."""
     return code_key(dependencies.stage_closure(*modules, without=without))
 
 

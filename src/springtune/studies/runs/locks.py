@@ -31,15 +31,7 @@ class LockedError(ValueError):
 
 
 def claim(folder: Path, config: Path) -> None:
-    """Note the study that a folder belongs to.
-
-    Parameters
-    ----------
-    folder : Path
-        Where its results are: ``results/<study>`` in the folder that runs are called in.
-    config : Path
-        The study's file. A path in the folder of runs is noted from there on, so that both can be moved.
-    """
+    """Note the study that a folder belongs to."""
     place, path = (Path(os.path.abspath(one)) for one in (folder.parent.parent, config))
     note = {"config": str(path.relative_to(place) if path.is_relative_to(place) else path)}
     if checked_json.read(folder / STUDY_FILE) != note:
@@ -47,17 +39,7 @@ def claim(folder: Path, config: Path) -> None:
 
 
 def claimed(folder: Path) -> Path | None:
-    """File of the study that a folder belongs to; None where it is not known or not there.
-
-    Parameters
-    ----------
-    folder : Path
-        As of `claim`.
-
-    Returns
-    -------
-    Path or None
-    """
+    """File of the study that a folder belongs to; None where it is not known or not there."""
     note = checked_json.read(folder / STUDY_FILE, config=str)
     path = folder.parent.parent / note["config"] if note else None
     return path if path and path.is_file() else None
@@ -68,16 +50,6 @@ def check_claim(folder: Path, config: Path) -> None:
 
     A file that was moved, a link to it and a file with the same content are the same study. A folder without a note is
     of any study of its name.
-
-    Parameters
-    ----------
-    folder, config : Path
-        As of `claim`.
-
-    Raises
-    ------
-    LockedError
-        If the folder is of another study, whose file is still there.
     """
     other = claimed(folder)
     if other is None or not config.is_file() or filecmp.cmp(other, config, shallow=False):
@@ -87,13 +59,7 @@ def check_claim(folder: Path, config: Path) -> None:
 
 
 def begin(folders: Iterable[Path]) -> None:
-    """Note that this process computes studies.
-
-    Parameters
-    ----------
-    folders : iterable of Path
-        Where their results go.
-    """
+    """Note that this process computes studies."""
     import psutil
 
     process, named = psutil.Process(), {str(folder) for folder in folders}
@@ -126,23 +92,7 @@ def _note() -> Path:
 
 
 def is_held(folder: Path) -> bool:
-    """Whether a run has locked a study; that it is gone may be seen from a lock that is stale.
-
-    Parameters
-    ----------
-    folder : Path
-        Where its results are: ``results/<study>`` in the folder that runs are called in.
-
-    Returns
-    -------
-    bool
-        True where there are locks, and all of them are stale.
-
-    Raises
-    ------
-    LockedError
-        If the process is alive, or on another machine.
-    """
+    """Whether a run has locked a study; that it is gone may be seen from a lock that is stale."""
     place = folder.parent.parent
     locked = any(_is_on(path, folder) for path in _files(place / LOCKS, "*.lock"))
     noted = False
@@ -165,23 +115,7 @@ def is_held(folder: Path) -> bool:
 
 
 def release(folder: Path) -> str:
-    """Remove locks on a study that a process which is gone has left.
-
-    Parameters
-    ----------
-    folder : Path
-        As of `is_held`.
-
-    Returns
-    -------
-    str
-        What was removed; empty where there was nothing.
-
-    Raises
-    ------
-    LockedError
-        As `is_held`.
-    """
+    """Remove locks on a study that a process which is gone has left."""
     if not is_held(folder):
         return ""
     place = folder.parent.parent

@@ -36,19 +36,7 @@ STORED, STORES = (
 
 
 def orphans(study: "Study", folder: Path) -> list[Path]:
-    """Files of the kinds that runs make which the study's next run neither makes nor reads.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where the study's results are.
-
-    Returns
-    -------
-    list of Path
-        Sorted; none of them outside of the folder. Whatever else lies there is not looked at.
-    """
+    """Files of the kinds that runs make which the study's next run neither makes nor reads."""
     planned = plan.plan(study, folder, 1)
     jobs = rerun.jobs(study, planned)
     products = [Path(path) for job in jobs.values() for path in job.products]

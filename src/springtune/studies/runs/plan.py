@@ -30,27 +30,12 @@ LASTING = "seconds"
 
 
 def stages() -> "tuple[Stage, ...]":
-    """Stages of all study kinds.
-
-    Returns
-    -------
-    tuple of Stage
-    """
+    """Stages of all study kinds."""
     return tuple(stage for kind in kinds() for stage in kind.stages)
 
 
 def table_files(output: "Output", study: "Study") -> list[str]:
-    """Files of the tables of an output: where it is the page, each table of all study kinds as CSV, and the page.
-
-    Parameters
-    ----------
-    output : Output
-    study : Study
-
-    Returns
-    -------
-    list of str
-    """
+    """Files of the tables of an output: where it is the page, each table of all study kinds as CSV, and the page."""
     if not output.page:
         return list(output.tables(study))
     return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
@@ -63,20 +48,7 @@ def usual_costs() -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Tasks:
-    """What a job of a stage is to do.
-
-    Attributes
-    ----------
-    stage : Stage
-    label : str
-        Of the bundle.
-    content : dict
-        Tasks, as the stage's module takes them.
-    digest : str
-        Of all that the job depends on.
-    products : tuple of str
-        Files that it makes.
-    """
+    """What a job of a stage is to do."""
 
     stage: "Stage"
     label: str
@@ -96,14 +68,10 @@ class Plan:
 
     Attributes
     ----------
-    folder : Path
-        Where the study's results go.
     limits : dict
         Of one task, see `springtune.studies.config.model.Study`.
     bundles : dict
         What each bundle holds, by stage and label, and the cores and the seconds of a job that they are made for.
-    jobs : dict of str to Tasks
-        By name, in the order of stages.
     needs : dict of tuple to springtune.studies.runs.bundles.Needs
         What a job needs, by stage and label; stages that share bundles share their seconds, too.
     """
@@ -143,22 +111,7 @@ class Plan:
 
 
 def plan(study: "Study", folder: Path, cores: int = 1, lasting: float | None = None) -> Plan:
-    """Plan the jobs of a study's stages; nothing is written.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where its results go.
-    cores : int, optional
-        Bundles are made at least for so many cores.
-    lasting : float, optional
-        Seconds that a job is to last, 0 for as few as pay; without, what they were made for before.
-
-    Returns
-    -------
-    Plan
-    """
+    """Plan the jobs of a study's stages; nothing is written."""
     known: dict[str, Any] = checked_json.read(folder / BUNDLES_FILE, cores=int) or {"cores": 0}
     lasting_before = known.get(LASTING, 0.0)
     lasting = lasting_before if lasting is None else lasting

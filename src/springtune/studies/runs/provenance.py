@@ -48,20 +48,7 @@ PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2
 
 
 def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -> dict[str, str]:
-    """Attributes of the root of a study's dataset.
-
-    Parameters
-    ----------
-    study : Study
-    config : str or Path
-        YAML file of the study.
-    untold : collection of str, optional
-        Attributes to leave empty: ``git_diff``, ``host``.
-
-    Returns
-    -------
-    dict of str to str
-    """
+    """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     software = {name: installed(name) for name in SOFTWARE} | {"python": platform.python_version()}
     folder = Path(config).resolve().parent
@@ -97,19 +84,7 @@ def _references(study: Study) -> dict[str, str]:
 
 
 def inputs(study: Study, folder: Path) -> dict[str, str]:
-    """SHA-256 of each file that a study is made from, the versions of its software included.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where the study's file is, absolute.
-
-    Returns
-    -------
-    dict of str to str
-        By the file's name: seen from the checkout, or from the study where there is none.
-    """
+    """SHA-256 of each file that a study is made from, the versions of its software included."""
     root = _checkout(folder)
     files = input_files(study) | ({root / LOCK} if root else set())
     return {_name(file.resolve(), root or folder): checksum(file) for file in sorted(files)}
@@ -121,16 +96,7 @@ def _checkout(folder: Path) -> Path | None:
 
 
 def input_files(study: Study) -> set[Path]:
-    """The study's file, and all that it names: meshes, rows of parameters, tests, printed values.
-
-    Parameters
-    ----------
-    study : Study
-
-    Returns
-    -------
-    set of Path
-    """
+    """The study's file, and all that it names: meshes, rows of parameters, tests, printed values."""
     files = {study.path, *study.test_files, *study.row_files}
     files |= {mesh.file for mesh in study.mesh_files.values() if mesh.file}
     files |= {study.printed_path} if study.printed_path else set()
@@ -162,19 +128,6 @@ def difference(study: Study, folder: Path, *options: str) -> str:
     """What of the package, the rules and the study's own files differs from the commit, and nothing else.
 
     Files that git does not know are not part of it.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        In the checkout, absolute.
-    *options : str
-        Of ``git diff``.
-
-    Returns
-    -------
-    str
-        Bytes that are no UTF-8 are escaped.
     """
     top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
     files = {file.resolve() for file in input_files(study)} | (

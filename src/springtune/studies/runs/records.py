@@ -16,33 +16,13 @@ MISSING, DAMAGED = " is missing", " is damaged"
 
 
 def checksum(path: str | Path) -> str:
-    """SHA-256 of a file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    str
-    """
+    """SHA-256 of a file."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write(path: str | Path, digest: str, products: Iterable[str | Path], **more: Any) -> None:
-    """Write the record of a job that is done.
-
-    Parameters
-    ----------
-    path : str or Path
-    digest : str
-        Of all that it was to do.
-    products : iterable of str or Path
-        Files that it was to make; one that is not there could not be made, and what it made instead says why.
-    **more
-        What else is to be told of it.
-    """
+    """Write the record of a job that is done."""
     made: dict[str, list[Any] | None] = {}
     for product in map(Path, products):
         made[str(product)] = None
@@ -53,40 +33,12 @@ def write(path: str | Path, digest: str, products: Iterable[str | Path], **more:
 
 
 def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> str:
-    """Why a job is to run.
-
-    Parameters
-    ----------
-    path, digest, products, wholly
-        As of `faults`.
-
-    Returns
-    -------
-    str
-        The first of its faults; empty where there is none.
-    """
+    """Why a job is to run."""
     return next(faults(path, digest, products, wholly), "")
 
 
 def faults(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> Iterator[str]:
-    """All reasons for which a job is to run.
-
-    Parameters
-    ----------
-    path : str or Path
-        Its record.
-    digest : str
-        Of what it is to do.
-    products : iterable of str or Path
-        Files that it is to make; those that its record names besides are compared, too.
-    wholly : bool, optional
-        Whether to compare the checksum of each of them, not only of those whose size or time is another.
-
-    Yields
-    ------
-    str
-        None where it has done what is asked for, and what it made is there as it was.
-    """
+    """All reasons for which a job is to run."""
     path = Path(path)
     if not path.exists():
         yield "not done yet"

@@ -45,14 +45,8 @@ class Job:
 
     Attributes
     ----------
-    name : str
-        Stem of its files.
     digest : str
         Of all that it depends on, apart from what jobs before it make.
-    products : tuple of str
-        Files that it makes.
-    record : Path
-        What it has done.
     reads : str
         Job whose first product it is made from; empty for stages, whose results are known by their keys.
     inputs : tuple of str
@@ -68,16 +62,7 @@ class Job:
 
 
 def output_jobs(study: "Study") -> "dict[str, list[Output]]":
-    """Outputs that a study asks for and that have files in it, by the job that makes them.
-
-    Parameters
-    ----------
-    study : Study
-
-    Returns
-    -------
-    dict of str to list of Output
-    """
+    """Outputs that a study asks for and that have files in it, by the job that makes them."""
     found: dict[str, list[Output]] = {}
     for one in () if study.part else outputs().values():  # figures and tables are of whole studies
         if one.name in study.outputs and output_files(one, study):
@@ -86,18 +71,7 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
 
 
 def output_files(output: "Output", study: "Study") -> list[str]:
-    """Files of an output.
-
-    Parameters
-    ----------
-    output : Output
-    study : Study
-
-    Returns
-    -------
-    list of str
-        From the study's folder on.
-    """
+    """Files of an output."""
     figures = [f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS]
     return figures + [f"{output.into}/{name}" for name in table_files(output, study)]
 
@@ -109,39 +83,13 @@ def linked(study: "Study") -> list[str]:
 
 
 def untold(folder: Path, chosen: Mapping[str, bool] | None = None) -> list[str]:
-    """Attributes that the dataset of a study leaves empty.
-
-    Parameters
-    ----------
-    folder : Path
-        Where its results are.
-    chosen : dict of str to bool, optional
-        By the options of a run, see `BLANKED`; what is not chosen is as in the dataset that is there.
-
-    Returns
-    -------
-    list of str
-    """
+    """Attributes that the dataset of a study leaves empty."""
     before = (checked_json.read(folder / RECORDS / f"{COLLECT}.json", products=dict) or {}).get("untold", [])
     return [name for option, name in BLANKED.items() if (chosen or {}).get(option, name in before)]
 
 
 def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -> dict[str, Job]:
-    """All jobs of a study.
-
-    Parameters
-    ----------
-    study : Study
-    plan : Plan
-        Of its stages.
-    chosen : dict of str to bool, optional
-        As of `untold`.
-
-    Returns
-    -------
-    dict of str to Job
-        By name, in an order in which each comes after those that it waits for.
-    """
+    """All jobs of a study."""
     folder = plan.folder
     found = [Job(one.name, one.digest, one.products, plan.record(one.name)) for one in plan.jobs.values()]
     collected = hash_of(_collect_digest(study, plan), untold(folder, chosen))
@@ -221,21 +169,7 @@ def _browse_digest(study: "Study") -> str:
 
 
 def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
-    """The job that sets the paper.
-
-    Parameters
-    ----------
-    source : Path
-        Folder of its source.
-    datasets : iterable of Path
-        That it reads; those that are made again in the same run come before it anyway.
-    folder : Path
-        Where the paper goes.
-
-    Returns
-    -------
-    Job
-    """
+    """The job that sets the paper."""
     texts = {path.name: records.checksum(path) for path in sorted(source.iterdir()) if path.is_file()}
     examples = sorted((source.resolve().parents[1] / "examples").glob("*.py"))
     texts |= {f"examples/{path.name}": records.checksum(path) for path in examples}
@@ -246,21 +180,7 @@ def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
 
 
 def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
-    """Why a job is to run, whatever becomes of those before it.
-
-    Parameters
-    ----------
-    job : Job
-    found : dict of str to Job
-        All jobs of its study.
-    wholly : bool, optional
-        Whether to compare the checksum of all that it made, not only of files whose size or time is another.
-
-    Returns
-    -------
-    str
-        Empty where it has done what is asked for, and what it made is there as it was.
-    """
+    """Why a job is to run, whatever becomes of those before it."""
     why = records.fault(job.record, job.digest, job.products, wholly)
     if not why and job.reads and not _is_up_to_date(job, found[job.reads]):
         return f"{found[job.reads].products[0]} is another one"
@@ -281,11 +201,5 @@ def _is_up_to_date(job: Job, before: Job) -> bool:
 
 
 def is_damage(why: str) -> bool:
-    """Whether a job is to run since a file is not as it was made: a user should know.
-
-    Parameters
-    ----------
-    why : str
-        As of `fault`.
-    """
+    """Whether a job is to run since a file is not as it was made: a user should know."""
     return why.endswith((records.DAMAGED, records.MISSING))

@@ -48,10 +48,6 @@ def main(tasks: str, done: str, digest: str) -> None:
     tasks : str
         The note: ``digest``, ``limits``, ``module`` (of the package, with functions ``run(content, spent)`` and
         ``lose(content, key, why, limits)``), ``content`` for these and ``products``, files that it makes.
-    done : str
-        Record to write.
-    digest : str
-        Of what is to do.
     """
     note = checked_json.read(tasks)
     if note is None or note["digest"] != digest:
@@ -94,20 +90,7 @@ def _do(note: dict[str, Any], done: str | Path, spent: Spent) -> None:
 
 
 def mended(function: Callable[[], Made], folder: Path) -> Made:
-    """Call a function; stored files that it finds damaged are made again.
-
-    Parameters
-    ----------
-    function : callable
-        May be called more than once.
-    folder : Path
-        Of the study.
-
-    Returns
-    -------
-    object
-        What it returns.
-    """
+    """Call a function; stored files that it finds damaged are made again."""
     again: Counter[Path] = Counter()
     while True:
         try:

@@ -39,12 +39,7 @@ OLD = b"\x89HDF"
 
 
 def _checked(path: str | Path) -> None:
-    """Compare a file with its checksum.
-
-    Raises
-    ------
-    DamagedError
-    """
+    """Compare a file with its checksum."""
     try:
         content = Path(path).read_bytes()
     except OSError as error:
@@ -61,18 +56,7 @@ def _user_block(image: bytes) -> bytes:
 
 
 def stored(path: str | Path, limits: str | None = None) -> set[str]:
-    """Keys of the results in a file; a damaged one is set aside and holds none.
-
-    Parameters
-    ----------
-    path : str or Path
-    limits : str, optional
-        Limits that tasks have now: a result that was lost to others is not stored.
-
-    Returns
-    -------
-    set of str
-    """
+    """Keys of the results in a file; a damaged one is set aside and holds none."""
     if not Path(path).exists():
         return set()
     try:
@@ -100,26 +84,7 @@ def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
-    """Read results.
-
-    Parameters
-    ----------
-    path : str or Path
-    names : iterable of str
-        Keys of the results to read.
-    fields : sequence of str, optional
-        Arrays to read besides scalars.
-
-    Returns
-    -------
-    dict of str to dict
-        Results by key: scalars, texts and the arrays asked for.
-
-    Raises
-    ------
-    DamagedError
-        If the file is not there, is not what was written or lacks one of the results.
-    """
+    """Read results."""
     _checked(path)
     with h5py.File(path) as file:
         scalars = _scalars(file)
@@ -135,22 +100,7 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
 
 
 def contents(path: str | Path) -> dict[str, dict[str, Any]]:
-    """All results in a file, as `add` takes them: scalars, texts and all arrays.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    dict of str to dict
-        Results by key; those that were lost to limits say so.
-
-    Raises
-    ------
-    DamagedError
-        If the file is not there or is not what was written.
-    """
+    """All results in a file, as `add` takes them: scalars, texts and all arrays."""
     _checked(path)
     with h5py.File(path) as file:
         found = _scalars(file)
@@ -160,47 +110,14 @@ def contents(path: str | Path) -> dict[str, dict[str, Any]]:
 
 
 def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[str, Any]:
-    """Read a result that has a file to itself, named by its key.
-
-    Parameters
-    ----------
-    folder : str or Path
-    key : str
-    fields : sequence of str, optional
-        Arrays to read besides scalars.
-
-    Returns
-    -------
-    dict
-        Scalars, texts and the arrays asked for.
-
-    Raises
-    ------
-    DamagedError
-        As `read`.
-    """
+    """Read a result that has a file to itself, named by its key."""
     return read(Path(folder) / f"{key}.h5", [key], fields)[key]
 
 
 def missing(
     folder: str | Path, tasks: Iterable[Mapping[str, Any]], limits: str | None = None
 ) -> Iterator[tuple[Path, Mapping[str, Any]]]:
-    """Tasks whose result, a file each, named by the task's key, is not stored yet.
-
-    Parameters
-    ----------
-    folder : str or Path
-    tasks : iterable of dict
-        Each with its ``key``.
-    limits : str, optional
-        As of `stored`.
-
-    Yields
-    ------
-    path : Path
-        Where the result belongs.
-    task : dict
-    """
+    """Tasks whose result, a file each, named by the task's key, is not stored yet."""
     for task in tasks:
         path = Path(folder) / f"{task['key']}.h5"
         if task["key"] not in stored(path, limits):
@@ -212,12 +129,7 @@ KEPT_BACK = 5.0
 
 
 class Keeper:
-    """Context that adds results to a file now and then, and at its end: what is computed is not lost to what comes.
-
-    Parameters
-    ----------
-    path : str or Path
-    """
+    """Context that adds results to a file now and then, and at its end: what is computed is not lost to what comes."""
 
     def __init__(self, path: str | Path) -> None:
         self.path, self.results, self.since = path, dict[str, Mapping[str, Any]](), time.perf_counter()
@@ -239,29 +151,12 @@ class Keeper:
 
 
 def lose(folder: str | Path, key: str, hole: Mapping[str, Any], limits: str) -> None:
-    """Store that a task, whose result has a file to itself, went beyond its limits.
-
-    Parameters
-    ----------
-    folder : str or Path
-    key : str
-        Of the task.
-    hole : dict
-        Its result.
-    limits : str
-        In words; where they change, the task is not stored any more.
-    """
+    """Store that a task, whose result has a file to itself, went beyond its limits."""
     add(Path(folder) / f"{key}.h5", {key: {**hole, LIMITS: limits}})
 
 
 def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     """Add results to a file, which changes whole or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-    results : dict of str to dict
-        Results by key; arrays become datasets, all else one JSON text.
 
     Examples
     --------

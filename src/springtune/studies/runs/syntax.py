@@ -31,21 +31,6 @@ class Source(NamedTuple):
 def read(text: str | bytes, package: str = "") -> Source:
     r"""Read a text.
 
-    Parameters
-    ----------
-    text : str or bytes
-    package : str, optional
-        Package whose attributes are imports, too, where it is imported as a whole.
-
-    Returns
-    -------
-    Source
-
-    Raises
-    ------
-    SyntaxError
-        If it is not Python's.
-
     Examples
     --------
     >>> read("def f():\n    return 1").digest == read("def f(): return 1  # one").digest

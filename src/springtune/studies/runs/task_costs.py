@@ -21,16 +21,6 @@ LOST = "beyond limits"
 class Spent:
     """What the tasks of a job cost, for the record that says it is done.
 
-    Parameters
-    ----------
-    watch : Watch, optional
-        Keeps each task within its limits; there are none without.
-
-    Attributes
-    ----------
-    broken : list of Exception
-        What was raised by a program that is broken.
-
     Examples
     --------
     >>> spent = Spent()
@@ -52,22 +42,7 @@ class Spent:
         return self.watch.words if self.watch else ""
 
     def attempt(self, key: str, function: Callable[[], Any], hole: Callable[[str], dict[str, Any]]) -> Any:
-        """Result of a task.
-
-        Parameters
-        ----------
-        key : str
-            Of the task: one that is beyond its limits is lost under this name.
-        function : callable
-            Computes the result.
-        hole : callable
-            Result of a task that fails for reasons of its own, from these.
-
-        Returns
-        -------
-        object
-            None where the program is broken: nothing is to be stored, and the job ends with an error.
-        """
+        """Result of a task."""
         from .failures import own_reason  # here: what counts alone needs no definitions
 
         try:
@@ -89,31 +64,14 @@ class Spent:
             return hole(why)
 
     def add(self, kind: str, units: float, seconds: float, count: int = 1) -> None:
-        """Count tasks.
-
-        Parameters
-        ----------
-        kind : str
-        units : float
-            Its particles, or what else its cost grows with.
-        seconds : float
-        count : int, optional
-            Tasks of which these are the sums.
-        """
+        """Count tasks."""
         sums = self.sums[kind]
         sums[0] += count
         sums[1] += units
         sums[2] += seconds
 
     def summary(self) -> dict[str, Any]:
-        """What to write to the record.
-
-        Returns
-        -------
-        dict
-            ``start_up``, seconds spent on imports; ``work``, by kind: number of tasks, sums of their units and seconds;
-            ``memory``, the most that this process, or one that it called, had [byte].
-        """
+        """What to write to the record."""
         lost = self.watch.lost if self.watch else 0
         work = dict(self.sums) | ({LOST: [lost, 0.0, 0.0]} if lost else {})
         return {"start_up": self.start_up, "work": work, "memory": most_memory()}

@@ -30,20 +30,7 @@ PARENT_DEATH = 1
 
 
 class Watch:
-    """Limits of the tasks of a job, and which task is under way.
-
-    Parameters
-    ----------
-    limits : dict
-        ``seconds`` and ``memory`` [byte] of a task.
-
-    Attributes
-    ----------
-    words : str
-        The limits, for a reader.
-    lost : int
-        Tasks that went beyond them so far.
-    """
+    """Limits of the tasks of a job, and which task is under way."""
 
     def __init__(self, limits: Mapping[str, float]) -> None:
         self.seconds, self.memory = limits["seconds"], limits["memory"]
@@ -53,12 +40,7 @@ class Watch:
 
     @contextmanager
     def over(self, key: str) -> Iterator[None]:
-        """Context of a task.
-
-        Parameters
-        ----------
-        key : str
-        """
+        """Context of a task."""
         self._write(key)
         before = resource.getrlimit(resource.RLIMIT_AS)
         used = virtual_memory()
@@ -89,21 +71,7 @@ def go_with_parent() -> None:
 
 
 def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str], None]) -> None:
-    """Call a function in a child of this process, again after each task that ends the child.
-
-    Parameters
-    ----------
-    function : callable
-        Does the tasks that are left.
-    watch : Watch
-    lose : callable
-        Of a task's key and why it is lost: takes it from those that are left.
-
-    Raises
-    ------
-    SystemExit
-        If the function raises, or the child was stopped.
-    """
+    """Call a function in a child of this process, again after each task that ends the child."""
     while True:
         child = _begin(function)
         with _passed_on(child):

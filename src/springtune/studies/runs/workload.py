@@ -26,16 +26,10 @@ class Load:
 
     Attributes
     ----------
-    part : str
-        What it is part of, for a reader.
     tasks : int
         Its scenes, references or what else its stage works on.
     seconds : float
         What it is expected to take if nothing of it is stored.
-    threads : int
-        Cores that it takes.
-    products : list of Path
-        Files that it makes one by one.
     """
 
     part: str
@@ -47,15 +41,6 @@ class Load:
 
 def keys_of(content: Any) -> list[str]:
     """Keys of the results that a task file asks for, one a task.
-
-    Parameters
-    ----------
-    content : object
-        Of the file.
-
-    Returns
-    -------
-    list of str
 
     Examples
     --------
@@ -71,17 +56,6 @@ def keys_of(content: Any) -> list[str]:
 
 def results_of(content: Any, name: str = "") -> set[tuple[str, str]]:
     """Results that a task file asks for: the name of what each is stored for, such as its mesh, and its key.
-
-    Parameters
-    ----------
-    content : object
-        Of the file.
-    name : str, optional
-        Of what it is part of.
-
-    Returns
-    -------
-    set of tuple of str
 
     Examples
     --------
@@ -100,38 +74,14 @@ def results_of(content: Any, name: str = "") -> set[tuple[str, str]]:
 
 
 def computed(done: Path) -> int | None:
-    """Number of tasks that a job computed, those left out whose results were there; None where it does not say.
-
-    Parameters
-    ----------
-    done : Path
-        Its record, with a `springtune.studies.runs.task_costs.Spent.summary`.
-
-    Returns
-    -------
-    int or None
-    """
+    """Number of tasks that a job computed, those left out whose results were there; None where it does not say."""
     work = (checked_json.read(done) or {}).get("work")
     # What definitions cost is told beside the task that they are part of.
     return None if work is None else sum(row[0] for name, row in work.items() if name not in DEFINITIONS)
 
 
 def loads(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Load]:
-    """What each job of a run has to do.
-
-    Parameters
-    ----------
-    study : Study
-    plan : Plan
-        Of its stages.
-    jobs : iterable of tuple
-        Of each job its number, the name of its rule, its threads and its outputs.
-
-    Returns
-    -------
-    dict of int to Load
-        By number, in the order of stages; without jobs that only name targets.
-    """
+    """What each job of a run has to do."""
     folder = plan.folder
     of_bundles = _of_bundles(study, plan)
     order = {stem: place for place, stem in enumerate(of_bundles)}
@@ -176,36 +126,12 @@ def _seconds_presented(folder: Path, rule: str, files: int) -> float:
 
 
 def presented_needs(folder: Path, rule: str, files: int) -> bundles.Needs:
-    """What a job asks a cluster for that makes no results of scenes.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the study.
-    rule : str
-        Its name.
-    files : int
-        Number of files that it makes.
-
-    Returns
-    -------
-    springtune.studies.runs.bundles.Needs
-    """
+    """What a job asks a cluster for that makes no results of scenes."""
     return bundles.Needs(_seconds_presented(folder, rule, files))
 
 
 def told(found: dict[int, Load], cores: int) -> str:
-    """What a run has to do, in a line.
-
-    Parameters
-    ----------
-    found : dict of int to Load
-    cores : int
-
-    Returns
-    -------
-    str
-    """
+    """What a run has to do, in a line."""
     seconds = sum(load.seconds * min(load.threads, cores) for load in found.values()) / cores
     jobs = f"{len(found)} job{'' if len(found) == 1 else 's'}"
     return f"{jobs}, about {clock(seconds)} on {cores} core{'' if cores == 1 else 's'} if nothing is stored yet"
@@ -213,14 +139,6 @@ def told(found: dict[int, Load], cores: int) -> str:
 
 def clock(seconds: float) -> str:
     """Seconds as people read them.
-
-    Parameters
-    ----------
-    seconds : float
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -32,17 +32,7 @@ PART_COLOURS = ("#0b3c5d", "#2879b9", "#7fb8da", "#c8ddf0", "#f2f2f2")
 
 
 def named(data):
-    """Approaches with names: of those that have an error `SHOWN`, and as many others as fit, the most accurate first.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        Group ``/benchmark``, or one scene of it.
-
-    Returns
-    -------
-    list of str
-    """
+    """Approaches to name: those with an error in `SHOWN`, then as many others as fit, the most accurate first."""
     dimensions = [name for name in data.error.dims if name != "approach"]
     smallest = np.abs(data.error).min(dimensions)
     there = [str(name) for name in data.approach.values[np.argsort(smallest.values)] if np.isfinite(smallest.sel(
@@ -64,17 +54,7 @@ def family(approach):
 
 
 def benchmark(tree):
-    """Figures of the benchmark: errors over seconds of each scene; rates; costs, of the first scene; a whole curve.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """Figures of the benchmark: errors over seconds of each scene; rates; costs, of the first scene; a whole curve."""
     others = {
         "benchmark_rates": plot_benchmark_rates,
         "benchmark_costs": plot_benchmark_costs,

@@ -89,23 +89,12 @@ class Case:
 
     Attributes
     ----------
-    name : str
-    beam : Beam
-    material : Material
-        With a density.
-    load : str
-        Key of `springtune.problem.loads.LOADS`.
     force : float
         Force on the loaded side, tension positive [N].
-    approaches : tuple of str
     mesh_sizes : tuple of float
         Lengths of an edge [m], ascending.
     finest : tuple of float
         The shortest edge of each approach [m].
-    most_seconds : float
-        Seconds of the processor that a run may take.
-    second_beam : Beam or None
-        Beam on which errors are checked.
     """
 
     name: str

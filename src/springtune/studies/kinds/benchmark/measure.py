@@ -93,15 +93,7 @@ class Clock:
 
 
 class Alarm:
-    """Limits of what a process does: seconds of the processor for each run, and what is left to the task of all.
-
-    Parameters
-    ----------
-    most : float
-        Seconds of a run.
-    left : float
-        Of the task; none where it is 0.
-    """
+    """Limits of what a process does: seconds of the processor for each run, and what is left to the task of all."""
 
     def __init__(self, most, left):
         self.most, self.left = most, left
@@ -123,22 +115,10 @@ def run(scene, approaches, sizes, finest, most_seconds, second_beam=None):
 
     Parameters
     ----------
-    scene : LoadedBeam
-    approaches : sequence of str
-        Names as `springtune.studies.kinds.benchmark.names.approach_names` gives them.
     sizes : sequence of float
         Lengths of an edge [m], ascending.
     finest : sequence of float
         The shortest one that is asked of each approach [m].
-    most_seconds : float
-        Seconds of the processor that one run may take.
-    second_beam : Beam, optional
-        Another beam, on which each case that was solved is solved once more, for its error alone.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Variables of `springtune.studies.kinds.benchmark.variables.BENCHMARK` over approach and mesh size.
     """
     begin = time.perf_counter()
     reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
@@ -227,20 +207,7 @@ def _case(scene, approach, size, meshes, most_seconds, once=False):
 
 
 def in_process(function, most_seconds, *arguments):
-    """What a function finds in a process of its own, or what became of it: `status`, `message`, and whether `beyond`.
-
-    Parameters
-    ----------
-    function : callable
-        Of an `Alarm`, which it sets for each of its runs, and the arguments.
-    most_seconds : float
-        Of a run.
-    *arguments
-
-    Returns
-    -------
-    dict
-    """
+    """Result of a function in a process of its own, or `status`, `message` and whether it went `beyond` its limits."""
     context = multiprocessing.get_context("fork")
     receive, send = context.Pipe(duplex=False)
     left = signal.getitimer(signal.ITIMER_PROF)[0]  # of the task's limit, which a new process does not have
@@ -401,11 +368,6 @@ def explicit(scene, sizes, most_seconds, updates=UPDATES):
 
     A step reads each spring's ends, rest vector, length and stiffness, and of each particle four vectors, two of which
     it writes: from a cache, where an earlier step has left it there.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Over mesh size, number of threads and precision; and what became of them.
     """
     shape = len(sizes), len(THREAD_COUNTS), len(PRECISIONS)
     arrays = {name: np.full(shape, np.nan) for name in ("explicit_steps", "spring_updates", "explicit_bandwidth")}

@@ -30,17 +30,7 @@ def _parameters(case):
 
 
 def cases(study):
-    """Scenes of a study's benchmark, with their keys.
-
-    Parameters
-    ----------
-    study : Study
-
-    Returns
-    -------
-    list of tuple
-        A `springtune.studies.kinds.benchmark.kind.Case`, its key, and whether it is the first one.
-    """
+    """Scenes of a study's benchmark, with their keys."""
     return [(case, case_key(case, number == 0), number == 0) for number, case in enumerate(study.parts["benchmark"])]
 
 

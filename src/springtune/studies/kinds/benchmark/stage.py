@@ -17,16 +17,7 @@ CURVE_SIZE = 1e-3
 
 
 def run(tasks, spent):
-    """Time the scenes that are not stored yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``cases``, each with ``key``, ``curves`` and what
-        `springtune.studies.kinds.benchmark.measure.run` takes.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Time the scenes that are not stored yet."""
     for path, task in store.missing(tasks["folder"], tasks["cases"], spent.limits):
         begin = time.perf_counter()
         result = spent.attempt(task["key"], partial(_case, task), partial(_hole, task))
@@ -36,15 +27,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a scene is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the scene; what became of it; the limits.
-    """
+    """Store that a scene is beyond its limits."""
     task = next(one for one in tasks["cases"] if one["key"] == key)
     store.lose(tasks["folder"], key, _hole(task, why), limits)
 

@@ -18,19 +18,7 @@ TARGETS = (0.01, 0.001, 0.0001)
 
 
 def write(tree, folder):
-    """Write the page in Markdown.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        With the group ``/benchmark``.
-    folder : str or Path
-
-    Returns
-    -------
-    list of str
-        Names of the files written.
-    """
+    """Write the page in Markdown."""
     write_text(Path(folder) / PAGE, page(tree))
     return [PAGE]
 
@@ -198,17 +186,6 @@ def comparison(old: xr.Dataset, new: xr.Dataset) -> tuple[list[str], int]:
 
     A machine that is slower on the whole is no regression: ratios are over their median. Flagged is what lies outside
     of `NOISE` and of three times the spread that the runs showed.
-
-    Parameters
-    ----------
-    old, new : xarray.Dataset
-        Groups ``/benchmark``.
-
-    Returns
-    -------
-    lines : list of str
-    flagged : int
-        Number of approaches that became slower.
     """
     both = {name: [label for label in old[name].values if label in new[name].values]
             for name in ("scene", "approach", "mesh_size")}  # fmt: skip

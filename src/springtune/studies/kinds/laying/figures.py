@@ -10,17 +10,7 @@ from ...output.selection import cells, choose, group, labels_of
 
 
 def laying(tree):
-    """The figure of laid strips.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """The figure of laid strips."""
     yield "laying", plot_laying, {}
 
 

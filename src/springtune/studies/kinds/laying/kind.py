@@ -74,16 +74,8 @@ class LayingScene:
 
     Attributes
     ----------
-    strip : Strip
-    trapezoid : Trapezoid
-    material, support : Material
-        Of the strip and of the trapezoid.
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
     mesh_size : float
         Length of an edge [m].
-    loading : str
-        One of `LOADINGS`.
     pressure : float
         Pressure on the strip, or its weight over its upper face [Pa].
     friction : float
@@ -107,7 +99,6 @@ class Laying:
 
     Attributes
     ----------
-    strips : tuple of LayingScene
     references : tuple of LayingScene
         Strips of finite elements that the others are compared with, on several meshes a loading and friction.
     """

@@ -33,8 +33,6 @@ class Laid:
 
     Attributes
     ----------
-    area : float
-        Area between the strip and the floor [m2].
     elongation : float
         Elongation of the strip's lower fibre [1].
     penetration : float
@@ -43,13 +41,6 @@ class Laid:
         Vertical contact force on the floor and rigid bodies less the load, over the load [1]; NaN for drawn ends.
     load_share : float
         Share of the load that was reached [1].
-    message : str
-        Why it is not the whole one; empty otherwise.
-    iterations : int
-        Newton steps.
-    seconds : float
-    skipped : str
-        What the scene did not need.
     outline : ndarray of float, shape (n, 2)
         Where the outline of the strip is, in order [m].
     """
@@ -72,28 +63,14 @@ def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="str
 
     Parameters
     ----------
-    strip : Strip
-    trapezoid : Trapezoid
-    material, support : Material
-        Of the strip and of the trapezoid.
-    definition : str
-        Key of `springtune.springs.DEFINITIONS` that derives a stiffness; of strip and trapezoid.
     size : float
         Mesh size [m].
-    mesh_type : str
-        Of the strip and the trapezoid, with an even number of cells along the strip.
-    loading : str
-        One of `springtune.studies.kinds.laying.kind.LOADINGS`.
     pressure : float
         Pressure on the upper face, or weight over it [Pa].
     friction : float
         Coulomb's coefficient [1].
     rigid : float
         Ratio of Young's moduli from which the trapezoid is rigid [1].
-
-    Returns
-    -------
-    Laid
     """
     begin = time.perf_counter()
     body, mesh = _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pressure)

@@ -18,13 +18,6 @@ def run(tasks, spent):
     """Lay the strips that are not stored yet.
 
     A strip that does not lie is stored with its status and message; it never stops the others.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``strips``, each with ``key`` and what `springtune.studies.kinds.laying.lay.lay` takes.
-    spent : Spent
-        What tasks cost is added to it.
     """
     for path, task in store.missing(tasks["folder"], tasks["strips"], spent.limits):
         begin = time.perf_counter()
@@ -36,15 +29,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a strip is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the strip; what became of it; the limits.
-    """
+    """Store that a strip is beyond its limits."""
     store.lose(tasks["folder"], key, _hole(why), limits)
 
 

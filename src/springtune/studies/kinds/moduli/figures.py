@@ -21,17 +21,7 @@ BASELINE = "uniform"
 
 
 def definitions(tree):
-    """Figures that compare definitions: moduli, errors against mesh size by load, and heat maps by mesh type.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """Figures that compare definitions: moduli, errors against mesh size by load, and heat maps by mesh type."""
     root = unswept(group(tree, "/"))
     for stem, selection in figures(root["load"].values.tolist(), root.mesh_type.values.tolist()).items():
         if "load" in selection:

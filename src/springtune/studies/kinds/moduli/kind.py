@@ -33,9 +33,6 @@ class Measurement:
 
     Attributes
     ----------
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    mesh_type : str
     mesh_size : float
         Length of an edge [m].
     poisson_ratio : float
@@ -56,7 +53,6 @@ class Measurements:
     ----------
     patch : Beam
         Box on whose meshes moduli are measured; its thickness does not matter.
-    measurements : tuple of Measurement
     """
 
     patch: Beam

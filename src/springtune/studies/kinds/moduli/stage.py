@@ -15,16 +15,7 @@ from ..scenes.stored_mesh import REFUSED
 
 
 def run(tasks, spent):
-    """Measure the moduli that are not stored yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``patches``, each with ``name``, ``mesh`` (what the stage `mesh` takes) and
-        ``measurements``, each of these with ``key, definition, poisson_ratio``.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Measure the moduli that are not stored yet."""
     for patch in tasks["patches"]:
         path = Path(tasks["folder"]) / f"{patch['name']}.h5"
         present = store.stored(path, spent.limits)
@@ -53,15 +44,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, name, why, limits):
-    """Store that a measurement, or the mesh of a patch, is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    name, why, limits : str
-        Key of the measurement or name of the patch; what became of it; the limits.
-    """
+    """Store that a measurement, or the mesh of a patch, is beyond its limits."""
     for patch in tasks["patches"]:
         lost = [one["key"] for one in patch["measurements"] if name in (one["key"], patch["name"])]
         store.add(Path(tasks["folder"]) / f"{patch['name']}.h5", dict.fromkeys(lost, _hole(why) | {"limits": limits}))

@@ -20,19 +20,7 @@ MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulu
 
 
 def write(tree, folder):
-    """Write two CSV files and a page in Markdown.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        With the group ``/moduli``.
-    folder : str or Path
-
-    Returns
-    -------
-    list of str
-        Names of the files written.
-    """
+    """Write two CSV files and a page in Markdown."""
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
     scene = (*SCENE, *(str(name) for name in root.status.dims if name not in SCENE))  # what is swept, too
     texts = (_csv(root, scene, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))

@@ -17,18 +17,12 @@ class Rule:
 
     Attributes
     ----------
-    first, last : float
-        Ends of the values.
-    points : int
-        Values of the first batch.
     logarithmic : bool
         Whether values are spaced by their logarithms.
     tolerance : float
         Size of the error that matters [1].
     resolution : float
         Widest interval that is not halved any more, over that between the ends [1].
-    most : int
-        Most values.
 
     Examples
     --------
@@ -46,17 +40,7 @@ class Rule:
     most: int
 
     def value(self, place: float) -> float:
-        """Value at a place from 0 to 1.
-
-        Parameters
-        ----------
-        place : float
-
-        Returns
-        -------
-        float
-            To twelve digits; the ends are exact.
-        """
+        """Value at a place from 0 to 1."""
         if place in (0, 1):
             return self.last if place else self.first
         if self.logarithmic:
@@ -79,8 +63,6 @@ class Crossing:
         The error that is crossed [1].
     value : float
         By a straight line between the two values that enclose it.
-    width : float
-        Distance of these.
     change : float
         By how much the error changes between them, with its sign [1]: at a jump it stays as large as it is.
     """
@@ -92,16 +74,7 @@ class Crossing:
 
 
 def value_key(value: float) -> str:
-    """Key of a value's result in the file of its refinement.
-
-    Parameters
-    ----------
-    value : float
-
-    Returns
-    -------
-    str
-    """
+    """Key of a value's result in the file of its refinement."""
     return f"{value:.12g}"
 
 
@@ -110,17 +83,8 @@ def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple
 
     Parameters
     ----------
-    rule : Rule
     solve : callable
         Errors [1] at values, which are all of a batch; NaN where there is none.
-
-    Returns
-    -------
-    places : list of float
-        From 0 to 1, in the order of their addition: those of a smaller ``rule.most`` come first.
-    batches : list of int
-        Batch that each came in, from 0.
-    errors : list of float
 
     Examples
     --------
@@ -159,17 +123,6 @@ def _crosses(one: float, other: float, level: float) -> bool:
 
 def crossings(rule: Rule, places: Sequence[float], errors: Sequence[float]) -> list[Crossing]:
     """Where the error is zero, or the tolerance, by the last values.
-
-    Parameters
-    ----------
-    rule : Rule
-    places, errors : sequence of float
-        As `refine` gives them.
-
-    Returns
-    -------
-    list of Crossing
-        By their values, ascending.
 
     Examples
     --------

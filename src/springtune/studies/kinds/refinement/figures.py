@@ -12,17 +12,7 @@ HOLLOW = "hollow: unstable, or beyond the linear reference"
 
 
 def refinement(tree):
-    """The figure of refinements.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """The figure of refinements."""
     yield "refinement", plot_refinement, {}
 
 

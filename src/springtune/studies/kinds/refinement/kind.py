@@ -109,20 +109,12 @@ class Refinement:
 
     Attributes
     ----------
-    name : str
-    beam : Beam
-    material : Material
-    load : str
-        Key of `springtune.problem.loads.LOADS`.
     force : float
         With its sign [N]; that of the load where it is the parameter, and its size elsewhere.
-    mesh_type : str
     mesh_size : float
         Length of an edge [m]; zero where it is the parameter.
-    definition, kinematics : str
     parameter : str
         Key of `springtune.studies.kinds.refinement.names.VARIED`.
-    rule : Rule
     """
 
     name: str

@@ -11,17 +11,10 @@ class Parameter:
 
     Attributes
     ----------
-    meaning : str
-    unit : str
-        In SI.
     kind : str
         Of `springtune.units.QUANTITY_KINDS`; empty for numbers.
     scales : tuple of (str, float)
         Units of figures and their sizes in SI, the largest first; none for numbers.
-    most : float
-        Largest value.
-    zero : bool
-        Whether it may be zero.
     """
 
     meaning: str
@@ -34,15 +27,6 @@ class Parameter:
     def scale(self, largest: float) -> tuple[str, float]:
         """Unit in which values are shown, and its size in SI.
 
-        Parameters
-        ----------
-        largest : float
-            Of the values.
-
-        Returns
-        -------
-        tuple of str and float
-
         Examples
         --------
         >>> VARIED["force"].scale(20.0), VARIED["force"].scale(2e4)
@@ -51,22 +35,7 @@ class Parameter:
         return next((one for one in self.scales if largest >= one[1]), self.scales[-1])
 
     def read(self, text: str) -> float:
-        """Value of a text.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        float
-            In SI units.
-
-        Raises
-        ------
-        ValueError
-            If it is none; the message says why and what to give.
-        """
+        """Value of a text."""
         if self.kind:
             try:
                 value = parse(text, self.kind)

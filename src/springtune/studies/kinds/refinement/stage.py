@@ -31,17 +31,7 @@ SEPARATOR = "/"
 
 
 def run(tasks, spent):
-    """Solve the values that refinements ask for and that are not stored yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``refinements``, each with ``key`` of its file, ``beam, material, kind, follower, force,
-        mesh_type, mesh_size, definition, kinematics, parameter`` and ``rules``, see
-        `springtune.studies.kinds.refinement.batches.Rule`.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Solve the values that refinements ask for and that are not stored yet."""
     for task in tasks["refinements"]:
         path = Path(tasks["folder"]) / f"{task['key']}.h5"
         present = store.stored(path, spent.limits)
@@ -70,15 +60,7 @@ def _errors(task, solver, known, keeper, spent, values):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a value is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the value; what became of it; the limits.
-    """
+    """Store that a value is beyond its limits."""
     name, _, value = key.partition(SEPARATOR)
     store.add(Path(tasks["folder"]) / f"{name}.h5", {value: _hole(why) | {store.LIMITS: limits}})
 

@@ -18,19 +18,7 @@ VALUE_COLUMNS = ("displacement", "reference_displacement", "reference_error_esti
 
 
 def write(tree, folder):
-    """Write two CSV files.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        With the group ``/refinement``.
-    folder : str or Path
-
-    Returns
-    -------
-    list of str
-        Names of the files written.
-    """
+    """Write two CSV files."""
     data = tree["refinement"].to_dataset()
     for name, rows in zip(REFINEMENT_TABLES, (_values(data), _crossings(data))):
         write_text(Path(folder) / name, csv_text(rows))

@@ -15,17 +15,7 @@ COORDINATES = (*(f"refined_{name}" for name in VARIED), "batch", "parameter")
 
 
 def refinement_group(parameters: Collection[str]) -> Group:
-    """The group of a study.
-
-    Parameters
-    ----------
-    parameters : collection of str
-        That are varied; each has a variable of its own, since their units differ.
-
-    Returns
-    -------
-    Group
-    """
+    """The group of a study."""
     values, found = {}, {}
     for name in (name for name in VARIED if name in parameters):
         known = VARIED[name]

@@ -73,17 +73,7 @@ def _stored(sample, folder):
 
 
 class _Scenes:
-    """Fills the group ``/samples``.
-
-    Parameters
-    ----------
-    sample : Sample
-    axes : dict
-        Labels of the dimensions.
-    drawn : dict of str to ndarray
-        Parameters of all rows.
-    data : xarray.Dataset
-    """
+    """Fills the group ``/samples``."""
 
     def __init__(self, sample, axes, drawn, data):
         self.sample, self.drawn = sample, drawn

@@ -15,17 +15,6 @@ from .names import FIRST_ROLES, SOBOL_INDICES, rows_each
 def points(design: str, size: int, dimensions: int, seed: int, first: int = 0, last: int | None = None) -> np.ndarray:
     """Points of the unit cube.
 
-    Parameters
-    ----------
-    design : str
-        One of `springtune.studies.kinds.samples.names.DESIGNS`.
-    size : int
-        How many: a power of two.
-    dimensions : int
-    seed : int
-    first, last : int, optional
-        First of them to return, and that after the last one.
-
     Returns
     -------
     ndarray of float, shape (last - first, dimensions)
@@ -72,17 +61,6 @@ def _latin_hypercube(size: int, dimensions: int, seed: int) -> np.ndarray:
 def quantile(distribution: Mapping[str, Any], shares: np.ndarray) -> np.ndarray:
     """Values of a distribution below which it has shares of its probability.
 
-    Parameters
-    ----------
-    distribution : dict
-        ``distribution`` (a name), ``low`` and ``high``, its ends, and ``mode`` or ``mean`` and ``deviation``.
-    shares : ndarray of float
-        From 0 to 1.
-
-    Returns
-    -------
-    ndarray of float
-
     Examples
     --------
     >>> spread = {"distribution": "log-uniform", "low": 1.0, "high": 100.0}
@@ -115,17 +93,6 @@ def varied(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def roles(design: str, names: list[str]) -> list[str]:
     """What each row of a base sample is.
 
-    Parameters
-    ----------
-    design : str
-    names : list of str
-        Parameters that vary.
-
-    Returns
-    -------
-    list of str
-        ``"A"``, ``"B"``, and for each parameter A with this one of B; a single text where rows stand alone.
-
     Examples
     --------
     >>> roles("sobol-indices", ["length", "force"])
@@ -138,16 +105,6 @@ def draw(
     design: str, seed: int, parameters: Mapping[str, Mapping[str, Any]], first: int, last: int
 ) -> dict[str, np.ndarray]:
     """Parameters of the scenes of some base samples.
-
-    Parameters
-    ----------
-    design : str
-        One of `springtune.studies.kinds.samples.names.DESIGNS`.
-    seed : int
-    parameters : dict of str to dict
-        Distributions by the parameter's name, see `quantile`.
-    first, last : int
-        First base sample, and that after the last one.
 
     Returns
     -------

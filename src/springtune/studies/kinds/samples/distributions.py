@@ -27,15 +27,7 @@ _NUMBERS = {
 
 
 class Distributed:
-    """Annotation of a parameter: a value, or a distribution that it is drawn from.
-
-    Parameters
-    ----------
-    name : str
-        Key of `springtune.studies.kinds.samples.names.PARAMETERS`.
-    example : str
-        A range, for messages.
-    """
+    """Annotation of a parameter: a value, or a distribution that it is drawn from."""
 
     def __init__(self, name: str, example: str) -> None:
         scalar = _NUMBERS.get(name) or quantity(PARAMETERS[name][0])

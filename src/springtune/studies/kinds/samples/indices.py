@@ -29,8 +29,6 @@ class Indices:
         First- and total-order indices [1].
     first_band, total_band : ndarray of float, shape (2, n_parameters)
         Ends of their bootstrap bands.
-    rows : int
-        Base samples that they are estimated from.
     """
 
     first: np.ndarray
@@ -49,8 +47,6 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
         Values at the rows A and B.
     at_ab : ndarray of float, shape (n_parameters, n)
         Values at A with each parameter of B in turn.
-    least : float, optional
-        Standard deviation up to which values count as one, in their unit.
 
     Returns
     -------
@@ -108,8 +104,6 @@ def main_effect(parameter: np.ndarray, values: np.ndarray, bins: int) -> tuple[n
     ----------
     parameter, values : ndarray of float, shape (n,)
         Of points that are independent of each other; NaN where there is no value.
-    bins : int
-        Parts of equally many points.
 
     Returns
     -------

@@ -13,17 +13,7 @@ from .designs import draw
 
 
 def run(tasks: dict[str, Any], spent: Spent) -> None:
-    """Build the interpolants that are not there yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder``; ``references``, each with ``key``, ``kind`` (of load, by name) and ``box`` (of aspect ratios and
-        Poisson's ratios); and ``sample`` where references may be solved one by one: ``design, seed, parameters,
-        first, last`` as `springtune.studies.kinds.samples.designs.draw` takes them.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Build the interpolants that are not there yet."""
     pairs = set()
     if tasks["sample"]:
         drawn = draw(**tasks["sample"])
@@ -41,16 +31,5 @@ def lose(tasks: dict[str, Any], key: str, why: str, limits: str) -> None:
 
 
 def problem_key(reference: str, aspect_ratio: float, nu: float) -> str:
-    """Key of a reference that is solved by itself, in the file of the interpolant that it lacks.
-
-    Parameters
-    ----------
-    reference : str
-        Key of the interpolant.
-    aspect_ratio, nu : float
-
-    Returns
-    -------
-    str
-    """
+    """Key of a reference that is solved by itself, in the file of the interpolant that it lacks."""
     return f"{reference} {float(aspect_ratio)!r} {float(nu)!r}"

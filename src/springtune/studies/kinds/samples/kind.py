@@ -124,11 +124,6 @@ class Sample:
 
     Attributes
     ----------
-    design, mesh_type, kinematics, failures : str
-    size, seed : int
-    loads, definitions : tuple of str
-        In the order of their dimensions.
-    best_stiffness : bool
     parameters : dict of str to dict
         Distributions in the order of `PARAMETERS`, see `springtune.studies.kinds.samples.designs.quantile`.
     blocks : tuple of tuple of int

@@ -57,17 +57,6 @@ PLAIN_ROWS = 512
 def rows_each(design: str, varied: int) -> int:
     """Rows of the sample for each base sample.
 
-    Parameters
-    ----------
-    design : str
-        One of `DESIGNS`.
-    varied : int
-        Number of parameters that vary.
-
-    Returns
-    -------
-    int
-
     Examples
     --------
     >>> rows_each("sobol-indices", 6), rows_each("sobol", 6)
@@ -78,17 +67,6 @@ def rows_each(design: str, varied: int) -> int:
 
 def blocks(design: str, size: int) -> list[tuple[int, int]]:
     """First base sample of each task, and that after its last: those of a size begin with those of half the size.
-
-    Parameters
-    ----------
-    design : str
-        One of `DESIGNS`.
-    size : int
-        Base samples: a power of two.
-
-    Returns
-    -------
-    list of tuple of int
 
     Examples
     --------

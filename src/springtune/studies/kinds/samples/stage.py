@@ -38,20 +38,7 @@ SCALES = 1e-7
 
 
 def run(tasks, spent, kept_back=store.KEPT_BACK):
-    """Solve the scenes of a bundle that are not stored yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder``, ``design, seed, parameters`` (see `springtune.studies.kinds.samples.designs.draw`), ``mesh_type,
-        kinematics``, ``meshed``, the key of what meshes depend on besides their box, ``results``: by key ``kind`` (of
-        load, by name), ``definition`` and for nonlinear kinematics ``sign`` and ``follower``; and ``blocks``, each with
-        ``key`` and ``first`` and ``last`` base sample.
-    spent : Spent
-        What tasks cost is added to it.
-    kept_back : float, optional
-        Seconds for which results are in memory alone: those are lost if a network goes beyond its limits.
-    """
+    """Solve the scenes of a bundle that are not stored yet."""
     waiting = []
     for block in tasks["blocks"]:
         path = Path(tasks["folder"]) / f"{block['key']}.h5"
@@ -69,35 +56,13 @@ def run(tasks, spent, kept_back=store.KEPT_BACK):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a network is beyond its limits: its block is solved again without it.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the network; what became of it; the limits.
-    """
+    """Store that a network is beyond its limits: its block is solved again without it."""
     name = key.partition(" ")[0]
     store.add(Path(tasks["folder"]) / f"{name}.h5", {f"{LOST_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
 
 
 class _Block:
-    """Rows of some base samples, and what is known of their scenes.
-
-    Parameters
-    ----------
-    tasks, block : dict
-        As in the tasks of `run`.
-    path : Path
-        File of its results.
-    missing : dict
-        Results that are not stored.
-    new : bool
-        Whether the parameters are not stored, either.
-    lost : dict of str to str
-        Networks that went beyond limits before, and what became of them.
-    """
+    """Rows of some base samples, and what is known of their scenes."""
 
     def __init__(self, tasks, block, path, missing, new, lost):
         self.key, self.path, self.missing, self.new, self.lost = block["key"], path, missing, new, lost

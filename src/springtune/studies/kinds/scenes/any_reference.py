@@ -8,21 +8,7 @@ from . import stored_interpolant, stored_reference
 
 
 def read(folder, reference, fields=()):
-    """Reference of a beam, material and kind of load.
-
-    Parameters
-    ----------
-    folder, fields
-        As of `springtune.studies.kinds.scenes.stored_reference.read`.
-    reference : dict
-        As there; where it is interpolated, with ``interpolant``, the key of that, and ``problem``, the aspect ratio and
-        Poisson's ratio.
-
-    Returns
-    -------
-    dict
-        As there. One that is interpolated has no arrays, and ``solves``, the number of solutions behind it.
-    """
+    """Reference of a beam, material and kind of load."""
     if "interpolant" not in reference:
         return stored_reference.read(folder, reference, fields)
     interpolant, results, seconds, why = stored_interpolant.read(folder, reference["interpolant"])

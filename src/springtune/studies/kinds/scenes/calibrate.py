@@ -8,16 +8,7 @@ from ...runs import checked_json, store
 
 
 def run(tasks, spent):
-    """Calibrate from the stored curves.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``curves`` (folder) and ``groups``, each with ``name`` and ``members``, and each of these with
-        ``mesh, curve`` (its key)``, load, force``.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Calibrate from the stored curves."""
     results = {}
     for group in tasks["groups"]:
         try:

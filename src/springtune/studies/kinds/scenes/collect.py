@@ -54,18 +54,7 @@ FACE_VARIABLES = {
 
 
 def groups(study, folder):
-    """Groups of a dataset.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Where the study's results are.
-
-    Returns
-    -------
-    dict of str to xarray.Dataset
-    """
+    """Groups of a dataset."""
     axes = study.axes | {"stiffness_ratio": study.stiffness_ratios}
     root = Filler(swept(ROOT, study).empty(axes))
     _meshes(study, folder, root)

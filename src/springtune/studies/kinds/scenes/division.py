@@ -19,18 +19,7 @@ Item = TypeVar("Item")
 
 
 def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, float]":
-    """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's.
-
-    Parameters
-    ----------
-    study : Study
-    costs : Costs
-    division : Division
-
-    Returns
-    -------
-    dict of tuple to float
-    """
+    """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's."""
     if division.by == "grid":
         return {("grid", name): sum(_seconds(one, costs) for one in items) for name, items in _by_grid(study).items()}
     found: dict[Name, float] = {}
@@ -44,18 +33,7 @@ def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, fl
 
 
 def take(study: "Study", names: "Iterable[Name]") -> "Study":
-    """The study with some of its pieces, and what these need, alone.
-
-    Parameters
-    ----------
-    study : Study
-    names : iterable of tuple
-        Of pieces.
-
-    Returns
-    -------
-    Study
-    """
+    """The study with some of its pieces, and what these need, alone."""
     by_grid, by_stem = _by_grid(study), _by_stem(study)
     chosen: set[Asked] = set()
     for first, *rest in names:
@@ -64,19 +42,7 @@ def take(study: "Study", names: "Iterable[Name]") -> "Study":
 
 
 def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """A study of a few scenes and curves of another one, and of what these need.
-
-    Parameters
-    ----------
-    study : Study
-    chosen : set
-        Of SceneSpec and CurveSpec; what is none of them is not looked at.
-
-    Returns
-    -------
-    Study
-        Of other kinds of study it has what the other one has.
-    """
+    """A study of a few scenes and curves of another one, and of what these need."""
     scenes = tuple(scene for scene in study.scenes if scene in chosen)
     groups = {
         (scene.mesh.mesh_type, scene.material, scene.kinematics) for scene in scenes if scene.definition == "calibrated"

@@ -297,17 +297,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
 
 
 def like_with_like(data):
-    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference.
-
-    Parameters
-    ----------
-    data : xarray.DataTree or xarray.Dataset
-
-    Returns
-    -------
-    xarray.Dataset
-        With the attribute ``finite_strain`` where errors were exchanged.
-    """
+    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference."""
     root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
     finite = None if finite is None else of_own_law(finite)
@@ -328,18 +318,6 @@ def compared(root, selection):
 
 def error_panels(ax, shown, draw, title, swept):
     """Small multiples of deformation errors.
-
-    Parameters
-    ----------
-    ax : Figure, sequence of Axes or None
-    shown : list
-        What each panel shows.
-    draw : callable
-        Of a panel and what it shows: draws it, and returns its title, ends of lines for their names, and a note.
-    title : str
-        Of the figure.
-    swept : bool
-        Whether titles of panels say what is swept, and take more lines.
 
     Returns
     -------
@@ -408,24 +386,9 @@ def error_line(panel, x, cell, name, look, asked=...):
 
     Parameters
     ----------
-    panel : matplotlib.axes.Axes
     x : ndarray, shape (n,)
     cell : xarray.Dataset
         With ``deformation_error`` and ``status``, shape (n,).
-    name : str
-    look : dict
-        Of the line.
-    asked : ndarray of bool, optional
-        Where the line goes; a value that is not there is a gap in it.
-
-    Returns
-    -------
-    ends : list of tuple
-        End of the line for its name; none of a line without values.
-    doubts : set of str
-        What is in doubt.
-    lost : dict of str to list of float
-        Where it was asked for and has no error, by the reason.
     """
     error, flags = 100 * cell.deformation_error.values, cell.status.values
     known, ends, lost = np.isfinite(error), [], {}

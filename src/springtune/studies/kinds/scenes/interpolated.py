@@ -45,19 +45,7 @@ NU_STEP = 0.05
 
 @once_a_study("grids", "outputs")
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
-    """Interpolants that a study has.
-
-    Parameters
-    ----------
-    study : Study
-        Or a part of it: what counts are all scenes of its grids, and its outputs.
-
-    Returns
-    -------
-    dict
-        By the name of the kind of load: the box of aspect ratios and Poisson's ratios, and by beam, material and load
-        the aspect ratio and Poisson's ratio of each of its unit problems.
-    """
+    """Interpolants that a study has."""
     if any(name in study.outputs for name in WITH_FIELDS):
         return {}
     scenes = [scene for grid in study.grids for scene in grid.scenes]
@@ -87,16 +75,6 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
 def box_of(problems: set[tuple[float, float]]) -> "Box":
     """Box of aspect ratios and Poisson's ratios around unit problems, its ends rounded outwards.
 
-    Parameters
-    ----------
-    problems : set of tuple of float
-        Aspect ratio and Poisson's ratio of each.
-
-    Returns
-    -------
-    tuple of tuple of float
-        First and last aspect ratio, first and last Poisson's ratio; one that all share is not rounded.
-
     Examples
     --------
     >>> box_of({(1.5, 0.3), (5, 0.3)})
@@ -124,15 +102,6 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
 
 def expected_solves(box: "Box") -> int:
     """Number of solves that an interpolant over a box takes, about.
-
-    Parameters
-    ----------
-    box : tuple of tuple of float
-        As `box_of` gives it.
-
-    Returns
-    -------
-    int
 
     Examples
     --------

@@ -10,15 +10,7 @@ from . import stored_mesh
 
 
 def run(tasks, spent):
-    """Make the meshes of a bundle that are not there yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``meshes``, each with ``name``, ``key`` and what `make` takes.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Make the meshes of a bundle that are not there yet."""
     folder = tasks["folder"]
     for task in tasks["meshes"]:
         if stored_mesh.is_stored(folder, task["name"], task["key"], spent.limits):
@@ -38,15 +30,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, name, why, limits):
-    """Store that a mesh is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    name, why, limits : str
-        Of the mesh; what became of it; the limits.
-    """
+    """Store that a mesh is beyond its limits."""
     key = next(task["key"] for task in tasks["meshes"] if task["name"] == name)
     stored_mesh.refuse(tasks["folder"], name, key, _hole(why) | {"limits": limits})
 

@@ -11,17 +11,6 @@ if TYPE_CHECKING:
 
 
 def write(tree: "xr.DataTree", folder: Path) -> list[Path]:
-    """Write the collection and its files.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-    folder : Path
-
-    Returns
-    -------
-    list of Path
-        What was written, from the folder on; a scene that has no equilibrium has no file.
-    """
+    """Write the collection and its files."""
     folder.mkdir(parents=True, exist_ok=True)
     return [path.relative_to(folder) for path in write_scenes(tree, folder / COLLECTION)]

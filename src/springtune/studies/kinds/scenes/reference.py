@@ -21,20 +21,7 @@ OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plan
 
 
 def run(tasks, spent):
-    """Solve the references of a bundle that are not there yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder``, ``references``, each with ``key`` and ``problem``, what
-        `springtune.reference.similarity.unit_problem` gives with the name of the kind of load, and ``finite``, each
-        with ``key, beam, material, force, load, law, plane, follower``, where ``load`` is the name of the kind and
-        ``law`` ``"neo-hooke"`` or ``"yeoh"``. There may be ``interpolants``, each with ``key``, ``kind``, by name,
-        ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two ratios of each unit problem that is
-        asked of it, by its own key.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Solve the references of a bundle that are not there yet."""
     for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
         for path, task in store.missing(tasks["folder"], tasks[section], spent.limits):
             begin = time.perf_counter()
@@ -49,15 +36,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a reference is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the reference; what became of it; the limits.
-    """
+    """Store that a reference is beyond its limits."""
     own = {task["key"] for task in (*tasks["references"], *tasks["finite"])}
     interpolants = [task for task in tasks.get("interpolants", ()) if key in (task["key"], *task["problems"])]
     # What an interpolant cannot do goes into its own file.

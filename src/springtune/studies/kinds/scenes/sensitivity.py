@@ -25,17 +25,7 @@ from . import stored_mesh
 
 
 def run(tasks, spent):
-    """Trace the curves of a bundle that are not stored yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder``, ``meshes`` and ``references`` (folders) and ``families``, each with ``name`` and
-        ``curves``, and each of these with ``key, kind, force, kinematics, stiffnesses, reference`` (see
-        `springtune.studies.kinds.scenes.any_reference.read`).
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Trace the curves of a bundle that are not stored yet."""
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
         present = store.stored(path, spent.limits)
@@ -59,15 +49,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a curve is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the curve; what became of it; the limits.
-    """
+    """Store that a curve is beyond its limits."""
     for family in tasks["families"]:
         for curve in family["curves"]:
             if curve["key"] == key:

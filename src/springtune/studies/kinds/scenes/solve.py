@@ -25,18 +25,6 @@ def run(tasks, spent):
     """Solve the scenes of a bundle that are not stored yet.
 
     A scene that fails is stored with its status and message; it never stops the others.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder``, ``meshes`` and ``references`` (folders), ``calibration`` (file of the stage `calibrate`,
-        or nothing) and ``families``, each with ``name, thickness`` and ``scenes``, and each of these with
-        ``key, material, kind`` (the load's, by name), ``follower, force, definition, kinematics``, ``reference`` (see
-        `springtune.studies.kinds.scenes.stored_reference.read`) where it has a field, ``stiffness`` where it is told,
-        ``stiffness_scale`` where it is not 1, ``keep_fields`` where displacements of all particles and forces of all
-        springs are kept, and ``thickness_ratio`` and ``calibration``, the name of a group, where it is calibrated.
-    spent : Spent
-        What tasks cost is added to it.
     """
     calibration = checked_json.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
@@ -74,15 +62,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, name, why, limits):
-    """Store that a scene is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    name, why, limits : str
-        Key of its result; what became of it; the limits.
-    """
+    """Store that a scene is beyond its limits."""
     calibration = checked_json.demand(tasks["calibration"]) if tasks["calibration"] else {}
     for family in tasks["families"]:
         kept = {stored_key(scene, calibration): scene.get("keep_fields") for scene in family["scenes"]}
@@ -111,14 +91,7 @@ def _turn(scene):
 
 
 class References:
-    """Fields of references at the particles of a mesh, read when first asked for.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Where the references are stored.
-    mesh : Mesh
-    """
+    """Fields of references at the particles of a mesh, read when first asked for."""
 
     def __init__(self, folder, mesh):
         self.folder, self.mesh, self.fields = folder, mesh, {}
@@ -140,13 +113,8 @@ def solve(sheet, scene, reference=None, calibration=None):
 
     Parameters
     ----------
-    sheet : Sheet
-    scene : dict
-        As in the tasks.
     reference : callable, optional
         Displacements of the scene's reference for 1 N at the particles [m]; None without.
-    calibration : dict, optional
-        Calibrated stiffnesses by group.
 
     Returns
     -------

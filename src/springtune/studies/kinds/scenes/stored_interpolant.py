@@ -29,18 +29,7 @@ ANSWERS = ("displacement", "mean_displacement", "rotation", "strain", "error_est
 
 
 def make(path: Path, task: "Mapping[str, Any]", spent: "Spent") -> None:
-    """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it.
-
-    Parameters
-    ----------
-    path : Path
-        File of the interpolant.
-    task : dict
-        ``key``, ``kind`` (of load, by name), ``box`` (of aspect ratios and Poisson's ratios) and ``problems``, the two
-        ratios of each unit problem by a key of its own.
-    spent : Spent
-        What tasks cost is added to it, as ``interpolant``: its units are solves.
-    """
+    """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it."""
     if task["key"] not in store.stored(path, spent.limits):
         begin = time.perf_counter()
         result = spent.attempt(task["key"], partial(_built, task), hole)
@@ -71,24 +60,7 @@ def hole(why: str) -> dict[str, Any]:
 
 
 def read(folder: str | Path, key: str) -> "Found":
-    """Interpolant, or what there is in its place.
-
-    Parameters
-    ----------
-    folder : str or Path
-    key : str
-
-    Returns
-    -------
-    Interpolant or None
-    dict of str to dict
-        Without one, unit problems that were solved by themselves, by their keys: what is in `ANSWERS`, ``message`` and
-        ``seconds``, or these two alone.
-    float
-        Seconds that it took for each unit problem that was asked of it.
-    str
-        Why there is none.
-    """
+    """Interpolant, or what there is in its place."""
     path = Path(folder) / f"{key}.h5"
     state = path.stat() if path.exists() else None
     return _opened(path, key, (state.st_size, state.st_mtime_ns) if state else None)

@@ -22,18 +22,7 @@ def files(folder: str | Path, name: str) -> tuple[Path, Path]:
 
 
 def write(folder: str | Path, name: str, key: str, mesh: Mesh, known: dict[str, float]) -> None:
-    """Store a mesh.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-    key : str
-        Of what it is made from.
-    mesh : Mesh
-    known : dict
-        Figures of it.
-    """
+    """Store a mesh."""
     path, notes = files(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
     # The notes name the mesh they belong to, so they go first and come last.
@@ -43,38 +32,14 @@ def write(folder: str | Path, name: str, key: str, mesh: Mesh, known: dict[str, 
 
 
 def refuse(folder: str | Path, name: str, key: str, hole: dict[str, str]) -> None:
-    """Store that a mesh cannot be made.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-    key : str
-        Of what it would be made from.
-    hole : dict
-        ``message``, such as ``"mesh: own.vtu: cells with no area: 1, ..."``, and ``limits`` where it went beyond them.
-    """
+    """Store that a mesh cannot be made."""
     path, notes = files(folder, name)
     path.unlink(missing_ok=True)
     checked_json.write(notes, {"key": key, **hole})
 
 
 def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
-    """Whether a mesh is stored, or that it cannot be made; one that is damaged is set aside.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-    key : str
-        Of what it is to be made from.
-    limits : str
-        Limits that it has now; what went beyond others is not stored.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a mesh is stored, or that it cannot be made; one that is damaged is set aside."""
     path, notes = files(folder, name)
     if not notes.exists():
         return False
@@ -91,64 +56,19 @@ def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
 
 
 def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
-    """What is known of a mesh: its ``key`` and ``checksum``, what it took and its quality.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    DamagedError
-        If they are not there, or not what was written.
-    """
+    """What is known of a mesh: its ``key`` and ``checksum``, what it took and its quality."""
     notes: dict[str, Any] = checked_json.demand(files(folder, name)[1])
     return notes
 
 
 def refusal(folder: str | Path, name: str) -> dict[str, str]:
-    """Why a mesh could not be made: ``message``, and ``limits`` where it went beyond them; empty where it was.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    DamagedError
-        As `read_notes`.
-    """
+    """Why a mesh could not be made: ``message``, and ``limits`` where it went beyond them; empty where it was."""
     notes = read_notes(folder, name)
     return {label: notes[label] for label in ("message", "limits") if label in notes}
 
 
 def read(folder: str | Path, name: str) -> Mesh:
-    """Mesh by its name.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-
-    Returns
-    -------
-    Mesh
-
-    Raises
-    ------
-    DamagedError
-        If it is not there, or not what was written.
-    """
+    """Mesh by its name."""
     path, _ = files(folder, name)
     _checked(path, read_notes(folder, name)["checksum"])
     return read_mesh(path)

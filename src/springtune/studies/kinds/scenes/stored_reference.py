@@ -10,13 +10,9 @@ def read(folder, reference, fields=()):
 
     Parameters
     ----------
-    folder : str or Path
-        Where references are stored.
     reference : dict
         ``key`` of the unit problem, ``length`` [m] and ``displacement`` [m/N], see
         `springtune.reference.similarity.unit_scales`.
-    fields : sequence of str, optional
-        Arrays to read besides scalars, of ``x``, ``y`` and ``displacements``.
 
     Returns
     -------

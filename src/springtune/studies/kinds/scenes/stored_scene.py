@@ -16,45 +16,19 @@ def calibrated_key(key: str, stiffness: float | None) -> str:
 
     Parameters
     ----------
-    key : str
-        Of all that it depends on besides.
     stiffness : float or None
         What was calibrated [N/m]; None where there is nothing.
-
-    Returns
-    -------
-    str
     """
     return hash_of(key, stiffness)
 
 
 def fields_key(key: str) -> str:
-    """Key of the fields of a scene.
-
-    Parameters
-    ----------
-    key : str
-        Of its numbers.
-
-    Returns
-    -------
-    str
-    """
+    """Key of the fields of a scene."""
     return hash_of(key, "fields")
 
 
 def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of a result as they are stored; nothing where it has none.
-
-    Parameters
-    ----------
-    result : dict
-        With `FIELD_ARRAYS`, if it was solved.
-
-    Returns
-    -------
-    dict
-    """
+    """Fields of a result as they are stored; nothing where it has none."""
     if not FIELD_ARRAYS.keys() <= result.keys():
         return {}
     arrays = [result[name].astype(kind).ravel() for name, kind in FIELD_ARRAYS.items()]
@@ -64,10 +38,6 @@ def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def unpacked(stored: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Fields of what is stored: `packed`, undone.
-
-    Parameters
-    ----------
-    stored : dict
 
     Returns
     -------

@@ -18,18 +18,7 @@ SPARSE = 50
 
 
 def summary(study: Study, further: list[list[object]]) -> str:
-    """What a study asks for and what of it is shared, as text.
-
-    Parameters
-    ----------
-    study : Study
-    further : list of list
-        Rows on what it asks for besides scenes: a name, a number and a remark each.
-
-    Returns
-    -------
-    str
-    """
+    """What a study asks for and what of it is shared, as text."""
     title = f"{study.name}: {study.title}"
     if not study.scenes:
         return "\n".join([title, "", aligned(further, left=0, right=(1,))])

@@ -22,17 +22,7 @@ WIDE = 20.0
 
 
 def sweep(tree):
-    """Figures of sweeps: one for each parameter that is swept, mesh type, material and load.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """Figures of sweeps: one for each parameter that is swept, mesh type, material and load."""
     present = group(tree, "/").status != 0
     names = [name for name in SWEPT if present.sizes.get(name, 1) > 1]
     for name in names:

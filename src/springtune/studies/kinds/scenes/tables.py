@@ -13,18 +13,7 @@ ROW = ("beam", "mesh_size")
 
 
 def tables(tree):
-    """Tables of the page: the paper's, and those of references at finite strain and of pressed faces.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Returns
-    -------
-    list of dict
-        Each with ``stem`` and ``rows``; those as the paper's with their labels, their ``definitions`` and the columns
-        of what is ``swept``; the others with ``title`` and ``note``.
-    """
+    """Tables of the page: the paper's, and those of references at finite strain and of pressed faces."""
     root = tree.to_dataset()
     if "status" not in root:  # a study without scenes
         return []

@@ -121,18 +121,7 @@ OF_PRINT = "paper_"
 
 
 def swept(group: Group, study: "Study") -> Group:
-    """Group whose variables are over what a study sweeps, each over what it depends on.
-
-    Parameters
-    ----------
-    group : Group
-    study : Study
-
-    Returns
-    -------
-    Group
-        The force is a coordinate where it is swept, and no variable.
-    """
+    """Group whose variables are over what a study sweeps, each over what it depends on."""
     further: dict[str, list[str]] = {}
     for name, (dimensions, *_) in group.variables.items():
         if name in OF_BODIES.values():
@@ -143,16 +132,7 @@ def swept(group: Group, study: "Study") -> Group:
 
 
 def fields_of(study: "Study") -> Group:
-    """Group of whole fields of a study: of what it sweeps they are of one value each, which the group says.
-
-    Parameters
-    ----------
-    study : Study
-
-    Returns
-    -------
-    Group
-    """
+    """Group of whole fields of a study: of what it sweeps they are of one value each, which the group says."""
     place = "beam", "mesh_type", "material", "load"
     said = {}
     for name in study.swept:

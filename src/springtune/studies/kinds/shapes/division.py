@@ -14,18 +14,7 @@ if TYPE_CHECKING:
 
 
 def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, float]":
-    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids.
-
-    Parameters
-    ----------
-    study : Study
-    costs : Costs
-    division : Division
-
-    Returns
-    -------
-    dict of tuple to float
-    """
+    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids."""
     part = study.parts["shapes"]
     found: dict[Name, float] = defaultdict(float)
     for one in part.scenes:
@@ -37,36 +26,13 @@ def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, fl
 
 
 def take(study: "Study", names: "Iterable[Name]") -> "Study":
-    """The study with some of its pieces alone.
-
-    Parameters
-    ----------
-    study : Study
-    names : iterable of tuple
-        Of pieces.
-
-    Returns
-    -------
-    Study
-    """
+    """The study with some of its pieces alone."""
     wanted = set(names)
     return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
 
 
 def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """A study of a few scenes of shapes of another one, and of what these need.
-
-    Parameters
-    ----------
-    study : Study
-    chosen : set
-        Of ShapeScene; what is none is not looked at.
-
-    Returns
-    -------
-    Study
-        Of other kinds of study it has what the other one has.
-    """
+    """A study of a few scenes of shapes of another one, and of what these need."""
     part = study.parts["shapes"]
     scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
     if not scenes:

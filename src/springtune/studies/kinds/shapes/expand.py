@@ -25,14 +25,8 @@ class ShapeScene:
         Key of `springtune.studies.kinds.shapes.names.OUTLINED`, or ``"file"``.
     mesh_size : float
         Asked length of an edge [m]; 0 where the mesh is that of a file.
-    material : str
-        Name of the material of the main part.
     load : str
         Name of a load of the shape.
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    kinematics : str
-        One of `springtune.problem.loads.KINEMATICS`.
     """
 
     shape: str
@@ -55,18 +49,10 @@ class Shapes:
 
     Attributes
     ----------
-    declared : dict of str to Shape
-        All of the study, by name.
     shapes : tuple of Shape
         Those that have scenes.
-    materials : tuple of Material
-        Those that they are of.
     parts : dict of str to dict of str to str
         Name of the material of each part, by shape and part.
-    scenes : tuple of ShapeScene
-        Free of duplicates, in a canonical order.
-    referred : tuple of tuple of str
-        Shape, material and load of each reference.
     refined : dict of str to dict of str to float
         Mesh size over that of the rest, by shape and group, point or part [1].
     """

@@ -33,17 +33,7 @@ MOST_SHOWN_ERROR = 100.0
 
 
 def shapes(tree):
-    """Figures of shapes: all quantities; and of each shape and load its errors, and its networks.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """Figures of shapes: all quantities; and of each shape and load its errors, and its networks."""
     data = group(tree, "shapes")
     asked = (data.status != 0).any([name for name in data.status.dims if name not in ("shape", "load")])
     pairs = [

@@ -15,15 +15,7 @@ from .task_values import shape_of
 
 
 def run(tasks, spent):
-    """Make the meshes of a bundle that are not there yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``meshes``, each with ``name``, ``key`` and ``source``, what `make` takes.
-    spent : Spent
-        What tasks cost is added to it.
-    """
+    """Make the meshes of a bundle that are not there yet."""
     for task in tasks["meshes"]:
         path = Path(tasks["folder"]) / f"{task['name']}.h5"
         if task["key"] in store.stored(path, spent.limits):
@@ -38,15 +30,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, name, why, limits):
-    """Store that a mesh is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    name, why, limits : str
-        Of the mesh; what became of it; the limits.
-    """
+    """Store that a mesh is beyond its limits."""
     key = next(task["key"] for task in tasks["meshes"] if task["name"] == name)
     store.add(Path(tasks["folder"]) / f"{name}.h5", {key: _hole(why) | {store.LIMITS: limits}})
 
@@ -63,18 +47,7 @@ def _made(source):
 
 
 def make(source):
-    """Mesh with its groups.
-
-    Parameters
-    ----------
-    source : dict
-        What `task_values.geometry` gives, with ``mesh_type``, ``mesh_size`` and ``refined``,
-        sizes by group, point or part; or with ``file``, its ``unit`` and the hash of its ``content``.
-
-    Returns
-    -------
-    GroupedMesh
-    """
+    """Mesh with its groups."""
     if "file" not in source:
         return mesh_shape(shape_of(source), source["mesh_size"], source["mesh_type"], source["refined"])
     content = hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest()

@@ -22,12 +22,8 @@ class QuantityKind:
 
     Attributes
     ----------
-    unit_kind : str
-        Key of `springtune.units.QUANTITY_KINDS`.
     places : tuple of str
         What a study says it is of: ``at`` a point, ``of`` a group.
-    example : str
-        How a study writes one.
     shown : tuple of tuple
         Units that it is shown in and their sizes in SI units, the largest first.
     """

@@ -24,10 +24,6 @@ def figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
     ----------
     cases : list of dict
         Labels ``shape`` and ``load``.
-
-    Returns
-    -------
-    dict of str to dict
     """
     found: dict[str, dict[str, str]] = {OVERVIEW: {}} if cases else {}
     for name in (ERRORS, DEFORMED):

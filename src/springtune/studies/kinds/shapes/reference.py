@@ -23,8 +23,6 @@ def run(tasks, spent):
     tasks : dict
         ``folder`` and ``references``, each with ``key``, ``shape`` (what `mesh.make` takes),
         ``thickness``, ``load`` and ``materials``, see `task_values`.
-    spent : Spent
-        What tasks cost is added to it.
     """
     for path, task in store.missing(tasks["folder"], tasks["references"], spent.limits):
         begin = time.perf_counter()
@@ -37,15 +35,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a reference is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the reference; what became of it; the limits.
-    """
+    """Store that a reference is beyond its limits."""
     store.lose(tasks["folder"], key, _hole(why), limits)
 
 
@@ -97,10 +87,6 @@ def rounds_of(edges):
     Parameters
     ----------
     edges : ndarray of int, shape (n, 2)
-
-    Returns
-    -------
-    list of ndarray of int
     """
     beside = {}
     for one, other in edges.tolist():

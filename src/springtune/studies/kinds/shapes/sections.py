@@ -31,13 +31,7 @@ BEYOND_MEASURE = 1e30
 
 
 class Signed(Scalar):
-    """Annotation of a quantity of either sign, or zero, which needs no unit.
-
-    Parameters
-    ----------
-    kind : str
-        Key of `springtune.units.QUANTITY_KINDS`.
-    """
+    """Annotation of a quantity of either sign, or zero, which needs no unit."""
 
     def __init__(self, kind: str) -> None:
         example = units.QUANTITY_KINDS[kind].example
@@ -58,13 +52,7 @@ def _signed(text: str, kind: str) -> float:
 
 
 class Vector:
-    """Annotation of two quantities, along x and along y.
-
-    Parameters
-    ----------
-    kind : str
-        Key of `springtune.units.QUANTITY_KINDS`.
-    """
+    """Annotation of two quantities, along x and along y."""
 
     def __init__(self, kind: str) -> None:
         self.item = Signed(kind)
@@ -86,12 +74,7 @@ class Vector:
 
 
 class Words:
-    """Annotation of what is expected where the items of a list or mapping do not tell.
-
-    Parameters
-    ----------
-    words : str
-    """
+    """Annotation of what is expected where the items of a list or mapping do not tell."""
 
     def __init__(self, words: str) -> None:
         self.words = words

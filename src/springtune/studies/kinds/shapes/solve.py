@@ -30,8 +30,6 @@ def run(tasks, spent):
         ``folder``, ``meshes`` (folder of the stage `shape_mesh`) and ``families``, each with ``name`` and ``mesh``, the
         mesh's name and key, ``shape``, see `task_values.geometry`, and ``scenes``, each with
         ``key, thickness, load, materials, definition, kinematics``, and ``keep_fields`` where its network is drawn.
-    spent : Spent
-        What tasks cost is added to it.
     """
     for family in tasks["families"]:
         path = Path(tasks["folder"]) / f"{family['name']}.h5"
@@ -67,15 +65,7 @@ def _keys(scene):
 
 
 def lose(tasks, key, why, limits):
-    """Store that a scene is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the scene; what became of it; the limits.
-    """
+    """Store that a scene is beyond its limits."""
     for family in tasks["families"]:
         for scene in family["scenes"]:
             if scene["key"] == key:

@@ -17,16 +17,7 @@ NO_LIMITS = "none"
 
 
 def packed(grouped: GroupedMesh) -> dict[str, Any]:
-    """A mesh and its groups as they are stored.
-
-    Parameters
-    ----------
-    grouped : GroupedMesh
-
-    Returns
-    -------
-    dict
-    """
+    """A mesh and its groups as they are stored."""
     mesh = grouped.mesh
     found: dict[str, Any] = {"points": mesh.points, "triangles": mesh.triangles, "quads": mesh.quads}
     found |= {"side_names": list(grouped.sides), "part_names": list(grouped.parts), "unusable": dict(grouped.unusable)}
@@ -38,25 +29,7 @@ def packed(grouped: GroupedMesh) -> dict[str, Any]:
 
 
 def read(folder: str | Path, name: str, key: str) -> GroupedMesh | str:
-    """A stored mesh, or why there is none.
-
-    Parameters
-    ----------
-    folder : str or Path
-    name : str
-        Of the mesh.
-    key : str
-        Of what it is made from.
-
-    Returns
-    -------
-    GroupedMesh or str
-
-    Raises
-    ------
-    DamagedError
-        If it is not there, or not what was written.
-    """
+    """A stored mesh, or why there is none."""
     path = Path(folder) / f"{name}.h5"
     known = store.read(path, [key])[key]
     if known["message"]:
@@ -78,15 +51,5 @@ def read(folder: str | Path, name: str, key: str) -> GroupedMesh | str:
 
 
 def is_lost(folder: str | Path, name: str, key: str) -> bool:
-    """Whether a mesh went beyond its limits, so that others may make it.
-
-    Parameters
-    ----------
-    folder, name, key
-        As of `read`.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a mesh went beyond its limits, so that others may make it."""
     return key not in store.stored(Path(folder) / f"{name}.h5", NO_LIMITS)

@@ -16,14 +16,6 @@ UNNAMED, ONE_LOAD = "shape", "load"
 def quantity_key(quantity: Quantity) -> str:
     """What a quantity is, whatever a study calls it.
 
-    Parameters
-    ----------
-    quantity : Quantity
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> quantity_key(Quantity("tip", "displacement", "end", "y", expected=1e-3))
@@ -33,17 +25,7 @@ def quantity_key(quantity: Quantity) -> str:
 
 
 def geometry(shape: Shape) -> dict[str, Any]:
-    """What meshes of a shape depend on: its sides and points; of a file nothing that is in it.
-
-    Parameters
-    ----------
-    shape : Shape
-
-    Returns
-    -------
-    dict
-        ``outline``, ``holes`` and ``points``.
-    """
+    """What meshes of a shape depend on: its sides and points; of a file nothing that is in it."""
     return {
         "outline": [asdict(side) for side in shape.outline],
         "holes": [asdict(hole) for hole in shape.holes],
@@ -52,16 +34,7 @@ def geometry(shape: Shape) -> dict[str, Any]:
 
 
 def load(case: LoadCase) -> dict[str, Any]:
-    """What results under a load depend on.
-
-    Parameters
-    ----------
-    case : LoadCase
-
-    Returns
-    -------
-    dict
-    """
+    """What results under a load depend on."""
     quantities = {quantity_key(one): one for one in case.quantities}
     plain = [
         replace(one, name=f"q{number}", expected=None, source="")
@@ -75,16 +48,8 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
 
     Parameters
     ----------
-    described : dict
     thickness : float, optional
         [m]
-    case : dict, optional
-        What `load` gives.
-
-    Returns
-    -------
-    Shape
-        With the load `ONE_LOAD`, where there is one.
     """
     holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
     points = {name: _pair(point) for name, point in described["points"].items()}
@@ -96,37 +61,13 @@ def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, 
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
-    """Values of quantities by their `quantity_key`; those that are no finite numbers are left out.
-
-    Parameters
-    ----------
-    values : dict of str to float
-        By the quantities' names in tasks.
-    case : LoadCase
-        As in tasks.
-
-    Returns
-    -------
-    dict of str to float
-    """
+    """Values of quantities by their `quantity_key`; those that are no finite numbers are left out."""
     found = {quantity_key(one): float(values[one.name]) for one in case.quantities if one.name in values}
     return {key: value for key, value in found.items() if isfinite(value)}
 
 
 def named(message: str, shape: Shape, case: LoadCase) -> str:
-    """A message of a task with the names that a study has.
-
-    Parameters
-    ----------
-    message : str
-    shape : Shape
-    case : LoadCase
-        One of its loads.
-
-    Returns
-    -------
-    str
-    """
+    """A message of a task with the names that a study has."""
     names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{ONE_LOAD}'": f"load '{case.name}'"}
     order = sorted({quantity_key(one) for one in case.quantities})
     names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}

@@ -12,34 +12,12 @@ if TYPE_CHECKING:
 
 
 def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, float]":
-    """Seconds of each piece: of an experiment with a definition, or of all.
-
-    Parameters
-    ----------
-    study : Study
-    costs : Costs
-    division : Division
-
-    Returns
-    -------
-    dict of tuple to float
-    """
+    """Seconds of each piece: of an experiment with a definition, or of all."""
     return division.of_section({(one.name, one.definition): costs.of(one.name) for one in study.parts["stability"]})
 
 
 def take(study: "Study", names: "Iterable[Name]") -> "Study":
-    """The study with some of its pieces alone.
-
-    Parameters
-    ----------
-    study : Study
-    names : iterable of tuple
-        Of pieces.
-
-    Returns
-    -------
-    Study
-    """
+    """The study with some of its pieces alone."""
     wanted = set(names)
     chosen = tuple(one for one in study.parts["stability"] if (one.name, one.definition) in wanted)
     return replace(study, parts=study.parts | {"stability": chosen})

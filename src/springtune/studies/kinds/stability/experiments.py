@@ -37,14 +37,8 @@ class Setup:
 
     Attributes
     ----------
-    beam : Beam
-    material : Material
-        With a density.
     force : float
         Traction [N].
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    mesh_type : str
     mesh_sizes : tuple of float
         Lengths of an edge [m], ascending.
     """
@@ -563,16 +557,5 @@ RUN = {
 
 
 def run(name, setup):
-    """Results of an experiment.
-
-    Parameters
-    ----------
-    name : str
-        Key of `springtune.studies.kinds.stability.names.EXPERIMENTS`.
-    setup : Setup
-
-    Returns
-    -------
-    dict of str to float or ndarray
-    """
+    """Results of an experiment."""
     return RUN[name](setup)

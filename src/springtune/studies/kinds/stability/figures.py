@@ -22,17 +22,7 @@ STRAIN_LOADS = {"axial": "Force on the end", "follower-pressure": "Pressure that
 
 
 def stability(tree):
-    """Figures of the experiments that a dataset has.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """Figures of the experiments that a dataset has."""
     for stem in figures(group(tree, "stability").experiment.values.tolist()):
         yield stem, PLOTS[stem], {}
 

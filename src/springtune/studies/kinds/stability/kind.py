@@ -49,14 +49,8 @@ class Experiment:
     ----------
     name : str
         Key of `springtune.studies.kinds.stability.names.EXPERIMENTS`.
-    beam : Beam
-    material : Material
-        With a density.
     force : float
         Traction [N].
-    definition : str
-        Key of `springtune.springs.DEFINITIONS`.
-    mesh_type : str
     mesh_sizes : tuple of float
         Lengths of an edge [m], ascending.
     """

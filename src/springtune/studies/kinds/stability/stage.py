@@ -16,14 +16,6 @@ def run(tasks, spent):
     """Do the experiments that are not stored yet.
 
     An experiment that fails is stored with its message; it never stops the others.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``experiments``, each with ``key``, ``name`` and what
-        `springtune.studies.kinds.stability.experiments.Setup` takes.
-    spent : Spent
-        What tasks cost is added to it.
     """
     for path, task in store.missing(tasks["folder"], tasks["experiments"], spent.limits):
         result = spent.attempt(task["key"], partial(_experiment, task), _hole)
@@ -34,15 +26,7 @@ def run(tasks, spent):
 
 
 def lose(tasks, key, why, limits):
-    """Store that an experiment is beyond its limits.
-
-    Parameters
-    ----------
-    tasks : dict
-        As of `run`.
-    key, why, limits : str
-        Of the experiment; what became of it; the limits.
-    """
+    """Store that an experiment is beyond its limits."""
     store.lose(tasks["folder"], key, _hole(why), limits)
 
 

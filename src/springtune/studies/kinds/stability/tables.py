@@ -14,19 +14,7 @@ from .outputs import PAGE
 
 
 def write(tree, folder):
-    """Write the page in Markdown.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        With the group ``/stability``.
-    folder : str or Path
-
-    Returns
-    -------
-    list of str
-        Names of the files written.
-    """
+    """Write the page in Markdown."""
     write_text(Path(folder) / PAGE, page(tree))
     return [PAGE]
 

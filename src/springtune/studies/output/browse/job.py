@@ -9,20 +9,7 @@ from .page import page
 
 
 def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
-    """Write the page of a dataset, and the record of it.
-
-    Parameters
-    ----------
-    dataset : str
-    output : str
-        HTML file to write.
-    record : str
-        Record to write.
-    digest : str
-        Of what is asked for.
-    *files : str
-        What else is made of the dataset, from its folder on.
-    """
+    """Write the page of a dataset, and the record of it."""
     read = records.checksum(dataset)
     write_text(output, page(dataset, files))
     records.write(record, digest, [output], read=read)

@@ -31,13 +31,7 @@ LIBRARY = ("bokeh", "bokeh-api")
 
 
 def views() -> dict[str, View]:
-    """Views that the study kinds declare.
-
-    Returns
-    -------
-    dict of str to View
-        By path of the group.
-    """
+    """Views that the study kinds declare."""
     found: dict[str, View] = {}
     for name in KINDS:
         module = f"studies.kinds.{name}.views"
@@ -47,27 +41,7 @@ def views() -> dict[str, View]:
 
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
-    """Page of a dataset.
-
-    Parameters
-    ----------
-    dataset : str or Path
-        NetCDF file.
-    files : iterable of str
-        Paths of what else was made of it, from the dataset's folder on: the page links to them.
-
-    Returns
-    -------
-    str
-        HTML that loads nothing: neither from a network nor from another file.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file, or the scripts of Bokeh are not installed.
-    ValueError
-        If it is not the dataset of a study.
-    """
+    """Page of a dataset."""
     path = Path(dataset)
     if not path.is_file():
         raise FileNotFoundError(

@@ -31,23 +31,7 @@ Packed = tuple[dict[str, Any], list[bytes]]
 
 
 def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]], list[bytes]]:
-    """Groups of a dataset, described and packed.
-
-    Parameters
-    ----------
-    file : h5netcdf.File
-        Read without xarray, whose import takes longer than all the rest of making a page.
-    room : int
-        Bytes that the numbers may take; where they take more, the largest variables are left out.
-
-    Returns
-    -------
-    groups : list of dict
-        Of each group: its path, attributes, dimensions with labels, variables with where their numbers are, and the
-        names of those left out.
-    contents : list of bytes
-        Numbers of each group, deflated.
-    """
+    """Groups of a dataset, described and packed."""
     found = list(_walk(file, {}))
     contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
     if sum(map(len, contents)) > room:

@@ -33,25 +33,6 @@ class Server(ThreadingHTTPServer):
 
     It listens on the loopback address, answers requests for it by that name alone (a page of somebody else that gives
     its own name this address is refused), and every path begins with a token that is drawn anew.
-
-    Parameters
-    ----------
-    dataset : str or Path
-        NetCDF file, or its folder.
-    port : int
-        0 chooses a free one.
-
-    Attributes
-    ----------
-    address : str
-        Of the page.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        As of `springtune.studies.output.browse.page.page`.
-    OSError
-        If the port is not to be had, with what to do about it.
     """
 
     daemon_threads = True
