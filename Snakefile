@@ -12,7 +12,10 @@ include: "workflow/rules/elsewhere.smk"
 if not TOLD:
 
     include: "workflow/rules/common.smk"
-    include: "workflow/rules/stages.smk"
+
+    for kind in KINDS:
+
+        include: f"workflow/rules/{kind}.smk"
     include: "workflow/rules/collect.smk"
     include: "workflow/rules/outputs.smk"
     include: "workflow/rules/browse.smk"
@@ -29,12 +32,11 @@ if not TOLD:
             f"{RESULTS} is complete"
         input:
             # Stages before the dataset, too: what they store is made again where it is missing.
-            DONE,
+            STORED,
             rules.collect.output,
             OUTPUTS.values(),
             str(RESULTS / rerun.PAGE),  # plain: the report is to name the rule that made it
 
-    release()
     if "storage" in config or asks_for_storage():
 
         include: "workflow/rules/storage.smk"

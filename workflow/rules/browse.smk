@@ -6,7 +6,6 @@ rule browse:
         "Writing the page to browse: index.html"
     input:
         dataset=rules.collect.output.dataset,
-        again=looked_at(JOBS, rerun.BROWSE),
     output:
         page=report(
             RESULTS / rerun.PAGE, caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}

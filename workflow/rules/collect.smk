@@ -5,8 +5,7 @@ rule collect:
     message:
         "Comparing, and collecting the dataset"
     input:
-        done=DONE,
-        again=looked_at(JOBS, rerun.COLLECT),
+        done=STORED,
     output:
         dataset=RESULTS / rerun.DATASET,
         summary=report(

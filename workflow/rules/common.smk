@@ -1,6 +1,7 @@
 """Helpers of the rules: the study, its folder and its bundles."""
 
 import os
+import re
 import sys
 import time
 import warnings
@@ -18,7 +19,7 @@ from springtune.studies.runs import commands
 from springtune.safe_io.atomic import remove_unfinished
 from springtune.studies.runs.dependencies import CODE_FILE, OURS
 from springtune.studies.kinds import load_study
-from springtune.studies.config.kind import FORMATS
+from springtune.studies.config.kind import FORMATS, KINDS
 from springtune.problem.geometry import AssumptionWarning
 from springtune.studies.config.messages import StudyError
 
@@ -72,6 +73,11 @@ ON_CLUSTER = workflow.resource_settings.nodes is not None
 CORES = 1 if ON_CLUSTER or not workflow.is_main_process else workflow.resource_settings.cores or 1
 PLAN = plan(STUDY, RESULTS, CORES, lasting())
 JOBS = rerun.jobs(STUDY, PLAN, UNTOLD)
+try:
+    locks.check_claim(RESULTS, CONFIG)
+except locks.LockedError as error:
+    print(error, file=sys.stderr)
+    sys.exit(1)
 # The one that is run; for the paper, those that it reads besides.
 READ = workflow.__dict__.setdefault("studies_read", [])
 READ.append((STUDY, PLAN))
@@ -84,8 +90,17 @@ if "study" not in config and DISPLAY:
 
 
 def done(stage):
-    """What all jobs of a stage make when they are done."""
+    """Records of all jobs of a stage."""
     return [PLAN.record(job.name) for job in PLAN.jobs.values() if job.stage.name == stage]
+
+
+def bundles(stage):
+    """Bundles of a stage, for the constraint of its wildcard."""
+    return "|".join(map(re.escape, PLAN.labels(stage))) or "none"
+
+
+STORED = [PLAN.record(name) for name in PLAN.jobs]
+"""Records of all jobs before the dataset."""
 
 
 def files(one):
@@ -130,29 +145,11 @@ def needs(name, wildcards):
     return workload.presented_needs(RESULTS, job, len(JOBS[job].products) if job in JOBS else 1)
 
 
-def looked_at(found, name):
-    """Input of a job that is none: a function, which Snakemake calls when it needs the job.
-
-    A job that has not done what is asked for, or whose files are not as it made them, is forced to run. Snakemake
-    judges by times and by notes of its own in a folder that may be gone; records know better.
-    """
-
-    def look(wildcards):
-        job = found[name.format(**dict(wildcards))]
-        if workflow.is_main_process and str(job.record) not in workflow.dag.forcefiles:
-            why = rerun.fault(job, found)
-            if why:
-                workflow.dag.forcefiles.add(str(job.record))
-            if rerun.is_damage(why):
-                logger.warning(f"{why}; it is made again")
-        return []
-
-    return look
-
-
 def begin():
     """What happens when jobs are about to run, and not when the Snakefile is read."""
     try:
+        for _, one in READ:
+            locks.check_idle(one.folder)
         locks.begin([one.folder for _, one in READ])
         for study, one in READ:
             remove_unfinished(one.folder)
@@ -162,6 +159,8 @@ def begin():
         OURS.remember(RESULTS.parent / CODE_FILE)
         if ON_CLUSTER:
             commands.remember(RESULTS, map(told_elsewhere, workflow.dag.needrun_jobs()))
+    except locks.LockedError as error:
+        raise WorkflowError(str(error)) from None
     except OSError as error:
         locks.end()
         remedy = "make room or give leave to write there, then call the same command again"
@@ -186,40 +185,6 @@ def told_elsewhere(job):
 def asks_for_storage():
     """Whether a target is one of `storage.smk`, whatever else was forgotten."""
     return not {"publish", "fetch"}.isdisjoint(sys.argv[1:])
-
-
-LOOKING = {
-    "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--dry-run", "--dryrun", "--filegraph",
-    "--lc", "--li", "--lint", "--list", "--list-changes", "--list-code-changes", "--list-input-changes", "--list-params-changes",
-    "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp", "--lt", "--lu", "--report",
-    "--rulegraph", "--summary", "--unlock", "-D", "-S", "-l", "-n", "-np",
-}  # fmt: skip
-"""Options of Snakemake by which nothing is computed."""
-
-
-def release():
-    """Refuse a folder of another study, and remove the lock of a run that was killed; who only looks leaves it there."""
-    state = Path(".snakemake")
-    if not os.access(state if state.exists() else ".", os.W_OK):
-        why = f"{Path.cwd()} cannot be written, and Snakemake wants to even where it only looks"
-        print(f"{why}; `springtune info`, `browse` and `verify` do not: call these", file=sys.stderr)
-        sys.exit(1)
-    looking = DISPLAY is not None and DISPLAY.common_settings.dryrun
-    looking |= any(word.partition("=")[0] in LOOKING for word in sys.argv[1:])
-    if not workflow.is_main_process:
-        return
-    disk = os.statvfs(".")
-    if not looking and disk.f_blocks and not disk.f_bavail:
-        print(f"{Path.cwd()}: the disk is full; make room, then call the same command again", file=sys.stderr)
-        sys.exit(1)
-    try:
-        locks.check_claim(RESULTS, CONFIG)
-        removed = "" if looking else locks.release(RESULTS)
-    except locks.LockedError as error:
-        print(error, file=sys.stderr)
-        sys.exit(1)
-    if removed:
-        logger.warning(removed)
 
 
 def tell_start():

@@ -13,7 +13,6 @@ for job, made in MADE.items():
             f"Drawing figures and writing tables: {', '.join(one.name for one in made)}"
         input:
             dataset=rules.collect.output.dataset,
-            again=looked_at(JOBS, job),
         output:
             *REPORTED[job],
             done=JOBS[job].record,

@@ -41,7 +41,6 @@ rule paper:
         "Setting the paper from the datasets of its studies"
     input:
         datasets=PAPER_DATASETS,
-        again=looked_at({rerun.PAPER: PAPER}, rerun.PAPER) if PAPER_WANTED else [],
     output:
         paper=report(
             "results/paper/paper.pdf", caption="../report/paper.rst", category="paper", labels={"name": "paper"}

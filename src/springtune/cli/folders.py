@@ -45,10 +45,10 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
 
 def idle(folder: Path) -> None:
     """Refuse to remove anything under a run."""
-    from ..studies.runs.locks import LockedError, is_held
+    from ..studies.runs.locks import LockedError, check_idle
 
     try:
-        is_held(folder)
+        check_idle(folder)
     except LockedError as error:
         raise click.ClickException(f"{error}; nothing is removed") from None
 

@@ -7,12 +7,16 @@ import sys
 import warnings
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from .completion import studies_here
 from .examples import examples
 from .many import allow, max_scenes
+
+if TYPE_CHECKING:
+    from ..studies.config.model import Study
 
 USUAL_STUDY = "config/paper.yaml"
 """Study that is run where none is named."""
@@ -106,13 +110,91 @@ def run(
     except OSError as error:
         why = f"{error.strerror}; name a folder that can be written"
         raise click.ClickException(f"--results {folder}: {why}") from None
-    if not strict or {"-n", "--dry-run", "--dryrun"} & {*options}:
+    if not options or _computes(options):
+        study = study if path == shown else load_study(path)  # its files are seen from here
+        studies = [study, *(_read_for_paper(path, study) if "paper" in options else ())]
+        _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
+        if _made_missing(studies, {"no_diff": no_diff, "no_host": no_host}) and not options:
+            from ..studies.output.summary import reminder
+
+            click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
+            raise SystemExit(_strictly(strict, study))
+    if not strict or not _computes(options):
         os.execv(command[0], command)
-    code = _called(command)
-    holes = 0 if code else _unsolved(Path("results") / study.name / "dataset.nc")
+    raise SystemExit(_called(command) or _strictly(strict, study))
+
+
+LOOKING = {
+    "--archive", "--cleanup-metadata", "--d3dag", "--dag", "--detailed-summary", "--dry-run", "--dryrun", "--filegraph",
+    "--lc", "--li", "--lint", "--list", "--list-changes", "--list-code-changes", "--list-input-changes",
+    "--list-params-changes", "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp",
+    "--lt", "--lu", "--report", "--rulegraph", "--summary", "--unlock", "-D", "-S", "-l", "-n", "-np",
+}  # fmt: skip
+"""Options of Snakemake by which nothing is computed."""
+
+
+def _computes(options: list[str]) -> bool:
+    """Whether Snakemake computes anything by these options."""
+    return not any(one.partition("=")[0] in LOOKING for one in options)
+
+
+def _results(study: "Study") -> Path:
+    return Path("results") / study.name
+
+
+def _read_for_paper(config: Path, study: "Study") -> "list[Study]":
+    """Studies that the paper reads besides one, as the rule `paper` finds them."""
+    from ..studies.kinds import load_study
+    from ..studies.runs.rerun import PAPER_STUDIES
+
+    beside = (config.with_name(f"{name}.yaml") for name in PAPER_STUDIES if name != study.name)
+    return [load_study(one if one.exists() else Path("config", one.name)) for one in beside]
+
+
+def _unlock(studies: "list[Study]", command: list[str]) -> None:
+    """Remove the lock of a run that was killed; refuse a study that another process computes, and a full disk."""
+    from ..studies.runs import locks
+
+    here = Path.cwd()
+    state = Path(".snakemake")
+    if not os.access(state if state.exists() else here, os.W_OK):
+        remedy = "`springtune info`, `browse` and `verify` write nothing: call these"
+        raise click.ClickException(f"{here} cannot be written; {remedy}")
+    disk = os.statvfs(here)
+    if disk.f_blocks and not disk.f_bavail:
+        raise click.ClickException(f"{here}: the disk is full; make room, then call the same command again")
+    try:
+        killed = [one.name for one in studies if locks.check_idle(_results(one))]
+    except locks.LockedError as error:
+        raise click.ClickException(str(error)) from None
+    if killed:
+        subprocess.run(command, check=False, capture_output=True)
+        locks.forget()
+        which = ", ".join(str(Path("results", name)) for name in killed)
+        click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
+
+
+def _made_missing(studies: "list[Study]", chosen: dict[str, bool]) -> bool:
+    """Remove the records of jobs that Snakemake may not know to be outdated; return whether there is nothing to do."""
+    from ..studies.runs import rerun
+
+    done = True
+    for study in studies:
+        found = rerun.outdated(study, _results(study), {name: True for name, value in chosen.items() if value})
+        done = done and found == {}
+        for record, why in (found or {}).items():
+            if rerun.is_damage(why):
+                click.echo(f"{why}; it is made again", err=True)
+            record.unlink()
+    return done
+
+
+def _strictly(strict: bool, study: "Study") -> int:
+    """Exit code of a run that made everything."""
+    holes = _unsolved(_results(study) / "dataset.nc") if strict else 0
     if holes:
         click.echo(f"--strict: {holes} scenes are not solved", err=True)
-    raise SystemExit(NOT_SOLVED if holes else code)
+    return NOT_SOLVED if holes else 0
 
 
 SLURM = "snakemake_executor_plugin_slurm"

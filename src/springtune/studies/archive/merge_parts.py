@@ -127,7 +127,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
     target = Path("results", study.name)
     locks.check_claim(target, study.path)
     for folder in (target, *folders):
-        locks.is_held(folder)
+        locks.check_idle(folder)
     sites = [_site(study, folder) for folder in folders]
     missing = [*_absent(study, sites)]
     places: dict[Path, list[Path]] = defaultdict(list)

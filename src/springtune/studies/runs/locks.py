@@ -1,7 +1,7 @@
-"""Who runs what in a folder, whose results it holds, and locks that a run which was killed has left.
+"""Who runs what in a folder, and whose results it holds.
 
-Snakemake locks the files of a run by lists of them, does not say by whom, and at the end of a run removes the locks of
-all others in its folder. So a run notes its process beside them; a lock is stale when that process is gone.
+Snakemake's locks do not say which process holds them, and the end of a run removes the locks of all others in its
+folder. So a run notes its process while it lasts. `springtune run` removes the lock of a process that is gone.
 """
 
 import filecmp
@@ -19,8 +19,8 @@ from springtune.safe_io.processes import lives, this_host
 from . import checked_json
 from .run_tasks import TASKS
 
-LOCKS, RUNS = Path(".snakemake/locks"), Path(".snakemake/springtune")
-"""Snakemake's locks, and notes of processes, from the folder on that a run is called in."""
+RUNS = Path(".snakemake/springtune")
+"""Notes of processes that run studies, in the folder that they were called in."""
 
 STUDY_FILE = f"{TASKS}/study.json"
 """File in a study's folder: the path of the config that was run last."""
@@ -70,11 +70,11 @@ def begin(folders: Iterable[Path]) -> None:
         "command": " ".join(sys.argv),
         "folders": sorted(named),
     }
-    _forget(Path(), named)
+    forget(Path(), named)
     checked_json.write(_note(), note)
 
 
-def _forget(place: Path, locked: Collection[str] = ()) -> None:
+def forget(place: Path = Path(), locked: Collection[str] = ()) -> None:
     """Remove notes of runs that are gone: of this machine, and those on folders that are locked by this process."""
     for path, note in _notes(place):
         gone = note["host"] == this_host() and not _is_alive(note)
@@ -91,59 +91,30 @@ def _note() -> Path:
     return RUNS / f"{re.sub('[^0-9A-Za-z-]+', '-', this_host())}_{os.getpid()}.json"
 
 
-def is_held(folder: Path) -> bool:
-    """Whether a run has locked a study; that it is gone may be seen from a lock that is stale."""
-    place = folder.parent.parent
-    locked = any(_is_on(path, folder) for path in _files(place / LOCKS, "*.lock"))
-    noted = False
-    for _, note in _notes(place):
+def check_idle(folder: Path) -> bool:
+    """Return whether a run of a study was killed and left its note; raise LockedError while a run computes it."""
+    killed = False
+    for _, note in _notes(folder.parent.parent):
         if Path(folder.parent.name, folder.name) not in map(Path, note["folders"]):
             continue
-        noted = True
-        if note["host"] != this_host() and locked:
+        if note["host"] != this_host():
             raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
-        if note["host"] == this_host() and _is_alive(note):
+        if _is_alive(note):
             raise LockedError(_told(folder, note, "on this machine"))
-    if not locked:
-        return False
-    # A run that was killed before it noted anything.
-    other = None if noted else _running_in(place)
-    if other is not None:
-        remedy = f"wait for its end, or stop it: kill {other}"
-        raise LockedError(f"{folder}: process {other} computes in this folder; {remedy}")
-    return True
-
-
-def release(folder: Path) -> str:
-    """Remove locks on a study that a process which is gone has left."""
-    if not is_held(folder):
-        return ""
-    place = folder.parent.parent
-    for path in _files(place / LOCKS, "*.lock"):
-        if _is_on(path, folder):
-            path.unlink(missing_ok=True)
-    _forget(place)
-    return f"{folder}: the run before was killed and left its lock; the lock is removed"
+        killed = True
+    return killed
 
 
 def _told(folder: Path, note: dict[str, Any], where: str) -> str:
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(note["start"]))
     remedy = f"wait for its end, or stop it: kill {note['pid']}"
     if note["host"] != this_host():
-        remedy = f"wait for its end; if it is gone: rm -r {LOCKS}"
+        remedy = f"wait for its end; if it is gone: rm -r {RUNS}, then snakemake --unlock"
     return f"{folder}: process {note['pid']} {where} computes it since {since} ({note['command']}); {remedy}"
 
 
 def _files(folder: Path, pattern: str) -> list[Path]:
     return sorted(folder.glob(pattern)) if folder.is_dir() else []
-
-
-def _is_on(lock: Path, folder: Path) -> bool:
-    try:
-        named = Path(folder.parent.name, folder.name)  # Snakemake names files from where it was called
-        return any(Path(line).is_relative_to(named) for line in lock.read_text(errors="replace").splitlines())
-    except OSError:
-        return False
 
 
 def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
@@ -155,23 +126,3 @@ def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 def _is_alive(note: dict[str, Any]) -> bool:
     return lives(note["pid"], note["start"])
-
-
-def _running_in(place: Path) -> int | None:
-    """Another process of Snakemake in a folder that computes."""
-    import psutil
-
-    own = psutil.Process()
-    family = {own.pid, *(process.pid for process in own.parents())}
-    for process in psutil.process_iter():
-        try:
-            if process.pid in family or not lives(process.pid):
-                continue
-            if Path(process.cwd()) != place.resolve():
-                continue
-            words = process.cmdline()
-        except psutil.Error:
-            continue
-        if any(Path(word).name == "snakemake" for word in words[:3]) and not {"-n", "--dry-run", "--dryrun"} & {*words}:
-            return process.pid
-    return None

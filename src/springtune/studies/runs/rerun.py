@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from ..config.kind import FORMATS, KINDS, kinds, outputs
 from ..config.shown import keeps_fields
 from . import checked_json, records
-from .dependencies import PACKAGE
+from .dependencies import CODE_FILE, OURS, PACKAGE
 from .hashing import hash_of
 from .keys import stage_key
-from .plan import Plan, table_files
+from .plan import BUNDLES_FILE, Plan, plan, table_files
 from .provenance import inputs
 from .run_tasks import RECORDS
 
@@ -187,6 +187,20 @@ def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
     if not why and job.inputs and checked_json.read(job.record)["read"] != [_checksum(path) for path in job.inputs]:
         return "a dataset that it reads is another one"
     return why
+
+
+def outdated(study: "Study", folder: Path, chosen: Mapping[str, bool] | None = None) -> dict[Path, str] | None:
+    """Return the records of jobs that are to run again though Snakemake may not know, with the reason of each.
+
+    Snakemake compares parameters with its own notes, and no content of what was made. None where a job is not done yet.
+    """
+    if not (folder / BUNDLES_FILE).exists():  # never run: planning 10,000 scenes takes a second
+        return None
+    OURS.recall(folder.parent / CODE_FILE)
+    found = jobs(study, plan(study, folder), chosen)
+    faults = {job.record: why for job in found.values() if (why := fault(job, found))}
+    known = {record: why for record, why in faults.items() if record.exists()}
+    return known if len(known) == len(faults) else known or None
 
 
 def _checksum(path: str) -> str:

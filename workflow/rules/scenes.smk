@@ -1,0 +1,97 @@
+"""Scenes of beams: meshes, references, sensitivity curves, calibration, and networks in equilibrium."""
+
+
+rule mesh:
+    message:
+        "Meshing, bundle {wildcards.bundle}"
+    output:
+        RESULTS / "done/mesh_{bundle}.json",
+    wildcard_constraints:
+        bundle=bundles("mesh"),
+    params:
+        # The file of tasks is written when a run begins, so that reading the Snakefile writes nothing.
+        tasks=lambda wildcards, output: str(RESULTS / "tasks" / Path(output[0]).name),
+        digest=lambda wildcards, output: JOBS[Path(output[0]).stem].digest,
+    threads: 1
+    resources:
+        runtime=minutes("mesh_{bundle}"),
+        mem_mb=megabytes("mesh_{bundle}"),
+    log:
+        RESULTS / "logs/mesh_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/mesh_{bundle}.tsv"
+    shell:
+        "python -m springtune.studies.runs.run_tasks {params.tasks:q} {output:q} {params.digest:q} > {log:q} 2>&1"
+
+
+use rule mesh as reference with:
+    message:
+        "Solving the finite-element references, bundle {wildcards.bundle}"
+    output:
+        RESULTS / "done/reference_{bundle}.json",
+    wildcard_constraints:
+        bundle=bundles("reference"),
+    resources:
+        runtime=minutes("reference_{bundle}"),
+        mem_mb=megabytes("reference_{bundle}"),
+    log:
+        RESULTS / "logs/reference_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/reference_{bundle}.tsv"
+
+
+use rule mesh as sensitivity with:
+    message:
+        "Tracing the sensitivity curves, bundle {wildcards.bundle}"
+    input:
+        RESULTS / "done/mesh_{bundle}.json",
+        done("reference"),
+    output:
+        RESULTS / "done/sensitivity_{bundle}.json",
+    wildcard_constraints:
+        bundle=bundles("sensitivity"),
+    resources:
+        runtime=minutes("sensitivity_{bundle}"),
+        mem_mb=megabytes("sensitivity_{bundle}"),
+    log:
+        RESULTS / "logs/sensitivity_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/sensitivity_{bundle}.tsv"
+
+
+use rule mesh as calibrate with:
+    message:
+        "Calibrating the uniform stiffness, bundle {wildcards.bundle}"
+    input:
+        done("sensitivity"),
+    output:
+        RESULTS / "done/calibrate_{bundle}.json",
+    wildcard_constraints:
+        bundle=bundles("calibrate"),
+    resources:
+        runtime=minutes("calibrate_{bundle}"),
+        mem_mb=megabytes("calibrate_{bundle}"),
+    log:
+        RESULTS / "logs/calibrate_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/calibrate_{bundle}.tsv"
+
+
+use rule mesh as solve with:
+    message:
+        "Solving the networks, bundle {wildcards.bundle}"
+    input:
+        RESULTS / "done/mesh_{bundle}.json",
+        done("reference"),
+        done("calibrate"),
+    output:
+        RESULTS / "done/solve_{bundle}.json",
+    wildcard_constraints:
+        bundle=bundles("solve"),
+    resources:
+        runtime=minutes("solve_{bundle}"),
+        mem_mb=megabytes("solve_{bundle}"),
+    log:
+        RESULTS / "logs/solve_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/solve_{bundle}.tsv"

@@ -1,0 +1,17 @@
+"""Experiments on numerical stability."""
+
+
+use rule mesh as stability with:
+    message:
+        "Experiments on stability, bundle {wildcards.bundle}"
+    output:
+        RESULTS / "done/stability_{bundle}.json",
+    wildcard_constraints:
+        bundle=bundles("stability"),
+    resources:
+        runtime=minutes("stability_{bundle}"),
+        mem_mb=megabytes("stability_{bundle}"),
+    log:
+        RESULTS / "logs/stability_{bundle}.log",
+    benchmark:
+        RESULTS / "benchmarks/stability_{bundle}.tsv"
