@@ -6,10 +6,10 @@
 
 
 include: "workflow/rules/environment.smk"
-include: "workflow/rules/elsewhere.smk"
+include: "workflow/rules/internals.smk"
 
 
-if not TOLD:
+if not NOTED:
 
     include: "workflow/rules/common.smk"
 
@@ -37,7 +37,7 @@ if not TOLD:
             OUTPUTS.values(),
             str(RESULTS / rerun.PAGE),  # plain: the report is to name the rule that made it
 
-    if "storage" in config or asks_for_storage():
+    if "storage" in config or {"publish", "fetch"} & {*WORDS}:
 
         include: "workflow/rules/storage.smk"
 

@@ -6,67 +6,14 @@ something to do.
 
 import os
 import sys
-from argparse import ArgumentError, ArgumentParser
 from logging import ERROR, WARNING, Handler, LogRecord
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from .display import Display
-
-SEEN = {
-    LogEvent.JOB_FINISHED,
-    LogEvent.JOB_INFO,
-    LogEvent.JOB_STARTED,
-    LogEvent.PROGRESS,
-    LogEvent.RESOURCES_INFO,
-    LogEvent.RUN_INFO,
-    LogEvent.SHELLCMD,
-    LogEvent.WORKFLOW_STARTED,
-}
-"""Events that the display shows in its own way."""
-
-LOG = "Complete log"
-"""Beginning of the message that names Snakemake's log; read where something failed."""
-
-IDLE = ("Assuming unrestricted", "Building DAG", "Elapsed time", "Select jobs", "Using shell")
-"""Beginnings of messages that say nothing beside the display."""
-
-NOTHING = "Nothing to be done"
-"""Beginning of the message of a run that finds everything made."""
-
-
-def _check_study(arguments: "Sequence[str]") -> None:
-    """End Snakemake with our message where a study is no study at all, as `springtune run` would.
-
-    Snakemake reads the file that ``--configfile`` names before the Snakefile, right after it has made its loggers: of
-    one that is missing it shows a traceback, of a tab no line, and aliases in aliases take all memory. What its own
-    parser would make of its arguments is not to be had here; that of a command in which this is not one is left to it.
-    """
-    parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
-    parser.add_argument("--configfile", "--configfiles", nargs="+", default=[])
-    try:
-        files = parser.parse_known_args(arguments)[0].configfile
-    except (ArgumentError, SystemExit):
-        return
-    if not files:
-        return
-    from springtune.studies.config.messages import StudyError
-    from springtune.studies.config.yaml_lines import read_study
-
-    try:
-        for file in files:
-            if not isinstance(read_study(file)[1], dict):
-                from springtune.studies.kinds import load_study
-
-                load_study(file)
-    except StudyError as error:
-        sys.exit(str(error))
 
 
 class LogHandler(LogHandlerBase):
@@ -78,17 +25,10 @@ class LogHandler(LogHandlerBase):
     Snakemake prints without a plugin.
     """
 
-    latest: "LogHandler | None" = None
-    """The handler of this run, for the Snakefile; None where Snakemake logs without this plugin."""
-
     def __post_init__(self) -> None:
         Handler.__init__(self)  # the interface before 2.0 leaves it out
-        _check_study(sys.argv[1:])
-        LogHandler.latest = self
         self.display: Display | None = None
         self.plain: Handler | None = None
-        self.results: Path | None = None  # the Snakefile says it
-        self.failed = False
         self.wanted = self._wanted()
 
     @property
@@ -152,17 +92,13 @@ class LogHandler(LogHandlerBase):
             sys.stderr.write(record.getMessage() + "\n")
         else:
             self._follow(record)
-        if self.results is not None and not self.common_settings.dryrun and record.getMessage().startswith(NOTHING):
-            self._remind(self.results)
 
     def _follow(self, record: LogRecord) -> None:
         event = getattr(record, "event", None)
-        self.failed |= record.levelno >= ERROR
         if self.display is None:
             # Without the Snakefile's hooks (--no-hooks) there is nothing to display.
             self.wanted = event != LogEvent.JOB_INFO
-            if self._is_told(record) or not self.wanted:
-                self._plain().emit(record)
+            self._plain().emit(record)
             return
         if event == LogEvent.JOB_INFO:
             self.display.begin(record.jobid)  # type: ignore[attr-defined]
@@ -170,20 +106,9 @@ class LogHandler(LogHandlerBase):
             self.display.finish(record.job_id)  # type: ignore[attr-defined]
         elif event == LogEvent.JOB_ERROR:
             self.display.fail(record.jobid)  # type: ignore[attr-defined]
-        if self._is_told(record):
+        if record.levelno >= WARNING:
             style = "red" if record.levelno >= ERROR else "yellow"
             self.display.tell(self.format(record), style)
-
-    def _is_told(self, record: LogRecord) -> bool:
-        """Whether the display does not show it in its own way."""
-        idle = IDLE if self.failed else (*IDLE, LOG)
-        shown = getattr(record, "event", None) in SEEN or record.getMessage().startswith(idle)
-        return record.levelno >= WARNING or not shown
-
-    def _remind(self, results: Path) -> None:
-        from springtune.studies.output.summary import reminder
-
-        sys.stderr.write(reminder(results))
 
     def _stop(self) -> None:
         if self.display is not None:

@@ -1,5 +1,6 @@
 """A study run through Snakemake in a folder of its own."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -31,6 +32,13 @@ class Run:
         command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default", "--cores", "2"]
         command += ["--configfile", self.folder / config, *arguments]
         done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+
+    def springtune(self, config, *arguments):
+        """Exit code and output of `springtune run` in this folder, on two cores."""
+        command = [sys.executable, "-m", "springtune", "run", config, "--cores", "2", *arguments]
+        environment = os.environ | {"SPRINGTUNE_WORKFLOW": str(REPOSITORY)}
+        done = subprocess.run(list(map(str, command)), cwd=self.folder, env=environment, capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 
     def write(self, name, text):

@@ -302,6 +302,8 @@ def test_example_reads_the_dataset(run, tree, repository, monkeypatch, tmp_path)
 def test_second_run_has_nothing_to_do_and_reminds_of_holes(run, tree):
     code, output = run.snakemake("quick.yaml")
     assert code == 0 and "Nothing to be done" in output
+    code, output = run.springtune("quick.yaml")
+    assert code == 0 and "Nothing to be done" in output
     holes = int((tree["stability"].contrast_status > 1).sum())
     assert holes and f"Not everything is solved: {holes} of " in output
     assert "results/quick: index.html, dataset.nc" in output

@@ -97,7 +97,7 @@ def test_what_a_removed_value_left_is_removed_on_request(grown, monkeypatch):
 def test_a_deleted_result_is_made_again(grown):
     lost = grown.folder / "results/grow/meshes/50x20_structured_10mm.vtu"
     lost.unlink()
-    code, output = grown.snakemake("grow.yaml", "--until", "collect")
+    code, output = grown.springtune("grow.yaml", "--until", "collect")
     assert code == 0, output
     assert lost.exists()
 

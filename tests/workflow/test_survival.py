@@ -73,13 +73,23 @@ def test_a_plan_of_what_was_never_run_is_made_without_writing(run):
     assert not (run.folder / "results/never").exists()
 
 
-def test_the_lock_of_a_process_that_is_gone_is_removed_with_a_word(finished):
+def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
     """As Snakemake writes locks, of the study's collect; what else becomes of locks: tests/unit/test_locks.py."""
     locks = finished.folder / ".snakemake/locks"
     locks.mkdir(exist_ok=True)
-    (locks / "0.output.lock").write_text("results/survival/dataset.nc\n")
-    code, output = finished.snakemake("survival.yaml")
-    assert code == 0 and "was killed and left its lock; the lock is removed" in output
+    (locks / "0.output.lock").write_text(f"{finished.folder}/results/survival/dataset.nc\n")
+    (finished.folder / "results/survival/index.html").unlink()
+    note = {
+        "host": this_host(),
+        "pid": 2**22 + 1,
+        "start": 1.0,
+        "command": "snakemake",
+        "folders": ["results/survival"],
+    }
+    checked_json.write(finished.folder / ".snakemake/springtune/of_a_test.json", note)
+    code, output = finished.springtune("survival.yaml")
+    assert code == 0 and "was killed and left its lock; the lock is removed" in output, output
+    assert (finished.folder / "results/survival/index.html").exists()
 
 
 def test_a_study_that_another_process_computes_is_left_to_it(finished):
@@ -88,7 +98,7 @@ def test_a_study_that_another_process_computes_is_left_to_it(finished):
             "folders": ["results/survival"]}  # fmt: skip
     path = finished.folder / ".snakemake/springtune/of_a_test.json"
     checked_json.write(path, note)
-    code, output = finished.snakemake("survival.yaml")
+    code, output = finished.springtune("survival.yaml")
     path.unlink()
     assert code == 1 and "Traceback" not in output
     assert re.search(rf"results/survival: process {os.getpid()} on this machine computes it since .*; wait", output)
@@ -109,7 +119,7 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     os.killpg(job.pid, signal.SIGKILL)
     job.wait()
     psutil.wait_procs(children)
-    code, output = run.snakemake("killed.yaml", "--until", "collect")
+    code, output = run.springtune("killed.yaml", "--until", "collect")
     assert code == 0, output
     with (
         xr.open_dataset(run.folder / "results/killed/dataset.nc") as one,

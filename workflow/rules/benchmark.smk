@@ -8,6 +8,9 @@ use rule mesh as benchmark with:
         RESULTS / "done/benchmark_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("benchmark"),
+    params:
+        tasks=str(RESULTS / "tasks/benchmark_{bundle}.json"),
+        digest=digest("benchmark_{bundle}"),
     # Other jobs would be in its seconds. On a cluster a node of its own is for the profile to ask for.
     threads: CORES
     resources:

@@ -9,10 +9,9 @@ from math import inf
 from pathlib import Path
 
 from snakemake.logging import logger
-from snakemake.settings.enums import Quietness
-from snakemake_logger_plugin_springtune import LogHandler
 
 from springtune.studies.runs import locks, rerun, workload
+from springtune.studies.runs.workload import READ
 from springtune.studies.runs.plan import plan, stages
 from springtune.safe_io.escapes import rst
 from springtune.studies.runs import commands
@@ -28,24 +27,21 @@ def loaded_study():
     try:
         with warnings.catch_warnings():
             # Jobs read it, too: the run says it once.
-            warnings.simplefilter("default" if workflow.is_main_process else "ignore", AssumptionWarning)
+            warnings.simplefilter("ignore" if IS_CHILD else "default", AssumptionWarning)
             warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
             return load_study(CONFIG)
     except StudyError as error:
-        # The message says it all; a traceback through Snakemake would bury it.
-        print(error, file=sys.stderr)
-        sys.exit(1)
+        refused(error)
 
 
 def lasting():
     """Seconds that a job is to last, by the profile of a cluster or ``--config job_minutes=5``; a child does not judge."""
-    if not workflow.is_main_process:
+    if IS_CHILD:
         return None
     minutes = config.get("job_minutes", 0)
     if isinstance(minutes, bool) or not isinstance(minutes, int | float) or not 0 <= minutes < inf:
-        print(f"--config job_minutes={minutes}: no number of minutes; the profile slurm has 5, a machine of one's own 0, "
-              "for as few as pay", file=sys.stderr)  # fmt: skip
-        sys.exit(1)
+        usual = "the profile slurm has 5, a machine of one's own 0, for as few as pay"
+        refused(f"--config job_minutes={minutes}: no number of minutes; {usual}")
     return 60.0 * minutes
 
 
@@ -56,37 +52,38 @@ def chosen_untold():
         variable = f"SPRINGTUNE_{option.upper()}"  # of `springtune run`: a --config would replace that of a profile
         value = str(config.get(option, os.environ.get(variable, ""))).lower()
         if value not in ("", "true", "false"):
-            print(f"--config {option}={value}: neither true nor false; give one of them", file=sys.stderr)
-            sys.exit(1)
+            refused(f"--config {option}={value}: neither true nor false; give one of them")
         if value:
             os.environ[variable], chosen[option] = value, value == "true"
     return chosen
 
 
+def refused(why):
+    """End before anything runs: the message says it all, and a traceback through Snakemake would bury it."""
+    print(why, file=sys.stderr)
+    sys.exit(1)
+
+
+ON_CLUSTER = NODES is not None
+WHY_NOT = commands.refusal(CONFIG, Path.cwd(), Path(workflow.basedir), Path(sys.executable), ON_CLUSTER)
+if WHY_NOT and not IS_CHILD:
+    refused(WHY_NOT)
 UNTOLD = chosen_untold()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
 config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 OURS.recall(RESULTS.parent / CODE_FILE)
-ON_CLUSTER = workflow.resource_settings.nodes is not None
 # A cluster has room for all jobs: only how long one lasts says how many there are. A child plans as the run did.
-CORES = 1 if ON_CLUSTER or not workflow.is_main_process else workflow.resource_settings.cores or 1
+CORES = 1 if ON_CLUSTER or IS_CHILD else workflow.cores or 1
 PLAN = plan(STUDY, RESULTS, CORES, lasting())
 JOBS = rerun.jobs(STUDY, PLAN, UNTOLD)
 try:
     locks.check_claim(RESULTS, CONFIG)
 except locks.LockedError as error:
-    print(error, file=sys.stderr)
-    sys.exit(1)
-# The one that is run; for the paper, those that it reads besides.
-READ = workflow.__dict__.setdefault("studies_read", [])
+    refused(error)
 READ.append((STUDY, PLAN))
 SHOWN = FORMATS[0]  # of a figure's files, the one that a browser shows
 CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
-
-DISPLAY = LogHandler.latest
-if "study" not in config and DISPLAY:
-    DISPLAY.results = RESULTS  # whose summary to show where nothing is to be done
 
 
 def done(stage):
@@ -97,6 +94,14 @@ def done(stage):
 def bundles(stage):
     """Bundles of a stage, for the constraint of its wildcard."""
     return "|".join(map(re.escape, PLAN.labels(stage))) or "none"
+
+
+def digest(name):
+    """Parameter of a job that changes with all that its results depend on, by the name of its record.
+
+    A function of the wildcards alone: Snakemake does not compare parameters that depend on input or output.
+    """
+    return lambda wildcards: JOBS[name.format(**dict(wildcards))].digest
 
 
 STORED = [PLAN.record(name) for name in PLAN.jobs]
@@ -158,7 +163,7 @@ def begin():
             one.write()
         OURS.remember(RESULTS.parent / CODE_FILE)
         if ON_CLUSTER:
-            commands.remember(RESULTS, map(told_elsewhere, workflow.dag.needrun_jobs()))
+            commands.remember(RESULTS, jobs_to_run())
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:
@@ -168,29 +173,9 @@ def begin():
     tell_start()
 
 
-def told_elsewhere(job):
-    """What a job needs to know where it runs."""
-    return {
-        "rule": job.rule.name,
-        "wildcards": dict(job.wildcards_dict),
-        # With wildcards: what the child calls in its turn is named by them.
-        "output": list(map(str, job.rule.output)),
-        "log": list(map(str, job.rule.log)),
-        "benchmark": str(job.rule.benchmark),
-        "threads": job.threads,
-        "command": job.shellcmd,
-    }
-
-
-def asks_for_storage():
-    """Whether a target is one of `storage.smk`, whatever else was forgotten."""
-    return not {"publish", "fetch"}.isdisjoint(sys.argv[1:])
-
-
 def tell_start():
     """Say how much there is to do; the progress display reads what each job is expected to take."""
-    dag = workflow.dag
-    jobs = [(dag.jobid(job), job.rule.name, job.threads, list(map(str, job.output))) for job in dag.needrun_jobs()]
+    jobs = [(job["number"], job["rule"], job["threads"], job["outputs"]) for job in jobs_to_run()]
     found, names = {}, []
     for study, one in READ:
         prefix = "" if study is STUDY else f"{study.name}_"
@@ -201,9 +186,11 @@ def tell_start():
         ]
         names += [study.name] if own or study is STUDY else []
         found |= workload.loads(study, one, own)
-    cores = max(1, min(workflow.nodes, len(jobs))) if ON_CLUSTER else CORES  # on a cluster, jobs side by side
+    cores = (
+        max(1, min(workflow.resource_settings.nodes, len(jobs))) if ON_CLUSTER else CORES
+    )  # on a cluster, jobs side by side
     text = f"{', '.join(names)}: {workload.told(found, cores)}"
-    logger.info(text, extra={"quietness": Quietness.PROGRESS, "loads": found, "cores": cores})
+    logger.info(text, extra={"loads": found, "cores": cores})
 
 
 def tell_end(how):

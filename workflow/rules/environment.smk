@@ -46,15 +46,3 @@ def chosen_config():
 
 
 CONFIG = chosen_config()
-
-if workflow.is_main_process:
-    why = commands.refusal(
-        CONFIG,
-        Path.cwd(),
-        Path(workflow.basedir),
-        Path(sys.executable),
-        on_cluster=workflow.resource_settings.nodes is not None,
-    )
-    if why:
-        print(why, file=sys.stderr)
-        sys.exit(1)

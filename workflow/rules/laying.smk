@@ -8,6 +8,9 @@ use rule mesh as laying with:
         RESULTS / "done/laying_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("laying"),
+    params:
+        tasks=str(RESULTS / "tasks/laying_{bundle}.json"),
+        digest=digest("laying_{bundle}"),
     resources:
         runtime=minutes("laying_{bundle}"),
         mem_mb=megabytes("laying_{bundle}"),

@@ -8,6 +8,9 @@ use rule mesh as moduli with:
         RESULTS / "done/moduli_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("moduli"),
+    params:
+        tasks=str(RESULTS / "tasks/moduli_{bundle}.json"),
+        digest=digest("moduli_{bundle}"),
     resources:
         runtime=minutes("moduli_{bundle}"),
         mem_mb=megabytes("moduli_{bundle}"),

@@ -9,7 +9,6 @@ PAPER_DATASETS = [Path("results") / name / rerun.DATASET for name in rerun.PAPER
 
 # Snakemake tells the targets after the Snakefile was read. Who wants neither the paper nor a job of a study that it reads
 # need not read these studies.
-WORDS = sys.argv[1:]
 PAPER_WANTED = any(word == "paper" or Path(word).name == "paper.pdf" for word in WORDS)
 
 if PAPER_WANTED:
@@ -17,8 +16,7 @@ if PAPER_WANTED:
     try:  # now, and not when the studies are done
         check_typst()
     except PaperError as error:
-        print(error, file=sys.stderr)
-        sys.exit(1)
+        refused(error)
 
 if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_STUDIES)) for word in WORDS):
     for name in rerun.PAPER_STUDIES:

@@ -8,6 +8,9 @@ use rule mesh as refinement with:
         RESULTS / "done/refinement_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("refinement"),
+    params:
+        tasks=str(RESULTS / "tasks/refinement_{bundle}.json"),
+        digest=digest("refinement_{bundle}"),
     resources:
         runtime=minutes("refinement_{bundle}"),
         mem_mb=megabytes("refinement_{bundle}"),

@@ -8,6 +8,9 @@ use rule mesh as interpolate with:
         RESULTS / "done/interpolate_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("interpolate"),
+    params:
+        tasks=str(RESULTS / "tasks/interpolate_{bundle}.json"),
+        digest=digest("interpolate_{bundle}"),
     resources:
         runtime=minutes("interpolate_{bundle}"),
         mem_mb=megabytes("interpolate_{bundle}"),
@@ -24,6 +27,9 @@ use rule mesh as sample with:
         RESULTS / "done/sample_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("sample"),
+    params:
+        tasks=str(RESULTS / "tasks/sample_{bundle}.json"),
+        digest=digest("sample_{bundle}"),
     resources:
         runtime=minutes("sample_{bundle}"),
         mem_mb=megabytes("sample_{bundle}"),

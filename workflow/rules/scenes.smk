@@ -10,8 +10,8 @@ rule mesh:
         bundle=bundles("mesh"),
     params:
         # The file of tasks is written when a run begins, so that reading the Snakefile writes nothing.
-        tasks=lambda wildcards, output: str(RESULTS / "tasks" / Path(output[0]).name),
-        digest=lambda wildcards, output: JOBS[Path(output[0]).stem].digest,
+        tasks=str(RESULTS / "tasks/mesh_{bundle}.json"),
+        digest=digest("mesh_{bundle}"),
     threads: 1
     resources:
         runtime=minutes("mesh_{bundle}"),
@@ -31,6 +31,9 @@ use rule mesh as reference with:
         RESULTS / "done/reference_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("reference"),
+    params:
+        tasks=str(RESULTS / "tasks/reference_{bundle}.json"),
+        digest=digest("reference_{bundle}"),
     resources:
         runtime=minutes("reference_{bundle}"),
         mem_mb=megabytes("reference_{bundle}"),
@@ -50,6 +53,9 @@ use rule mesh as sensitivity with:
         RESULTS / "done/sensitivity_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("sensitivity"),
+    params:
+        tasks=str(RESULTS / "tasks/sensitivity_{bundle}.json"),
+        digest=digest("sensitivity_{bundle}"),
     resources:
         runtime=minutes("sensitivity_{bundle}"),
         mem_mb=megabytes("sensitivity_{bundle}"),
@@ -68,6 +74,9 @@ use rule mesh as calibrate with:
         RESULTS / "done/calibrate_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("calibrate"),
+    params:
+        tasks=str(RESULTS / "tasks/calibrate_{bundle}.json"),
+        digest=digest("calibrate_{bundle}"),
     resources:
         runtime=minutes("calibrate_{bundle}"),
         mem_mb=megabytes("calibrate_{bundle}"),
@@ -88,6 +97,9 @@ use rule mesh as solve with:
         RESULTS / "done/solve_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("solve"),
+    params:
+        tasks=str(RESULTS / "tasks/solve_{bundle}.json"),
+        digest=digest("solve_{bundle}"),
     resources:
         runtime=minutes("solve_{bundle}"),
         mem_mb=megabytes("solve_{bundle}"),

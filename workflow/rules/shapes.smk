@@ -8,6 +8,9 @@ use rule mesh as shape_reference with:
         RESULTS / "done/shape_reference_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("shape_reference"),
+    params:
+        tasks=str(RESULTS / "tasks/shape_reference_{bundle}.json"),
+        digest=digest("shape_reference_{bundle}"),
     resources:
         runtime=minutes("shape_reference_{bundle}"),
         mem_mb=megabytes("shape_reference_{bundle}"),
@@ -24,6 +27,9 @@ use rule mesh as shape_mesh with:
         RESULTS / "done/shape_mesh_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("shape_mesh"),
+    params:
+        tasks=str(RESULTS / "tasks/shape_mesh_{bundle}.json"),
+        digest=digest("shape_mesh_{bundle}"),
     resources:
         runtime=minutes("shape_mesh_{bundle}"),
         mem_mb=megabytes("shape_mesh_{bundle}"),
@@ -42,6 +48,9 @@ use rule mesh as shape_solve with:
         RESULTS / "done/shape_solve_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("shape_solve"),
+    params:
+        tasks=str(RESULTS / "tasks/shape_solve_{bundle}.json"),
+        digest=digest("shape_solve_{bundle}"),
     resources:
         runtime=minutes("shape_solve_{bundle}"),
         mem_mb=megabytes("shape_solve_{bundle}"),

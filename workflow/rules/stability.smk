@@ -8,6 +8,9 @@ use rule mesh as stability with:
         RESULTS / "done/stability_{bundle}.json",
     wildcard_constraints:
         bundle=bundles("stability"),
+    params:
+        tasks=str(RESULTS / "tasks/stability_{bundle}.json"),
+        digest=digest("stability_{bundle}"),
     resources:
         runtime=minutes("stability_{bundle}"),
         mem_mb=megabytes("stability_{bundle}"),

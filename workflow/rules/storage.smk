@@ -11,18 +11,12 @@ PLUGIN = "snakemake_storage_plugin_s3"
 STORAGE = str(config.get("storage", "")).rstrip("/")
 
 
-def stop(why):
-    """Stop: the message says it all."""
-    print(why, file=sys.stderr)
-    sys.exit(1)
-
-
 if not STORAGE:
-    stop("publish, fetch: where? give --config storage=s3://bucket/folder")
+    refused("publish, fetch: where? give --config storage=s3://bucket/folder")
 if not re.fullmatch(r"s3://[^/{}]+(/[^{}]+)?", STORAGE):
-    stop(f"storage: '{STORAGE}' is no place for results; give one such as s3://bucket/folder")
+    refused(f"storage: '{STORAGE}' is no place for results; give one such as s3://bucket/folder")
 if find_spec(PLUGIN) is None:
-    stop("storage: Snakemake's plugin for s3:// is not installed; install the extra: pip install 'springtune[s3]'")
+    refused("storage: Snakemake's plugin for s3:// is not installed; install the extra: pip install 'springtune[s3]'")
 
 
 def stored(name):
@@ -34,7 +28,7 @@ PACKED = [stage.name for stage in stages() if done(stage.name)]
 SHOWN_FILES = [file for job in JOBS.values() if job.reads or job.name == rerun.COLLECT for file in job.products]
 
 
-if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets are not known yet
+if "fetch" in WORDS:  # what makes packs is not to be asked for them; targets are not known yet
 
     def packs_there(wildcards):
         """Packs of this study that the storage has."""
@@ -43,9 +37,11 @@ if "fetch" in sys.argv:  # what makes packs is not to be asked for them; targets
             # Not Snakemake's exists(): it cannot be called while the graph is built.
             there = [one for one in packs if one.flags["storage_object"].exists()]
         except Exception as error:
-            stop(f"{STORAGE}: {error}; correct access key, secret key or endpoint, or see whether the storage is there")
+            refused(
+                f"{STORAGE}: {error}; correct access key, secret key or endpoint, or see whether the storage is there"
+            )
         if not there:
-            stop(f"{STORAGE}/{STUDY.name} holds no results of this study; correct the place, or publish first")
+            refused(f"{STORAGE}/{STUDY.name} holds no results of this study; correct the place, or publish first")
         return there
 
     rule fetch:

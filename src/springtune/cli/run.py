@@ -110,11 +110,14 @@ def run(
     except OSError as error:
         why = f"{error.strerror}; name a folder that can be written"
         raise click.ClickException(f"--results {folder}: {why}") from None
-    if not options or _computes(options):
+    if _computes(options) or _plans(options):
         study = study if path == shown else load_study(path)  # its files are seen from here
         studies = [study, *(_read_for_paper(path, study) if "paper" in options else ())]
+    if _plans(options):
+        _made_missing(studies, {"no_diff": no_diff, "no_host": no_host}, remove=False)
+    elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
-        if _made_missing(studies, {"no_diff": no_diff, "no_host": no_host}) and not options:
+        if _made_missing(studies, {"no_diff": no_diff, "no_host": no_host}) and _asks_for_all(options):
             from ..studies.output.summary import reminder
 
             click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
@@ -136,6 +139,23 @@ LOOKING = {
 def _computes(options: list[str]) -> bool:
     """Whether Snakemake computes anything by these options."""
     return not any(one.partition("=")[0] in LOOKING for one in options)
+
+
+HOW = {"--cores": 1, "-c": 1, "--jobs": 1, "-j": 1, "--quiet": 0, "-q": 0, "--keep-going": 0, "-k": 0}
+"""Options that say how a run goes and not what it makes, with the number of their values."""
+
+
+def _asks_for_all(options: list[str]) -> bool:
+    """Whether everything of a study is asked for, and nothing is forced."""
+    rest = options
+    while rest and rest[0].partition("=")[0] in HOW:
+        rest = rest[1 + (HOW[rest[0]] if "=" not in rest[0] else 0) :]
+    return not rest
+
+
+def _plans(options: list[str]) -> bool:
+    """Whether Snakemake says what it would do."""
+    return not {"-n", "-np", "--dry-run", "--dryrun"}.isdisjoint(options)
 
 
 def _results(study: "Study") -> Path:
@@ -174,7 +194,7 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
 
-def _made_missing(studies: "list[Study]", chosen: dict[str, bool]) -> bool:
+def _made_missing(studies: "list[Study]", chosen: dict[str, bool], remove: bool = True) -> bool:
     """Remove the records of jobs that Snakemake may not know to be outdated; return whether there is nothing to do."""
     from ..studies.runs import rerun
 
@@ -184,8 +204,9 @@ def _made_missing(studies: "list[Study]", chosen: dict[str, bool]) -> bool:
         done = done and found == {}
         for record, why in (found or {}).items():
             if rerun.is_damage(why):
-                click.echo(f"{why}; it is made again", err=True)
-            record.unlink()
+                click.echo(f"{why}; it is made again" if remove else f"{why}; a run makes it again", err=True)
+            if remove:
+                record.unlink()
     return done
 
 

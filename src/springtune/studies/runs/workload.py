@@ -13,6 +13,9 @@ from .plan import COSTS_FILE, Plan, usual_costs
 if TYPE_CHECKING:
     from ..config.model import Study
 
+READ: "list[tuple[Study, Plan]]" = []
+"""Studies that this process runs: the one that was asked for, and those that the paper reads besides."""
+
 PRESENTED = (1.5, 0.3)
 """Seconds of a job that makes no results of scenes, before one was measured: in any case, and for each of its files."""
 
