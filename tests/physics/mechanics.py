@@ -135,7 +135,8 @@ def rubber_forces(x, inverse, area, shear, bulk):
     if not np.any(bulk):
         nominal = shear[:, None, None] * (gradient - cofactor / (ratio**3)[:, None, None])
     else:
-        thickness = 1 / np.sqrt(ratio)
+        with np.errstate(invalid="ignore"):  # a cell that is turned inside out has no force: NaN
+            thickness = 1 / np.sqrt(ratio)
         for _ in range(40):  # Newton's method, its slope by the same formula
             volume = ratio * thickness
             power, sum_ = volume ** (-2 / 3), squares + thickness**2

@@ -15,7 +15,7 @@ from rows import CODE, STORED, STUDY, VERSIONS
 
 import springtune
 from springtune.studies.kinds.scenes import plan
-from springtune.studies.runs import dependencies, keys
+from springtune.studies.runs import dependencies, keys, records, rerun
 
 ROWS = STUDY | STORED
 
@@ -71,6 +71,20 @@ def fresh(tmp_path_factory, complete):
 def test_exactly_these_jobs_are_to_run(changed):
     run = driver.Run(changed.cores)
     assert {run.called(name) for name in run.due()} == set(changed.jobs.split())
+
+
+@pytest.mark.parametrize("changed", STORED, indirect=True)
+def test_springtune_run_makes_missing_what_snakemake_cannot_see(changed):
+    """Snakemake runs jobs whose record is missing or was of another digest, and those that come after them."""
+    run = driver.Run(changed.cores)
+    due = run.due()
+    for record in rerun.outdated(run.study, run.folder) or ():
+        record.unlink()
+    seen = [name for name, job in run.jobs.items() if records.fault(job.record, job.digest, ())]
+    after = set(seen)
+    for name in run.jobs:
+        after |= {name} if run.before(name) & after else set()
+    assert after == set(due)
 
 
 @pytest.mark.parametrize("changed", ["comment added", "printed table commented"], indirect=True)

@@ -26,11 +26,11 @@ class Campaign:
         """Names of the jobs that are to run, in order."""
         found = []
         for name, job in self.jobs.items():
-            if rerun.fault(job, self.jobs) or self._before(name) & set(found):
+            if rerun.fault(job, self.jobs) or self.before(name) & set(found):
                 found.append(name)
         return found
 
-    def _before(self, name):
+    def before(self, name):
         """Jobs that a job comes after."""
         if name not in self.plan.jobs:
             return {*self.plan.jobs} if name == rerun.COLLECT else {rerun.COLLECT}
