@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
-"""Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
-it comes with, to first order; that of central differences half a step earlier. `central-difference` takes damping in
-proportion to mass implicitly; dampers along springs lag by half a step in all of them."""
+"""Explicit schemes; they differ in the velocity.
+
+`symplectic-euler` gives it at the time of the displacements, to first order; central differences half a step before.
+`central-difference` takes mass damping implicitly; spring dampers lag by half a step in all schemes.
+"""
 
 IMPLICIT = ("backward-euler", "implicit-midpoint")
 """Implicit schemes: the first one in the manner of SOFA, one linear solve a step, the second one of second order."""
@@ -24,16 +26,10 @@ BEHAVIOURS = ("stable", "decaying", "growing", "nan")
 
 @dataclass(frozen=True)
 class BackwardEuler:
-    """The scheme ``backward-euler`` with options, in the place of its name.
+    """Options of the scheme ``backward-euler``, in place of its name.
 
-    Attributes
-    ----------
-    stiffness_damping : float
-        Rayleigh's beta [s].
-    iterations : int or None
-        Conjugate-gradient iterations of each step; each is solved by a factorization without.
-    tolerance : float
-        Relative residual at which they end earlier [1]; SOFA's default.
+    `stiffness_damping` is Rayleigh's beta [s]. `iterations` are conjugate-gradient iterations a step, or None to
+    factorize; `tolerance` is their relative residual, by default SOFA's.
     """
 
     stiffness_damping: float = 0.0

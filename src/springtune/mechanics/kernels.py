@@ -1,17 +1,16 @@
 r"""Compiled inner loops of explicit time steps.
 
-Both advance displacements u and velocities v by many steps of
+Displacements u and velocities v advance by many steps of
 
 .. math:: v \leftarrow d \, v + g \, (p - r(u) - c(v)), \qquad u \leftarrow u + h \, v
 
-with d given, and g for each direction: g holds the step over the mass, 0 where a direction is held, so that nothing is
-allocated or branched on. In single precision all arrays and numbers are single.
+with the step over the mass in g, 0 for held directions, so that nothing is allocated or branched on. In single
+precision all arrays and numbers are single.
 
-Particles are advanced in blocks, and a block by several steps before those far from it, so that its numbers stay in the
-cache of a core: step after step follows along the network at a distance of its bandwidth. So many steps are a pass;
-where there are several threads, they take passes in turns, and each follows the one before at that distance, too
-(pipelined temporal blocking, Wittmann, Hager and Wellein, 10.1109/IPDPSW.2010.5470813). What is computed, and the order
-in which the forces on a particle are summed, is the same for any number of threads and size of the blocks.
+Particles advance in blocks, a block by several steps (a pass) before distant ones, so that its numbers stay in a
+core's cache; steps follow each other at the distance of the bandwidth. Several threads take passes in turns
+(pipelined temporal blocking, Wittmann, Hager and Wellein, 10.1109/IPDPSW.2010.5470813). The results and the order of
+summation do not depend on threads or block size.
 """
 
 from collections.abc import Callable, Iterator
@@ -143,30 +142,16 @@ def advance_springs(
     depth: int,
     progress: np.ndarray,
 ) -> None:
-    """Steps of springs that keep their length law, each with a damper along it, in the passes of a thread.
+    """Advance springs with their length law and a damper each, in the passes of a thread.
 
-    A particle's force is whole, and nothing needs its displacement any more, when the springs are done whose other ends
-    have smaller numbers, and then its own. A block's springs are done in three loops, of which the second computes
-    several at once.
+    A particle is done after the springs to smaller numbers and then its own. A block takes three loops; the second is
+    vectorised.
 
-    Parameters
-    ----------
-    first, second : ndarray of int, shape (n_springs,)
-        Ends of the springs, in ascending order.
-    rest : ndarray, shape (2, n_springs)
-        Rest vectors [m].
-    lengths, stiffness, dampers : ndarray, shape (n_springs,)
-        Rest length [m], stiffness [1] and damping [s] over the reference stiffness; no dampers have length 0.
-    gain, load : ndarray, shape (n_points, 2)
-        g [s-1] and load [m].
-    keep, step : float
-        d [1] and step [s].
-    force : ndarray, shape (n_points, 2)
-        Loads, and loads again at the end [m].
-    room : ndarray, shape (4, most springs of a block)
-        Of the thread, for what is between the loops.
-    u, v : ndarray, shape (1, n_points, 2)
-        State [m, m/s].
+    `first`, `second` (n_springs,) are ends in ascending order; `rest` (2, n_springs) vectors [m]; `lengths` [m],
+    `stiffness` [1] and `dampers` [s] (n_springs,) over the reference stiffness, or no dampers (length 0). `gain`,
+    `load`, `force` (n_points, 2) are g [1/s] and loads [m]; `force` holds loads at start and end. `keep` is d [1],
+    `step` in s. `room` (4, most springs of a block) is a thread's scratch space; `u`, `v` (1, n_points, 2) the state
+    [m, m/s].
     """
     u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
     ax, ay, bx, by = room[0], room[1], room[2], room[3]
@@ -230,15 +215,10 @@ def advance_matrix(
     depth: int,
     progress: np.ndarray,
 ) -> None:
-    """Steps of a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
+    """Advance a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
 
-    Parameters
-    ----------
-    stiffness, dampers : ndarray, shape (n_entries,)
-        Entries [1] and [s]; no dampers have length 0.
-    gain, load : ndarray, shape (unknowns,)
-    u, v : ndarray, shape (2, unknowns) and (1 or 2, unknowns)
-        State, from one to the other in turns where there are two: v needs two if there are dampers.
+    `stiffness` [1] and `dampers` [s] are entries, shape (n_entries,), or no dampers (length 0); `gain`, `load`
+    (unknowns,). `u` (2, unknowns) and `v` (1 or 2, unknowns) alternate between two states; v needs two with dampers.
     """
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
     blocks, distance = _passes(count, size, depth, bandwidth)

@@ -62,13 +62,7 @@ class Moving(Protocol):
 def make_stepper(
     motion: Moving, integrator: str | BackwardEuler, step: float, precision: str = "float64", threads: int = 1
 ) -> Stepper:
-    """State of a run of one integrator.
-
-    Parameters
-    ----------
-    step : float
-        [s]
-    """
+    """Return the state of a run of one integrator; `step` in s."""
     if integrator in EXPLICIT:
         return ExplicitSteps(motion, integrator, step, precision, threads)
     if integrator == "implicit-midpoint":
@@ -98,10 +92,7 @@ class Stepper(ABC):
 
 
 class ExplicitSteps(Stepper):
-    """Compiled steps, of springs that keep their length law or of a linear network; others are taken in numpy.
-
-    Parameters are those of `make_stepper`.
-    """
+    """Explicit steps: compiled for springs with their length law or linear networks, else in numpy."""
 
     def __init__(self, motion: Moving, integrator: str, step: float, precision: str, threads: int) -> None:
         self.motion, self.step = motion, step
@@ -311,14 +302,9 @@ def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray |
 
 
 class BackwardEulerSteps(Stepper):
-    r"""One linear solve a step, as SOFA's EulerImplicitSolver does.
+    r"""One linear solve a step, as SOFA's EulerImplicitSolver does; `step` h in s.
 
     .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
-
-    Parameters
-    ----------
-    step : float
-        [s]
     """
 
     def __init__(self, motion: Moving, step: float, options: BackwardEuler) -> None:
@@ -354,13 +340,7 @@ class BackwardEulerSteps(Stepper):
 
 
 class MidpointSteps(Stepper):
-    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``.
-
-    Parameters
-    ----------
-    step : float
-        [s]
-    """
+    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``."""
 
     def __init__(self, motion: Moving, step: float) -> None:
         self.motion, self.step = motion, step

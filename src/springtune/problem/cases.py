@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
-    """Refuse a load case that a mesh does not have the groups for, or that leaves cells free to move.
+    """Refuse a load case whose groups a mesh lacks, or that leaves cells free to move.
 
     Examples
     --------

@@ -35,7 +35,7 @@ def shown_order(name: str, value: float) -> float:
 
 
 def with_unit(name: str, value: float, digits: int = 4) -> str:
-    r"""A value of a swept parameter as it is read, of words that stay on a line.
+    r"""Return a swept parameter's value with its unit, without line breaks.
 
     Examples
     --------

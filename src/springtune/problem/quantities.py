@@ -6,7 +6,7 @@ from difflib import get_close_matches
 
 
 def quantity(value: float | str, kind: str, name: str) -> float:
-    """Number in SI units of a text with its unit, or of a number that is in SI units already.
+    """Return the number in SI units of a text with its unit, or of a number in SI units.
 
     Examples
     --------
@@ -62,7 +62,7 @@ MOST_WORDS = 50
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """``did you mean ...?`` if one of the words is near, and all of them.
+    """Return ``did you mean ...?`` if one of the words is near, and all of them.
 
     Examples
     --------
