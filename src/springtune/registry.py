@@ -1,7 +1,7 @@
-"""Named things that are declared where they stand: a decorator adds each to a mapping that others read.
+"""Registries of named functions: a decorator adds each to a mapping.
 
-The mapping finds what the modules of a package declare by importing them all, when it is first read. So a new entry is
-one place: its function. Code outside the package adds its own with the same decorator.
+On first use the mapping imports all modules of a package to find what they declare. Code outside the package uses the
+same decorator.
 """
 
 import inspect
@@ -19,9 +19,9 @@ HOOKS = {"drawing": "studies.output.drawing", "writing": "handover.written"}
 
 
 def imported(name: str) -> Any:
-    """Import a module, or with ``module:name`` what it has by that name, from the package on.
+    """Import a module of the package, or with ``module:name`` an attribute of it.
 
-    All imports by text go through this function: commands, study kinds, stages, outputs, public names and hooks.
+    All imports by text use this function: commands, study kinds, stages, outputs, public names and hooks.
     """
     module, _, attribute = name.partition(":")
     found = import_module(f"springtune.{module}")
@@ -35,13 +35,7 @@ def hook(name: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """A function and the name by which studies know it.
-
-    Attributes
-    ----------
-    order : float
-        Place among the others, the smallest first; those of one place are sorted by name.
-    """
+    """Function with its name in studies; entries are sorted by `order`, then by name."""
 
     name: str
     function: Callable[..., Any]
@@ -82,10 +76,9 @@ class Registry(Mapping[str, Entry]):
         self._complete = False
 
     def declare(self, entry: Entry) -> None:
-        """Add an entry; what the decorators call.
+        """Add an entry; the decorators call it.
 
-        A function that is declared once more from the same place, as when a cell of a notebook runs again, replaces
-        the former one.
+        A function declared again from the same place, as in a notebook cell, replaces the former one.
         """
         if not (isinstance(entry.name, str) and NAME.fullmatch(entry.name)):
             raise ValueError(f"{self._what}: {entry.name!r} cannot name one; {NAME_RULE}")

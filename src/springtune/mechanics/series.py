@@ -140,7 +140,7 @@ class StablePath:
     # -- series of the load -----------------------------------------------------------------------------------------
 
     def _by_series(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """Return displacements by series, mainly about rest, where the latter is accurate, and the number of proved loads."""
+        """Return displacements by series, whether that about rest is accurate, and the number of proved loads."""
         self._rest = series = self.problem.rest
         values, errors = series.measure(self.weights, loads)
         if (errors > CURVE_TOLERANCE).any():

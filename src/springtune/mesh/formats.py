@@ -54,10 +54,10 @@ LONGEST_SAID = 120
 
 
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
-    """Write a mesh, with its groups if it has some; the file appears whole or not at all.
+    """Write a mesh atomically, with its groups.
 
-    Sides become lines and points vertices. In ``.vtu``, cell data of zeros and ones mark the cells of each group; in
-    ``.msh``, format 2.2 of Gmsh, groups are physical ones. `springtune.read_shape` reads both.
+    Sides become lines and points vertices. ``.vtu`` has cell data of zeros and ones for each group, ``.msh`` (Gmsh
+    format 2.2) physical groups. `springtune.read_shape` reads both.
     """
     if not isinstance(mesh, Mesh | GroupedMesh):
         raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
@@ -126,9 +126,9 @@ def _gmsh_tags(
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """Read a mesh of any format that meshio knows.
+    """Read a mesh of any format that meshio supports.
 
-    Particles that belong to no cell are left out, clockwise cells are turned.
+    Particles without cells are dropped, clockwise cells are turned.
 
     Parameters
     ----------
@@ -143,26 +143,14 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     Raises
     ------
     MeshError
-        If the file cannot be read, is too large, has cells other than linear triangles and quadrilaterals or none of
-        these, cells of points that it does not have, points that are nowhere or not in one plane, or cells without
-        area.
+        If the file is unreadable or too large, has no linear triangles or quadrilaterals or other cells, cells with
+        missing points, points that are not finite or not in one plane, or cells without area.
     """
     return assembled(path, file_content(path), unit)[0]
 
 
 def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
-    """Mesh of what meshio read, as of `read_mesh`.
-
-    Parameters
-    ----------
-    unit : float
-        Of the coordinates [m].
-
-    Returns
-    -------
-    used : ndarray of int, shape (n_points,)
-        Numbers of its particles in the file.
-    """
+    """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
     cells = _read_cells(path, content)
     used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
     with np.errstate(over="ignore"):  # what is too far away is refused
@@ -308,15 +296,7 @@ def _counter_clockwise(path: str | Path, points: np.ndarray, corners: np.ndarray
 
 
 def read_beam_mesh(path: str | Path, length: float, height: float, unit: float = 1.0) -> Mesh:
-    """Read a mesh that is to fill a box, and put its lower left corner at the origin.
-
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    unit : float, optional
-        Unit of the coordinates in the file [m].
-    """
+    """Read a mesh that must fill a box, and move its lower left corner to the origin; lengths in m."""
     mesh = read_mesh(path, unit)
     box = np.array([length, height])
     mesh = Mesh(mesh.points - mesh.points.min(axis=0), mesh.triangles, mesh.quads)

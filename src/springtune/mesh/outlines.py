@@ -98,9 +98,9 @@ def mesh_shape(
 ) -> GroupedMesh:
     """Mesh a shape.
 
-    Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn, with its
-    particles on the arc; where much shorter ones are near, edges are divided further. Named points are particles.
-    Inside, netgen places points so that triangles come out near-equilateral. Same input, same mesh.
+    Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn with
+    particles on the arc; edges are divided further near much shorter ones. Named points are particles. Inside, netgen
+    makes near-equilateral triangles. Same input, same mesh.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ def mesh_shape(
     size : float
         Length of edges [m].
     mesh_type : str, optional
-        ``"free"``: no other one meshes an outline.
+        Only ``"free"`` meshes an outline.
     refined : mapping of str to float, optional
-        Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
+        Shorter edges [m] at named groups of sides, points and parts; they grow from there.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def mesh_shape(
     Raises
     ------
     MeshError
-        If the shape is that of a file, the mesh type another one, a size absurd or no number, or netgen fails.
+        If the shape is a file's, the mesh type is another one, a size is absurd or not a number, or netgen fails.
     """
     what = f"shape '{shape.name}'"
     if not shape.rounds:

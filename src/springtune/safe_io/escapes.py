@@ -10,7 +10,7 @@ PUNCTUATION = re.compile(r"([^\w\s]|_)")
 
 
 def shown(text: object) -> str:
-    r"""Return a text as one line whose control characters can be read and do nothing.
+    r"""Return a text as one line with its control characters escaped.
 
     Examples
     --------
@@ -21,7 +21,7 @@ def shown(text: object) -> str:
 
 
 def rst(text: str) -> str:
-    r"""Return reStructuredText that says a text.
+    r"""Return a text escaped for reStructuredText.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def rst(text: str) -> str:
 
 
 def markdown(text: object) -> str:
-    r"""Return Markdown that says a text, also in a cell of a table.
+    r"""Return a text escaped for Markdown, also in tables.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def markdown(text: object) -> str:
 
 
 def no_mathematics(text: str) -> str:
-    r"""Return a text of a figure in which a dollar sign is one.
+    r"""Return a figure's text with its dollar signs escaped.
 
     Examples
     --------
