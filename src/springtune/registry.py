@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 HOOKS = {"drawing": "studies.output.drawing", "writing": "handover.written"}
-"""Modules of upper rooms that lower ones call: they are found by name, so that no result depends on them."""
+"""Modules of upper layers that lower ones call by name, so that no result depends on them."""
 
 
 def imported(name: str) -> Any:
@@ -68,7 +68,7 @@ NAME_RULE = (
 
 
 class Registry(Mapping[str, Entry]):
-    """Read-only mapping from names to what was declared, in order; the modules of a package are read when needed."""
+    """Read-only ordered mapping from names to declared entries; imports the package's modules when needed."""
 
     def __init__(self, package: str, what: str):
         self._package, self._what = package, what
@@ -97,7 +97,7 @@ class Registry(Mapping[str, Entry]):
         self._entries = {one.name: one for one in sorted(entries, key=lambda one: (one.order, one.name))}
 
     def discard(self, name: str) -> None:
-        """Take out what code outside the package declared; nothing happens where there is no such name."""
+        """Remove what code outside the package declared; unknown names are ignored."""
         self._entries = {one: entry for one, entry in self._entries.items() if one != name}
 
     def _discover(self) -> None:

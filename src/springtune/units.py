@@ -148,7 +148,7 @@ def _article(kind: str) -> str:
 
 
 def _measure(unit: str) -> tuple[str, Decimal] | None:
-    """Kind and size in SI units of a unit; None where nobody knows it."""
+    """Return kind and size in SI units of a unit; None if unknown."""
     return _KNOWN.get(unit) or _ask_pint(unit)
 
 
@@ -160,7 +160,7 @@ def _registry() -> "pint.UnitRegistry[float]":
 
 
 def _plain(unit: str) -> bool:
-    """Whether a unit has no powers of numbers or of powers: pint would work out ``9^9^9^9``."""
+    """Return whether a unit has no nested or numeric powers: pint would evaluate ``9^9^9^9``."""
     tokens = _TOKEN.findall(unit)
     exponent = False  # whether the token before is a power, but for its sign
     for before, token in zip(["", *tokens], tokens):

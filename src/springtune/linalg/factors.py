@@ -15,7 +15,7 @@ from scipy.sparse import csc_array, sparray
 from scipy.sparse.linalg import splu
 
 CHOLESKY = find_spec("cvxopt") is not None and os.environ.get("SPRINGTUNE_SOLVER") != "superlu"
-"""Whether CHOLMOD is there, and taken where no solver is named."""
+"""Whether CHOLMOD is available and the default."""
 
 SUPERLU: dict[str, Any] = {"relax": 4, "panel_size": 4, "options": {"SymmetricMode": True}}
 """Sizes of SuperLU's panels: for these matrices its own are a quarter slower."""
@@ -26,7 +26,7 @@ class SingularError(ArithmeticError):
 
 
 class Factor(Protocol):
-    """What solves systems of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`."""
+    """Solver of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`."""
 
     name: str
 
@@ -40,11 +40,11 @@ class Factor(Protocol):
         ...
 
     def step(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where it is a step of Newton's method that is asked for."""
+        """As `solve`, for a step of Newton's method."""
         ...
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where an estimate would do."""
+        """As `solve`, but only an estimate."""
         ...
 
 

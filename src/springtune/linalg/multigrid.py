@@ -14,7 +14,7 @@ RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
 
 STEP_RESIDUAL = 1e-6
-"""The same of a step of Newton's method, whose tangent leaves more."""
+"""The same for a step of Newton's method."""
 
 MAX_CG_ITERATIONS = 300
 
@@ -32,17 +32,17 @@ COARSEST = 500
 """Unknowns below which the coarsest matrix is factorized, as a dense one."""
 
 MOST_BORROWED = 50
-"""Iterations with the grids of another matrix from which on those of its own take less time."""
+"""Iterations with another matrix's grids above which building own grids is faster."""
 
 IN_LINE = 1e-14
-"""Determinant of a particle's own stiffness, over the product of its two diagonal entries, that is but rounding."""
+"""Determinant of a particle's own stiffness over the product of its diagonal that counts as rounding."""
 
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
 
 class NotPositiveError(SingularError):
-    """Conjugate gradients came to no end."""
+    """Conjugate gradients did not converge."""
 
 
 class IndefiniteError(NotPositiveError):
@@ -131,7 +131,7 @@ class Multigrid:
         return self._direct
 
     def _precondition(self, right: np.ndarray) -> np.ndarray:
-        """What a cycle makes of a right-hand side."""
+        """Apply a multigrid cycle to a right-hand side."""
         size = np.linalg.norm(right) or 1.0
         single = np.multiply(right, 1.0 / size, out=np.empty(len(right), dtype=np.float32), casting="same_kind")
         return np.multiply(self._cycle(0, single), size, dtype=float)
@@ -207,7 +207,7 @@ class Multigrid:
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
 
     def _check_particles(self) -> None:
-        """Refuse a matrix in which a particle alone moves without any stiffness: all its springs are in one line."""
+        """Refuse a matrix with a particle that moves without stiffness: all its springs are in one line."""
         stiffness, coupling = self._matrix.diagonal(), self._matrix.diagonal(1)
         x = np.flatnonzero(np.diff(self._places // 2) == 0)  # of particles that are free along y, too
         both = stiffness[x] * stiffness[x + 1]

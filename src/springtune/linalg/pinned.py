@@ -18,7 +18,7 @@ from scipy.sparse import csc_array
 from .factors import Analysis, CholeskyFactor
 
 CLEAR = 100.0
-"""Least eigenvalue of T, in size, over its error from which on its sign counts."""
+"""Smallest ratio of an eigenvalue of T to its error for which its sign counts."""
 
 BACKWARD_ERROR = 1e-15
 """Residual over what rounding of the solution makes of it, above which a solve is corrected."""

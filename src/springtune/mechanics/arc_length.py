@@ -12,13 +12,13 @@ from .network import Network
 from .statics import StaticProblem
 
 NEARLY_STRAIGHT = 0.02
-"""Most by which the tangent at 0.4 of a buckling load moves that load, relative, where a column is nearly straight."""
+"""Largest relative change of a buckling load by the tangent at 0.4 of it, for a nearly straight column."""
 
 INCREMENT, MOST_INCREMENTS = 0.05, 20
 """Increment of a path to its buckling load, over the displacements of a straight one there, and how many at most."""
 
 BENDS = "nothing bifurcates: the path bends before; this is the load of the nearly perfect column, about rest"
-"""Message of a buckling load that no path has."""
+"""Message for a path without a buckling load."""
 
 
 @dataclass(frozen=True)

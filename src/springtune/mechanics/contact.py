@@ -38,7 +38,7 @@ STRAIGHT = 1e-6
 """Sine of the angle below which two edges are taken for one line."""
 
 JOINT = 1e-6
-"""Distance from the joint of two edges within which a corner is at it, over the mesh size."""
+"""Distance from the joint of two edges at which a corner counts as being there, over the mesh size."""
 
 LONGEST_WAY = 0.5
 """Longest way of a particle in one Newton step, over the mesh size."""
@@ -52,13 +52,13 @@ SMALLEST_LOAD_STEP = 1e-4
 """Smallest step of the load [1]."""
 
 SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
-"""Resistance to any motion that is tried in turn to make a tangent definite, over its mean diagonal."""
+"""Diagonal shifts tried in turn to make a tangent definite, over its mean diagonal."""
 
 GAP = 1e-9
-"""Depth of a corner behind an edge that counts as none, over the mesh size."""
+"""Depth of a corner behind an edge that counts as zero, over the mesh size."""
 
 COMPLIANCE = 1e-11
-"""Of a contact beside the bodies' own at it [1]."""
+"""Compliance added at a contact, over the bodies' own [1]."""
 
 EXCHANGES = 30
 """How often a set of closed contacts is exchanged before non-negative least squares look for it."""
@@ -67,7 +67,7 @@ CHANGES = 4
 """How often a Newton step may change which contacts it takes for closed."""
 
 FRICTION_TOLERANCE = 1e-6
-"""As `CONTACT_TOLERANCE`, where friction lags a step behind."""
+"""As `CONTACT_TOLERANCE`, with friction, which lags a step behind."""
 
 SLIP = 1e-3
 """Slip over which friction grows to its limit, over the mesh size; what sticks creeps by about as much a load step."""
@@ -506,7 +506,7 @@ class Contact:
         return None
 
     def _known(self, contacts: Contacts) -> np.ndarray:
-        """Contact forces of the step before on the corners that are still near [N], shape (n_contacts,)."""
+        """Return the last step's contact forces on corners still near [N], shape (n_contacts,)."""
         old = self.contacts
         if old is None:
             return np.zeros(len(contacts.gaps))
@@ -515,7 +515,7 @@ class Contact:
         return np.array([forces.get(key, 0.0) for key in keys])
 
     def _turning(self, contacts: Contacts, forces: np.ndarray) -> list[csc_array | None]:
-        """Stiffness of the contact forces as the edges turn that they act on: the curvature of the gaps, by body."""
+        """Return the stiffness of contact forces as their edges turn, by body: the curvature of the gaps."""
         parts: list[csc_array | None] = [None] * len(self.bodies)
         for number, body in enumerate(self.bodies):
             met = np.flatnonzero((contacts.targets == number) & (forces > 0))

@@ -9,29 +9,29 @@ from .network import Network
 from .newton import TOLERANCE
 
 BEYOND = 0.25
-"""First increment beyond the last load step, over that step, which is the longest one."""
+"""First increment beyond the last load step, over that step."""
 
 MOST_BEYOND = 24
-"""Points of a path beyond the last load step that are looked at for a limit point."""
+"""Most points beyond the last load step in search of a limit point."""
 
 SHORTEST_BEYOND = 1e-6
 """Shortest increment beyond the last load step, over that step."""
 
 SHORTEST_INVERTED = 1e-3
-"""Shortest increment to a place where a cell turns inside out, over that step."""
+"""Shortest increment to a place where a cell inverts, over that step."""
 
 NEARLY = 1e-3
-"""Load below a limit point, over it, that may be above it all the same: the limit point is estimated."""
+"""Relative distance below a limit point, which is only estimated, at which a load may lie above it."""
 
 MOST_BEHIND = 60
-"""Points of a path behind a limit point that are looked at for a stable one that carries the load."""
+"""Most points behind a limit point in search of a stable one that carries the load."""
 
 FEW, MANY = 3, 8
 """Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
 
 
 class Continued(Protocol):
-    """What has a path: a network under a load, as `springtune.mechanics.statics.StaticProblem`."""
+    """Problem with an equilibrium path, such as `springtune.mechanics.statics.StaticProblem`."""
 
     network: Network
     load_norm: float
@@ -40,10 +40,10 @@ class Continued(Protocol):
         """Load pattern at displacements."""
 
     def rate(self, displacements: np.ndarray) -> np.ndarray:
-        """As `load_at`, with what prescribed displacements pull as they grow."""
+        """As `load_at`, with the forces of growing prescribed displacements."""
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with those that are prescribed at a load in their places."""
+        """Displacements with those prescribed at a load inserted."""
 
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
         """Factor of the tangent of resistance less load."""

@@ -29,7 +29,7 @@ from .statics import StaticProblem
 from .stepping import make_stepper
 
 CHECK = 64
-"""Steps between looks at an explicit run: a look costs about two steps, one for rest some twenty."""
+"""Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
 
 BLOWN_UP = 1e3
 """Displacement over the largest of the network's extents beyond which a run has left its model."""
@@ -247,7 +247,7 @@ class Motion:
         return float(np.sqrt(squares[int(np.argmax(shares))]))
 
     def critical(self) -> "Motion":
-        """As it is, with damping in proportion to mass that is critical for the lowest loaded mode."""
+        """The same motion with critical mass damping of the lowest loaded mode."""
         return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
 
     # -- mechanics --------------------------------------------------------------------------------------------------
@@ -343,7 +343,7 @@ class Motion:
     def _end(
         self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int
     ) -> tuple[str, str] | None:
-        """Status and message of a run that came to nothing; None where it may go on."""
+        """Status and message of a failed run; None if it may go on."""
         size = np.abs(u).max()
         if not np.isfinite(size) or size > self._farthest or not np.isfinite(v).all():
             return "diverged", self._why(integrator, step, done)
@@ -366,7 +366,7 @@ class Motion:
         return status, message
 
     def _moving_end(self, u: np.ndarray, rest: float | None, steps: int) -> tuple[str, str]:
-        """Status and message of a run whose steps are all done."""
+        """Status and message after the last step of a run."""
         if self.network.inverted(u):
             return self._inverted_end(steps)
         if rest is None:

@@ -91,18 +91,18 @@ class Energy(ABC):
         return tangent.reshape(count, 2 * corners, 2 * corners)
 
     def objection(self, displacements: np.ndarray) -> str:
-        """What there is against its answer at displacements [m] of shape (n_points, 2); empty where nothing is."""
+        """Why the answer at displacements (n_points, 2) [m] is doubtful, or an empty string."""
         return ""
 
     @property
     def key(self) -> bytes:
-        """Bytes that tell energies of one mesh apart."""
+        """Bytes that distinguish energies of one mesh."""
         moduli = (np.ascontiguousarray(part).tobytes() for part in self._moduli())
         return type(self).__name__.encode() + self._cells + b"".join(moduli)
 
     @cached_property
     def _cells(self) -> bytes:
-        """Digest of the cells, which need not be all of the mesh."""
+        """Digest of the cells, which may be a part of the mesh."""
         return sha256(np.ascontiguousarray(self.corners).tobytes()).digest()
 
     @property
@@ -329,7 +329,7 @@ class _SheetEnergy(Energy):
         return 0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0)
 
     def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-        """Derivatives of D and of J by each corner's position [1/m], and the law; what is inside out is NaN."""
+        """Derivatives of D and of J by each corner's position [1/m], and the law; NaN for inverted triangles."""
         moved = moved - moved[:, :1]
         area, (along, across) = self._rest_area, self._rest_slopes
         first, second = self._apart(moved)
@@ -406,7 +406,7 @@ class YeohEnergy(_SheetEnergy):
         return self.coefficients, np.array(self.largest)
 
     def objection(self, displacements: np.ndarray) -> str:
-        """As of `Energy`: how many triangles are stretched beyond the data."""
+        """As of `Energy`: the number of triangles stretched beyond the data."""
         if not np.isfinite(self.largest).any():
             return ""
         with np.errstate(invalid="ignore"):
@@ -438,7 +438,7 @@ class YeohEnergy(_SheetEnergy):
 
 
 HALVED = np.log(0.5)
-"""Logarithm of the least volume that `NeoHookeEnergy` has an equilibrium across the sheet for."""
+"""Logarithm of the smallest volume with an equilibrium across the sheet in `NeoHookeEnergy`."""
 
 MOST_ITERATIONS = 60
 """Steps of Newton's method, or halvings, for the volume of a cell: a handful are taken."""

@@ -15,7 +15,7 @@ from ..linalg.factors import Factor
 from .network import Network
 
 ORDER = 14
-"""Order of a series that gives a whole curve, as a rule."""
+"""Default order of a series for a whole curve."""
 
 STEP = 1e-3
 """Difference of two approximants over the way from the point that ends a step along the path."""
@@ -71,7 +71,7 @@ class Expansion:
         self._extend(order)
 
     def extended(self, order: int) -> "Expansion":
-        """The series up to a higher order; this one stays what it is, for whoever else has it."""
+        """Return the series up to a higher order; this one does not change."""
         longer = copy(self)
         longer._extend(order)
         return longer

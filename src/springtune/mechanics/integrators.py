@@ -1,4 +1,4 @@
-"""Names of time integrators, options of one of them, and what a run makes of noise."""
+"""Time integrators: their names, options and numerical behaviour."""
 
 from dataclasses import dataclass
 
@@ -10,18 +10,18 @@ EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference
 """
 
 IMPLICIT = ("backward-euler", "implicit-midpoint")
-"""Implicit schemes: the first one in the manner of SOFA, one linear solve a step, the second one of second order."""
+"""Implicit schemes: SOFA's with one linear solve a step, and one of second order."""
 
 INTEGRATORS = (*EXPLICIT, *IMPLICIT)
 
 LAGGED = ("symplectic-euler", "central-difference-lagged")
-"""Schemes in which all damping lags, and narrows the step."""
+"""Schemes in which all damping lags, which reduces the stable step."""
 
 PRECISIONS = ("float64", "float32")
 """Floating-point numbers that explicit schemes compute in."""
 
 BEHAVIOURS = ("stable", "decaying", "growing", "nan")
-"""Meanings of the flags of ``behaviour``: what a run makes of noise."""
+"""Meanings of the flags of ``behaviour``: how a run treats noise."""
 
 
 @dataclass(frozen=True)

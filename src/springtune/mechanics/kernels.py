@@ -22,14 +22,14 @@ from numba import config, njit, types
 from numba.extending import intrinsic
 
 PATIENCE = 1000
-"""Looks at another thread, some microseconds, after which a waiting thread lets others have its core."""
+"""Checks of another thread, some microseconds, before a waiting thread yields its core."""
 
 STRIDE = 8
-"""Numbers of a thread in what tells its progress: a line of the cache, which no other thread writes."""
+"""Array entries between progress counters of threads: a cache line, against false sharing."""
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiled when first called, and kept on disk where there is a place to write."""
+    """Compile on the first call, and cache on disk if possible."""
     try:
         return njit(cache=True, error_model="numpy", nogil=True)(function)
     except RuntimeError:  # no folder to keep it in
@@ -38,7 +38,7 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextmanager
 def packed() -> Iterator[None]:
-    """Context in which what numba compiles computes both coordinates at once, in less time, with the same digits."""
+    """Context in which numba vectorises both coordinates: faster, with the same digits."""
     options: Any = config
     before = options.SLP_VECTORIZE
     options.SLP_VECTORIZE = 1
@@ -69,15 +69,15 @@ def _acquire(context: Any, array: Any) -> Any:
 
 
 _tell: Any = intrinsic(_release)
-"""Write the first number of an array after all that was written before."""
+"""Store the first number of an array after all previous writes (release)."""
 
 _told: Any = intrinsic(_acquire)
-"""Read the first number of an array before all that is read after."""
+"""Load the first number of an array before all later reads (acquire)."""
 
 
 @_compiled
 def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: int, distance: int) -> bool:
-    """Wait until the pass before is so many blocks ahead; false where it never will."""
+    """Wait until the pass before is so many blocks ahead; False if it never will be."""
     threads = len(progress) - 1
     if threads == 1 or number == 0:
         return True

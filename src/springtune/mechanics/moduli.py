@@ -28,7 +28,7 @@ from .energies import Energy
 from .network import Network
 
 EVEN = 1e-6
-"""What a strip's length may differ by, over its extent: coordinates from files have few digits [1]."""
+"""Tolerance of a strip's length over its extent [1]: coordinates from files have few digits."""
 
 
 class Elastic(Protocol):
@@ -207,7 +207,7 @@ class PatchTest:
 
     @cached_property
     def _free_body(self) -> tuple[np.ndarray, np.ndarray]:
-        """Directions held, none but the rigid motions', and forces of three even stresses, shape (3, n_points, 2)."""
+        """Directions held against rigid motions alone, and forces of three even stresses, shape (3, n_points, 2)."""
         return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in UNIT_STRESSES])
 
     def compliance(self, springs: Elastic) -> np.ndarray:

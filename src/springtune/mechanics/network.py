@@ -22,10 +22,10 @@ from .follower import FollowerPressure
 from .pattern import Pattern
 
 LARGE = 200_000
-"""Unknowns beyond which multigrid takes the place of SuperLU: there it is as fast, and takes a third of the memory."""
+"""Unknowns above which multigrid replaces SuperLU: as fast there, with a third of the memory."""
 
 LARGEST = 600_000
-"""Unknowns beyond which it takes the place of a Cholesky factorization, too: it is faster there, in half the memory."""
+"""Unknowns above which multigrid also replaces Cholesky: faster there, with half the memory."""
 
 FACTORIZED = 2_500_000
 """Unknowns up to which Cholesky (2 kB an unknown) replaces multigrid that does not converge.
@@ -138,7 +138,7 @@ class Network:
         return resistance
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
-        """As `resistance`, of held directions, too [m], shape (n_points, 2)."""
+        """As `resistance`, with held directions [m], shape (n_points, 2)."""
         total = np.zeros(self.held.shape)
         if self.has_springs:
             total -= self._pattern.sum_springs(self._pulls(displacements))
@@ -189,11 +189,11 @@ class Network:
         return np.finfo(float).eps * self.reduce(total)
 
     def linear_resistance(self, displacements: np.ndarray) -> np.ndarray:
-        """As `resistance`, of a network that is linear in the displacements."""
+        """As `resistance`, with linear kinematics."""
         return self.reduce(self.linear_forces(displacements))
 
     def linear_forces(self, displacements: np.ndarray) -> np.ndarray:
-        """Forces with which a linear network resists, of held directions, too [m], shape (n_points, 2)."""
+        """Forces of a linear network against displacements, with held directions [m], shape (n_points, 2)."""
         normals = self.rest_vectors / self.rest_lengths[:, None]
         apart = self.stretch(displacements)
         pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
@@ -286,7 +286,7 @@ class Network:
 
     @cached_property
     def _loose(self) -> str:
-        """Which body is free to move, of those that neither springs nor energies join, and how; empty if none is."""
+        """Which separate body is free to move, and how; or an empty string."""
         edges, whole = self.mesh.edges, self.energies or self.stiffness.all()
         try:
             check_held(self.mesh.points, edges if whole else edges[self.stiffness != 0], self.held, "the network")
@@ -320,7 +320,7 @@ class Network:
         return self._pinned(matrix) if self._indefinite and not tried else factor
 
     def _pinned(self, matrix: csc_array) -> Factor | None:
-        """Cholesky's factor with pins; None where they do not hold it, and where it needs none."""
+        """Return Cholesky's factor with pins; None if they do not suffice, or are not needed."""
         from ..linalg.pinned import factorize_pinned  # here: few networks are unstable
 
         factor = factorize_pinned(matrix, self._pattern.analysis, self._pattern.pins)

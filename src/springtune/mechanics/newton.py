@@ -1,4 +1,4 @@
-"""Newton's method for one equilibrium of a network, and how far its answer can be trusted."""
+"""Newton's method for one equilibrium of a network, with an error estimate."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ REFINED = 1e-9
 """Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
 
 REPRESENTATION = 4.0
-"""Residual that counts as balance, over what rounding of the displacements alone makes of it."""
+"""Residual that counts as balance, over that of rounding the displacements."""
 
 WATCHED = 4
 """Steps in a row that may leave the residual above its minimum: a slender turning beam stretches and releases."""
 
 LONGEST_STEP = 0.5
-"""Largest change of a spring's vector over its length in such a step."""
+"""Largest change of a spring's vector over its length in a watched step."""
 
 KEEP_TANGENT = 0.03
-"""Share of the residual that a step may leave for its tangent to serve once more."""
+"""Largest factor on the residual in a step for which the tangent is reused."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Iterate(NamedTuple):
 
 
 class Balance(Protocol):
-    """What is solved: a network under a load, as `springtune.mechanics.statics.StaticProblem`."""
+    """Problem to solve, such as `springtune.mechanics.statics.StaticProblem`."""
 
     network: Network
     load: np.ndarray
@@ -99,7 +99,7 @@ class Balance(Protocol):
         """Factor of the tangent of resistance less load."""
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with those that are prescribed."""
+        """Displacements with the prescribed ones inserted."""
 
 
 class Newton:
@@ -147,7 +147,7 @@ class Newton:
         return Iterate(displacements, *self.problem.balance(self.s, displacements))
 
     def _balanced(self) -> bool:
-        """Whether the residual is within the tolerance, or what rounding of the displacements alone makes of it."""
+        """Return whether the residual is within the tolerance, or that of rounding the displacements."""
         displacements, _, residual = self._here
         if residual <= TOLERANCE:
             return True
@@ -155,7 +155,7 @@ class Newton:
         return residual * abs(self.s) * self.problem.load_norm <= REPRESENTATION * norm(rounding)
 
     def _iterate(self) -> str:
-        """Take a step, or decide to take another one; why none can be taken, empty where one can."""
+        """Take or reject a step; return why none can be taken, or an empty string."""
         if not self._keep:
             if self._factorizations == self.max_factorizations:
                 return "too many iterations"
@@ -201,7 +201,7 @@ class Newton:
         return None
 
     def _refined(self) -> Equilibrium:
-        """The equilibrium found, refined where its estimated error is large, with the tangent there."""
+        """Return the equilibrium with the tangent there, refined if its estimated error is large."""
         here, self._factor = self._here, None
         try:
             self._factor = self.problem.factorize_tangent(self.s, here.displacements)
@@ -252,7 +252,7 @@ def refine(
 
 
 def uncertainty(error: float) -> str:
-    """Why a solution of this estimated error is not good; empty where it is."""
+    """Return why a solution of this estimated error is refused, or an empty string."""
     return "" if error <= CORRECTION else f"ill-conditioned: {error:.1e} of the displacements is uncertain"
 
 

@@ -16,7 +16,7 @@ DISSECTED = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
 
 PIN_PARTICLES = (8, 32)
-"""Particles that are pinned where the matrix is indefinite: so many, or so many where these do not hold it."""
+"""Particles to pin in an indefinite matrix; the second number is tried if the first fails."""
 
 
 class Pattern:
@@ -70,7 +70,7 @@ class Pattern:
         return indices, pointers, entries.data.astype(np.int64)
 
     def moved(self, mesh: Mesh) -> "Pattern":
-        """The same of a mesh with the same cells at other points; what depends on where these are is found anew."""
+        """Return the pattern of a mesh with the same cells at other points."""
         found = copy(self)
         found.mesh = mesh
         for name in ("order", "elimination", "pins", *(["analysis"] if self.size > DISSECTED else [])):
@@ -90,7 +90,7 @@ class Pattern:
 
     @cached_property
     def analysis(self) -> Analysis:
-        """Symbolic Cholesky factorization; in an order of CHOLMOD's own where ours would not gain what it costs."""
+        """Symbolic Cholesky factorization; in CHOLMOD's own order for meshes too small for nested dissection."""
         return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
 
     @cached_property
@@ -115,7 +115,7 @@ class Pattern:
         return order, numbered.data.astype(np.int64), indices, pointers
 
     def _codes(self, particles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which entries of the matrices of groups of particles are kept, and one number for the place of each."""
+        """Return which entries of groups' matrices are kept, and one number for each one's place."""
         local = self.number[particles].reshape(len(particles), -1)
         width = local.shape[1]
         rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()

@@ -22,7 +22,7 @@ WAY_ORDER = 10
 """Order of a series along the path."""
 
 MAX_SERIES = 3
-"""Series of the load, that about rest with them."""
+"""Most series in the load, including that about rest."""
 
 MAX_CORRECTIONS = 4
 """Steps of Newton's method with one tangent that bring a prediction to an equilibrium."""
@@ -34,16 +34,16 @@ MAX_STEPS = 60
 """Steps along the path beyond the series about rest."""
 
 LIMIT = 1e-3
-"""Share of the load that a path may still rise to a limit point where it is left."""
+"""Share of the load by which a path may still rise to a limit point when it is abandoned."""
 
 GROWTH = 8
 """Power of the way along a series with which its error is taken to grow; that of order 10 grows faster."""
 
 MAX_STEP_HALVINGS = 6
-"""Of a step at whose end there is no stable equilibrium."""
+"""Most halvings of a step whose end is not a stable equilibrium."""
 
 FEW_FACTORIZATIONS = 5
-"""Of a solve from a prediction: from near the path one or two do."""
+"""Most factorizations of a solve from a prediction; one or two suffice near the path."""
 
 NEAR = 0.02
 """Distance of a spring's vector from its prediction, over its length, beyond which a solve found another path."""
@@ -130,7 +130,7 @@ class StablePath:
         self.values, self.stable = values[places], stable[places]
 
     def value(self, s: float) -> float:
-        """Weighted displacement [m] at a load [m] on the stable path; NaN where it does not get there."""
+        """Return the weighted displacement [m] at a load [m] on the stable path, or NaN beyond it."""
         load = abs(s)
         series = self._series_of(load)
         if series is None:
@@ -175,7 +175,7 @@ class StablePath:
     def _proved(
         self, series: Expansion, loads: np.ndarray, values: np.ndarray, served: np.ndarray
     ) -> tuple[int, _Point | None]:
-        """How many loads in a row a series serves, proved by the point at the last of them; and that point."""
+        """Return how many successive loads a series serves, and the corrected point at the last of them."""
         number = len(served) if served.all() else int(np.argmin(served))
         while number > 0:
             point = self._point(series, loads[number - 1], values[number - 1])
@@ -281,7 +281,7 @@ class StablePath:
                 stable[place] = np.isfinite(values[place])
 
     def _check_others(self, loads: np.ndarray, values: np.ndarray, good: np.ndarray, found: np.ndarray) -> None:
-        """Keep values of the series about rest beyond the stable path: of equilibria, though not of that path."""
+        """Keep series values beyond the stable path: equilibria, though not on that path."""
         rest, others = self._rest, np.flatnonzero(good & ~found)
         for group in np.split(others, np.flatnonzero(np.diff(others) > 1) + 1):
             while len(group):
@@ -313,14 +313,14 @@ class StablePath:
                 return
 
     def _elsewhere(self, s: float) -> bool:
-        """Whether the series about rest is by now of another path, which the beam would leave."""
+        """Return whether the series about rest now follows another, unstable path."""
         network, displacements = self.problem.network, self._rest.at(s)[1]
         missing = s * self.problem.load - network.resistance(displacements)
         near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
         return near and not network.is_stable(displacements)
 
     def _reach(self, load: float) -> float:
-        """Weighted displacement at a load beyond the series; NaN where the stable path does not get there."""
+        """Return the weighted displacement at a load beyond the series, or NaN off the stable path."""
         while self.stable_to < load and not self.end:
             self._advance(load)
         if load > self.stable_to:

@@ -26,26 +26,29 @@ FAR = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
 
 TURNED = 0.3
-"""Change of a spring's vector over its length, turns included, beyond which it is, too."""
+"""Change of a spring's vector over its length above which this applies too."""
 
 UNSNAPPED = 1e-3
 """Change of a spring's vector over its length below which no path turns back."""
 
 SURPRISE = 0.1
-"""Distance of a spring's vector from where it was expected, over its length, beyond which a load step is halved."""
+"""Distance of a spring's vector from its prediction, over its length, above which a load step is halved."""
 
 SMALLEST_STEP = 1 / 64
 """Load step in which Newton's method has to converge, over the load."""
 
 SHORTEST = 1 / 2048
-"""Load step down to which springs that turn fast are told from springs that snap."""
+"""Smallest load step that distinguishes springs that turn fast from springs that snap."""
 
 BENT = 0.1
-"""Distance of the middle of a parabola from that of the straight way, over its length, up to which it is taken."""
+"""Largest distance of a parabola's middle from the straight way's, over its length, to use it."""
 
 FORESEEN, SLACK = 0.25, 0.02
-"""Distance of an equilibrium from a guess over the way to it, and work of the forces out of balance in the middle of
-that way over the load's, below which no snap can lie on the way: of 153 snaps of arches the least are 0.35 and 0.05."""
+"""Limits below which no snap can lie on the way to an equilibrium.
+
+Its distance from a guess over the way to it; and the work of out-of-balance forces in the middle of the way over the
+load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05.
+"""
 
 WAY = 8
 """Increments of a path behind a limit point, over the straight way from there to a stable equilibrium."""
@@ -57,7 +60,7 @@ MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
 
 HIGH_ORDER = 16
-"""Order of a series that the rule does not serve."""
+"""Order of a series if the default order fails."""
 
 START_ORDER = 3
 """Orders of the series that starts Newton's method: together they cost half of a factorization."""
@@ -144,7 +147,7 @@ class StaticProblem:
 
     @cached_property
     def long_rest(self) -> Expansion:
-        """As `rest`, for a curve that it does not serve."""
+        """As `rest`, of higher order."""
         return self.rest.extended(HIGH_ORDER)
 
     def linear(self, s: float) -> Equilibrium:
@@ -278,7 +281,7 @@ class StaticProblem:
         return not self.network.inverted(displacements) and self.network.is_stable(displacements, self._follower_at(s))
 
     def _unstable(self, s: float, found: Equilibrium) -> bool:
-        """Whether a path leaves an equilibrium; flutter on the way is no matter of where it leads."""
+        """Return whether a path leaves an equilibrium; flutter does not count."""
         assert found.factor is not None  # of what converged
         try:
             return self.stability(s, found.displacements, found.factor)[0] > 0
@@ -299,7 +302,7 @@ class StaticProblem:
 
     @cached_property
     def _free(self) -> Network:
-        """The network with nothing held."""
+        """The network without held directions."""
         network, none = self.network, np.zeros(self.network.held.shape, dtype=bool)
         return Network(network.mesh, none, network.stiffness, network.energies)
 
@@ -312,7 +315,7 @@ class StaticProblem:
         return load - self.network.reduce(pull.reshape(self.given.shape))
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements [m] with those that are prescribed at ``s`` in their places, shape (n_points, 2)."""
+        """Displacements [m], shape (n_points, 2), with those prescribed at ``s`` inserted."""
         return displacements if self.given is None else np.where(self.network.held, s * self.given, displacements)
 
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
@@ -385,7 +388,7 @@ class StaticProblem:
                 step *= 0.5
 
     def _snaps(self, s: float, direct: Equilibrium, here: float, last: np.ndarray, before: np.ndarray) -> bool:
-        """Whether a path that turns back beyond a load comes to a stable equilibrium under the whole one."""
+        """Return whether a path that turns back beyond a load regains the whole load in a stable equilibrium."""
         if not direct.converged or self._unstable(s, direct):
             return False
         way = float(np.linalg.norm(self.network.reduce(direct.displacements - last)))

@@ -1,4 +1,4 @@
-"""How a network in motion advances: one class of steps for each kind of integrator."""
+"""Time steps of a network in motion: one class for each kind of integrator."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FEWEST = 5000
 """Springs, or entries of a matrix, of a thread: with fewer, threads cost more than they save."""
 
 ROWS_AT_ONCE = 256
-"""Rows that are advanced at once: what is between the loops stays next to the processor."""
+"""Rows advanced at once, so that data between the loops stay in the cache."""
 
 CACHE = 2**19
 """Bytes that a thread may expect to keep near its core."""
@@ -31,7 +31,7 @@ DEEPEST_PASS = 8
 
 
 class Moving(Protocol):
-    """What advances: a network with masses and dampers under a load, as `springtune.mechanics.dynamics.Motion`."""
+    """Problem that moves, such as `springtune.mechanics.dynamics.Motion`."""
 
     network: Network
     linear: bool
@@ -88,7 +88,7 @@ class Stepper(ABC):
         """Take a number of steps."""
 
     def close(self) -> None:  # noqa: B027  most have nothing to do
-        """End what was begun for the run, threads."""
+        """Stop the threads of the run."""
 
 
 class ExplicitSteps(Stepper):
@@ -243,7 +243,7 @@ class ExplicitSteps(Stepper):
 
     @cached_property
     def threads(self) -> ThreadPoolExecutor:
-        """Threads beside the caller's; they stay on their cores from one call to the next."""
+        """Threads besides the caller's; they keep their cores between calls."""
         return ThreadPoolExecutor(max(1, len(self._threads) - 1))
 
     def close(self) -> None:

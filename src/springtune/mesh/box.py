@@ -1,4 +1,4 @@
-"""Whether a mesh fills a box exactly once, and if not, where and what to do about it."""
+"""Check that a mesh fills a box exactly once."""
 
 import numpy as np
 

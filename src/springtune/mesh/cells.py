@@ -1,4 +1,4 @@
-"""A mesh of triangles and quadrilaterals, and what a network needs to know of it."""
+"""Meshes of triangles and quadrilaterals."""
 
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -32,7 +32,7 @@ LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
 COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
-"""Endings of files that have a part of a mesh."""
+"""Endings of files that hold only a part of a mesh."""
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
@@ -50,7 +50,7 @@ MOST_IN_FILE = 1_000_000
 """Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
 
 LONGEST_SAID = 120
-"""Most characters of what meshio says that are shown."""
+"""Most characters of a message of meshio that are shown."""
 
 
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
@@ -164,14 +164,14 @@ def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.nda
 
 
 def _is_the_machines(error: BaseException, memory: float) -> bool:
-    """Whether a file cannot be read for reasons that are not its own: the system's errors, and a lack of memory."""
+    """Return whether a read failed for the system's reasons, such as a lack of memory."""
     if isinstance(error, MemoryError) and not isinstance(error, BeyondBound):
         return float(np.prod(getattr(error, "shape", 0), dtype=float)) * 8 <= memory
     return isinstance(error, OSError) and (error.errno or 0) > 0  # netCDF has numbers of its own, below
 
 
 def file_content(path: str | Path) -> Any:
-    """What meshio reads from a file; a MeshError says why it does not."""
+    """Read a file by meshio; a MeshError gives the reason for a failure."""
     if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     size = Path(path).stat().st_size

@@ -19,10 +19,10 @@ Point = tuple[float, float]
 """Coordinates [m]."""
 
 LEAST_AROUND = 6
-"""Fewest edges of a full turn of an arc: a small hole stays one."""
+"""Fewest edges of a full turn of an arc, so that a small hole remains."""
 
 FINEST = 4e-6
-"""Least mesh size over the extent of a shape: netgen takes points for one that are a millionth apart."""
+"""Smallest mesh size over the extent of a shape: netgen merges points a millionth apart."""
 
 GRADING = 0.3
 """How much longer edges get over the distance from shorter ones, at most: netgen's."""
@@ -66,7 +66,7 @@ class Round(Protocol):
 
 
 class Outlined(Protocol):
-    """What can be meshed: a `springtune.Shape`."""
+    """Shape that can be meshed: a `springtune.Shape`."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -259,7 +259,7 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """What netgen made: points in m, triangles, their regions, and the points in order along each stretch."""
+    """Result of netgen: points in m, triangles, their regions, and the points in order along each stretch."""
 
     points: np.ndarray
     triangles: np.ndarray

@@ -1,4 +1,4 @@
-"""Parts of a mesh that no edge joins, and whether they are held against rigid motions."""
+"""Connected parts of a mesh, and their supports against rigid motions."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Whether a mesh is a conforming plane sheet, and if not, where and what to do about it."""
+"""Check that a mesh is a conforming plane sheet."""
 
 from collections.abc import Sequence
 
@@ -7,10 +7,10 @@ import numpy as np
 from .cells import Mesh, signed_areas
 
 DIGITS = 1e-6
-"""What coordinates in a file may be off, over the extent of the mesh: formats in text have few digits."""
+"""Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
 
 MOST_SEARCHED = 2000
-"""So many ends of edges are looked at for one that hangs on another edge."""
+"""Most ends of edges checked for one that hangs on another edge."""
 
 MOST_PAIRS = 4_000_000
 """Pairs of edges that are compared at a time."""

@@ -1,4 +1,4 @@
-"""How a mesh type is declared: a function that meshes a box, and what others must know of its meshes."""
+"""Declaration of mesh types: functions that mesh a box."""
 
 import math
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def too_many(count: float, size: float, side: float, body: str) -> str:
 
 
 def nearest_whole(ratio: float) -> int:
-    """Nearest whole number, at least 1, halves to even ones: 2.5000000000000004 is a half, too."""
+    """Return the nearest whole number, at least 1, halves to even; 2.5000000000000004 counts as a half."""
     return max(1, round(round(ratio, 9)))
 
 

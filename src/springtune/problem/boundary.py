@@ -21,7 +21,7 @@ ON_POINT = 1e-9
 """Distance from a particle below which a point is that particle, over the extent of the mesh [1]."""
 
 OUTSIDE = 0.25
-"""How far a point may lie beyond the nearest cell, as on the arc that a straight edge cuts short, over its size [1]."""
+"""How far outside the nearest cell a point may lie, over its size [1], as next to an arc."""
 
 MAX_ITERATIONS = 50
 """Newton steps that look for a point in a quadrilateral."""

@@ -1,4 +1,4 @@
-"""Whether a load case fits a mesh with groups: its names, and whether supports hold each part of the body."""
+"""Checks of load cases on meshes with groups: names, and supports of each part."""
 
 from typing import TYPE_CHECKING
 

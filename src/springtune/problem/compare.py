@@ -1,4 +1,4 @@
-"""Comparing networks with references: errors, and the stiffness at which a sensitivity curve has none."""
+"""Errors of networks against references, and the stiffness at which a sensitivity curve has none."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ ROOT_TOLERANCE = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""
 
 HALVINGS = 12
-"""Of the way to where a curve ends, in search of its best stiffness there."""
+"""Bisections in search of a best stiffness where a curve ends."""
 
 
 def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:

@@ -8,7 +8,7 @@ from .quantities import positive
 
 
 class AssumptionWarning(UserWarning):
-    """What is asked for breaks an assumption of the model, such as that of a thin sheet."""
+    """An input violates an assumption of the model, such as that of a thin sheet."""
 
 
 def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -> None:

@@ -1,4 +1,4 @@
-"""Sides of an outline, straight or along an arc: where they run, how long they are, and whether they meet."""
+"""Sides of an outline, straight or arcs: points, lengths and intersections."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -9,10 +9,10 @@ Point = tuple[float, float]
 """Coordinates [m]."""
 
 SAME = 1e-9
-"""What the distances of two ends from a centre differ by at most on a circle, over these: coordinates are rounded."""
+"""Largest relative difference of two ends' distances from the centre of a circle."""
 
 APART = 1e-9
-"""What sides are apart at least, over the extent of the shape; nearer ones touch."""
+"""Smallest distance of sides over the extent of the shape; nearer ones touch."""
 
 PANELS = 64
 """Panels of an ellipse's arc on which its length is integrated."""
@@ -164,7 +164,7 @@ class OutlineSide:
         return self._lengths[panel] + self._length(panel / PANELS, parameter)
 
     def parameter_of(self, length: float) -> float:
-        """Parameter that is so far from the start, along the side [m]."""
+        """Parameter at a length from the start along the side [m]."""
         if self.arc is None or self.circular:
             return length / self.length
         from bisect import bisect_right

@@ -1,4 +1,4 @@
-"""What a person gives: quantities, as a text with its unit or a number in SI units, and names of what there is."""
+"""User input: quantities as texts with units or numbers in SI units, and known names."""
 
 import math
 from collections.abc import Iterable
@@ -30,7 +30,7 @@ def quantity(value: float | str, kind: str, name: str) -> float:
 
 
 def positive(value: float | str, kind: str, name: str) -> float:
-    """As `quantity`, of one that has to be above zero."""
+    """As `quantity`, refusing values that are not above zero."""
     number = quantity(value, kind, name)
     if not number > 0:
         raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")

@@ -1,4 +1,4 @@
-"""Tests of rubber as a testing machine writes them, and Yeoh's law fitted to one: see `fit_rubber`."""
+"""Rubber tests in CSV files, and Yeoh's law fitted to one: see `fit_rubber`."""
 
 import csv
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ TWO_COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa
 
 
 class TestDataError(ValueError):
-    """A test that no law can be fitted to; the message says why and what to do."""
+    """A test to which no law can be fitted; the message gives the reason and the remedy."""
 
     __test__ = False  # to pytest
 
@@ -103,7 +103,7 @@ class TensileTest:
 
 
 def told(test: TensileTest | str | Path) -> TensileTest:
-    """A test, read where its file is given."""
+    """Return a test; read it if its file is given."""
     return test if isinstance(test, TensileTest) else TensileTest.read(test)
 
 

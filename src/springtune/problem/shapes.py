@@ -45,7 +45,7 @@ def _place(value: Any, name: str) -> Point:
 
 
 def _named(value: object, what: str, *, empty: bool = False) -> None:
-    """Refuse what cannot name something."""
+    """Refuse what is not allowed as a name."""
     if not (isinstance(value, str) and (NAME.fullmatch(value) or (empty and not value))):
         raise ValueError(f"{what}: {value!r} cannot be a name; {NAME_RULE}")
 
@@ -349,7 +349,7 @@ COMPONENTS = {
     "area": (),
     "energy": (),
 }
-"""What a quantity of interest may be of, and its components."""
+"""Kinds of quantities of interest, and their components."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What became of a solve: one set of flags from the equilibrium to the dataset."""
+"""Status of a solve: one set of flags from the equilibrium to the dataset."""
 
 from enum import IntEnum
 

@@ -36,19 +36,19 @@ PIECE_SAMPLES = 7
 """Points on a piece of an outline at which distances are taken."""
 
 SMALLEST = 1e-9
-"""Distance that is taken for none, over the extent of a shape."""
+"""Distance that counts as zero, over the extent of a shape."""
 
 STRAIGHT = 1e-6
-"""Turn of a polygon that is taken for none [rad]."""
+"""Turn of a polygon that counts as zero [rad]."""
 
 SMOOTH_TURN = np.radians(12)
 """Turn of an outline that needs no smaller triangles [rad]: a polygon that stands for a circle."""
 
 SMALL_TURN = 1e-3
-"""Turn of an outline that is taken for none where stresses are concerned [rad]."""
+"""Turn of an outline that counts as zero for stresses [rad]."""
 
 RIGHT_ANGLE = np.radians(91)
-"""Angle up to which the outline may have a corner between sides without supports and loads, and needs none [rad]."""
+"""Largest angle of a corner without supports and loads that needs no grading [rad]."""
 
 FEWEST_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""

@@ -58,11 +58,11 @@ BENT = 0.1
 
 
 class IncompressibleError(ValueError):
-    """A material that displacements alone cannot describe."""
+    """A material that needs more than displacements as unknowns."""
 
 
 class FiniteStrainError(ReferenceNotConvergedError):
-    """A reference that did not converge; the message says how far it came."""
+    """A reference did not converge; the message gives the reached load."""
 
 
 @dataclass(frozen=True)

@@ -29,14 +29,13 @@ NODE_SHARE = 0.5
 """Share of the tolerance that the error estimates of nodes may take."""
 
 SAFETY = 3.0
-"""What the largest difference at the checks is multiplied with: the largest of all is hardly met by some tens."""
+"""Factor on the largest difference at the checks, since tens of checks hardly meet the maximum."""
 
 CHECKS_INSIDE, CHECKS_ON_EDGE = 12, 3
-"""Number of points inside the box, and on each of its edges, at which an interpolant is compared with solves. The
-corners are nodes."""
+"""Points inside the box and on each edge where solves check an interpolant; corners are nodes."""
 
 SEED = 20
-"""Of the places of these points."""
+"""Seed of the places of these points."""
 
 MOST_NODES = 65
 """Most nodes along an axis."""
@@ -170,7 +169,7 @@ class Interpolant:
 
 
 class _Box:
-    """What is solved for an interpolant over a box, and what is known from it."""
+    """Solves and results for an interpolant over a box."""
 
     def __init__(
         self,

@@ -397,7 +397,7 @@ class _Problem:
         self.infinite_energy = bool(self.loaded_points or self.reacting)
 
     def place(self, name: str) -> str:
-        """Of what a quantity is."""
+        """Return the group or point of a quantity."""
         of = self._quantities[name].of if name else ""
         return f" of {of!r}" if of else ""
 
@@ -741,7 +741,7 @@ class _Level:
         return (by_x + by_y) * np.sign(determinant) * weights
 
     def scale(self, kind: str) -> float:
-        """What is largest of a kind of quantity."""
+        """Return the largest value of a kind of quantity in the body."""
         mesh = self.space.mesh
         motion = float(np.abs(self.field[: len(mesh.points)]).max())
         if kind == "displacement":

@@ -1,12 +1,12 @@
-"""Texts that somebody else wrote, put where a terminal, RST, Markdown or matplotlib would read more into them."""
+"""Escape foreign texts for terminals, RST, Markdown and matplotlib."""
 
 import re
 
 UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, line breaks, marks that turn the direction of writing, and halves of characters."""
+"""Control characters, line breaks, bidirectional marks and surrogates."""
 
 PUNCTUATION = re.compile(r"([^\w\s]|_)")
-"""Whatever a markup language may give a meaning to."""
+"""Characters that a markup language may interpret."""
 
 
 def shown(text: object) -> str:

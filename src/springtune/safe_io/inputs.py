@@ -1,4 +1,4 @@
-"""Files of others: regular ones of a bounded size are read, within a bounded memory, and nothing beside them."""
+"""Bounded reading of foreign files: regular ones, of limited size, with limited memory."""
 
 import errno
 import mmap
@@ -15,7 +15,7 @@ LARGEST_CSV = 5_000_000
 
 
 _bounds = threading.RLock()
-"""One thread at a time sets a bound, which is one of the process."""
+"""Lock: a memory limit applies to the whole process."""
 
 
 class BeyondSize(ValueError):
@@ -23,7 +23,7 @@ class BeyondSize(ValueError):
 
 
 class DataElsewhere(ValueError):
-    """Data of a file are in another one."""
+    """Data of a file are stored in another one."""
 
 
 class BeyondBound(MemoryError):

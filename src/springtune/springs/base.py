@@ -1,4 +1,4 @@
-"""How a definition is declared, what it returns and how it refuses a mesh."""
+"""Declaration of definitions, their result and their errors."""
 
 import math
 from collections.abc import Callable
@@ -185,7 +185,7 @@ class Definition(Declared):
 
 
 NEEDS = ("", "stiffness", "cases")
-"""What a definition may be told besides mesh, material and thickness."""
+"""Possible fourth arguments of a definition."""
 
 Function = TypeVar("Function", bound=Callable[..., Springs])
 

@@ -93,7 +93,7 @@ def _start(mesh: Mesh, material: AnyMaterial, thickness: float) -> tuple[float, 
 
 
 class Misfit:
-    """Misfit of networks that differ in stiffness, its gradient, and how often it was asked."""
+    """Misfit of networks that differ in stiffness, its gradient, and the number of evaluations."""
 
     def __init__(self, mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]):
         from ..mechanics.network import Network  # here: see `springtune.springs`

@@ -36,7 +36,7 @@ CELL_FIELDS = "points", "corners"
 
 
 class Derives(Protocol):
-    """What a definition has to have: one of `springtune.springs.DEFINITIONS`, or of one's own."""
+    """Interface of a definition, the package's or the user's own."""
 
     @property
     def uniform(self) -> bool:
@@ -44,11 +44,11 @@ class Derives(Protocol):
 
     @property
     def uniaxial(self) -> bool:
-        """Whether it is for loads alone that stretch a beam along its length."""
+        """Whether it supports only loads along a beam."""
 
     @property
     def needs(self) -> str:
-        """What it is told besides mesh, material and thickness."""
+        """Its fourth argument, or an empty string."""
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh."""

@@ -49,14 +49,13 @@ TESTS = 4 * TEST_DEGREE - 1
 """Polynomial solutions up to that degree that are no rigid motion."""
 
 LEAST_TOLD = 1e-12
-"""Energy of a test over the largest one's below which rounding is all that it tells, as in very slender sheets [1]."""
+"""Energy of a test over the largest one's below which it is rounding, as in very slender sheets [1]."""
 
 CHANGE_WEIGHT = 0.1
 """lambda: weight of the mean squared logarithm of a spring's change against the squared misfit of the tests [1]."""
 
 STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.3
-"""Gauss-Newton steps at most; largest change of a logarithm in one of them, and that below which it is the last [1]:
-the next would be some tenth of it."""
+"""Most Gauss-Newton steps; largest change of a logarithm in one, and that below which it is the last [1]."""
 
 
 @definition("patch-fit", order=195, cells=(3,))
