@@ -1,7 +1,7 @@
-"""Named things that are declared where they stand: a decorator adds each to a mapping that others read.
+"""Registries of named functions: a decorator adds each to a mapping.
 
-The mapping finds what the modules of a package declare by importing them all, when it is first read. So a new entry is
-one place: its function. Code outside the package adds its own with the same decorator.
+On first use the mapping imports all modules of a package to find what they declare. Code outside the package uses the
+same decorator.
 """
 
 import inspect
@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 HOOKS = {"drawing": "studies.output.drawing", "writing": "handover.written"}
-"""Modules of upper rooms that lower ones call: they are found by name, so that no result depends on them."""
+"""Modules of upper layers that lower ones call by name, so that no result depends on them."""
 
 
 def imported(name: str) -> Any:
-    """Import a module, or with ``module:name`` what it has by that name, from the package on.
+    """Import a module of the package, or with ``module:name`` an attribute of it.
 
-    All imports by text go through this function: commands, study kinds, stages, outputs, public names and hooks.
+    All imports by text use this function: commands, study kinds, stages, outputs, public names and hooks.
     """
     module, _, attribute = name.partition(":")
     found = import_module(f"springtune.{module}")
@@ -35,13 +35,7 @@ def hook(name: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """A function and the name by which studies know it.
-
-    Attributes
-    ----------
-    order : float
-        Place among the others, the smallest first; those of one place are sorted by name.
-    """
+    """Function with its name in studies; entries are sorted by `order`, then by name."""
 
     name: str
     function: Callable[..., Any]
@@ -74,7 +68,7 @@ NAME_RULE = (
 
 
 class Registry(Mapping[str, Entry]):
-    """Read-only mapping from names to what was declared, in order; the modules of a package are read when needed."""
+    """Read-only ordered mapping from names to declared entries; imports the package's modules when needed."""
 
     def __init__(self, package: str, what: str):
         self._package, self._what = package, what
@@ -82,10 +76,9 @@ class Registry(Mapping[str, Entry]):
         self._complete = False
 
     def declare(self, entry: Entry) -> None:
-        """Add an entry; what the decorators call.
+        """Add an entry; the decorators call it.
 
-        A function that is declared once more from the same place, as when a cell of a notebook runs again, replaces
-        the former one.
+        A function declared again from the same place, as in a notebook cell, replaces the former one.
         """
         if not (isinstance(entry.name, str) and NAME.fullmatch(entry.name)):
             raise ValueError(f"{self._what}: {entry.name!r} cannot name one; {NAME_RULE}")
@@ -104,7 +97,7 @@ class Registry(Mapping[str, Entry]):
         self._entries = {one.name: one for one in sorted(entries, key=lambda one: (one.order, one.name))}
 
     def discard(self, name: str) -> None:
-        """Take out what code outside the package declared; nothing happens where there is no such name."""
+        """Remove what code outside the package declared; unknown names are ignored."""
         self._entries = {one: entry for one, entry in self._entries.items() if one != name}
 
     def _discover(self) -> None:

@@ -1,7 +1,7 @@
 """Quantities with units: "200 mm" to 0.2, "210 GPa" to 210e9.
 
-Units that studies usually use stand in a table here; all others are pint's. A test holds the table to pint, whose
-import and registry would cost every start of a workflow a third of a second.
+A table has the usual units; pint has all others, but its import would cost every start a third of a second. A test
+compares the table with pint.
 """
 
 import re
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of quantity.
+    """Kind of a quantity.
 
     Examples
     --------
@@ -79,7 +79,7 @@ _TOKEN = re.compile(r"[^\W\d]\w*|[0-9.]+|\S")
 class UnitError(ValueError):
     """A text that is not a quantity of the wanted kind; the message says why and what to write instead.
 
-    What takes quantities catches it and says of which argument, as a plain ValueError.
+    Public functions raise it as a plain ValueError that names the argument.
 
     Examples
     --------
@@ -94,7 +94,7 @@ class UnitError(ValueError):
 
 
 def parse(text: str, kind: str) -> float:
-    """Number in SI units of a quantity.
+    """Return the number in SI units of a quantity.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def _article(kind: str) -> str:
 
 
 def _measure(unit: str) -> tuple[str, Decimal] | None:
-    """Kind and size in SI units of a unit; None where nobody knows it."""
+    """Return kind and size in SI units of a unit; None if unknown."""
     return _KNOWN.get(unit) or _ask_pint(unit)
 
 
@@ -160,7 +160,7 @@ def _registry() -> "pint.UnitRegistry[float]":
 
 
 def _plain(unit: str) -> bool:
-    """Whether a unit has no powers of numbers or of powers: pint would work out ``9^9^9^9``."""
+    """Return whether a unit has no nested or numeric powers: pint would evaluate ``9^9^9^9``."""
     tokens = _TOKEN.findall(unit)
     exponent = False  # whether the token before is a power, but for its sign
     for before, token in zip(["", *tokens], tokens):

@@ -1,9 +1,8 @@
-"""Factorized symmetric matrices: by Cholesky's method where CHOLMOD is at hand, else by SuperLU.
+"""Factorized symmetric matrices: by CHOLMOD if available, else by SuperLU.
 
-CHOLMOD comes with the package cvxopt, an extra. Where it is not installed, or where the environment variable
-``SPRINGTUNE_SOLVER`` is ``superlu``, SuperLU factorizes, which takes three to five times as long. What is not positive
-definite has no Cholesky factor but with pins (`springtune.linalg.pinned`); without these SuperLU counts its negative
-pivots.
+CHOLMOD comes with the extra package cvxopt. Without it, or with the environment variable ``SPRINGTUNE_SOLVER`` set to
+``superlu``, SuperLU factorizes, which takes three to five times as long. Indefinite matrices have a Cholesky factor
+only with pins (`springtune.linalg.pinned`); else SuperLU counts their negative pivots.
 """
 
 import os
@@ -16,7 +15,7 @@ from scipy.sparse import csc_array, sparray
 from scipy.sparse.linalg import splu
 
 CHOLESKY = find_spec("cvxopt") is not None and os.environ.get("SPRINGTUNE_SOLVER") != "superlu"
-"""Whether CHOLMOD is there, and taken where no solver is named."""
+"""Whether CHOLMOD is available and the default."""
 
 SUPERLU: dict[str, Any] = {"relax": 4, "panel_size": 4, "options": {"SymmetricMode": True}}
 """Sizes of SuperLU's panels: for these matrices its own are a quarter slower."""
@@ -27,7 +26,7 @@ class SingularError(ArithmeticError):
 
 
 class Factor(Protocol):
-    """What solves systems of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`."""
+    """Solver of one symmetric matrix: `SuperLUFactor`, `CholeskyFactor` or `Multigrid`."""
 
     name: str
 
@@ -37,34 +36,20 @@ class Factor(Protocol):
         ...
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solution of the system.
-
-        Parameters
-        ----------
-        right : ndarray of float, shape (unknowns,) or (unknowns, n)
-            Right-hand sides.
-
-        Returns
-        -------
-        ndarray of float, of the same shape
-        """
+        """Solve for right-hand sides, shape (unknowns,) or (unknowns, n)."""
         ...
 
     def step(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where it is a step of Newton's method that is asked for."""
+        """As `solve`, for a step of Newton's method."""
         ...
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
-        """As `solve`, where an estimate would do."""
+        """As `solve`, but only an estimate."""
         ...
 
 
 class SuperLUFactor:
-    """A symmetric matrix factorized by SuperLU, see `Factor`.
-
-    Parameters
-    ----------
-    matrix : csc_array, shape (unknowns, unknowns)
+    """Symmetric matrix factorized by SuperLU, see `Factor`.
 
     Examples
     --------
@@ -107,15 +92,10 @@ class SuperLUFactor:
 
 
 class Analysis:
-    """Symbolic factorization of all symmetric matrices of one sparsity, done once and used again.
+    """Reusable symbolic factorization of all symmetric matrices of one sparsity.
 
-    Method: supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22,
-    2008).
-
-    Attributes
-    ----------
-    symbolic_factors : int
-        How many have been made: as many as there were numeric ones in use at a time.
+    Supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22, 2008).
+    `symbolic_factors` is the largest number of numeric factors in use at a time.
     """
 
     def __init__(self, indices: np.ndarray, pointers: np.ndarray, order: np.ndarray | None = None) -> None:
@@ -132,12 +112,7 @@ class Analysis:
         cholmod.options["supernodal"] = 2
 
     def factorize(self, data: np.ndarray) -> "CholeskyFactor | None":
-        """Factor of the matrix of these entries; None where it is not positive definite.
-
-        Parameters
-        ----------
-        data : ndarray of float, shape (n_entries,)
-        """
+        """Factorize the matrix of these entries (n_entries,); None if it is not positive definite."""
         from cvxopt import cholmod, matrix
 
         self._matrix.V = matrix(data[self._lower])
@@ -205,11 +180,7 @@ class CholeskyFactor:
 
 
 def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | CholeskyFactor:
-    """Factor of a symmetric matrix of any sparsity.
-
-    Parameters
-    ----------
-    matrix : sparse array, shape (n, n)
+    """Factorize a symmetric matrix of any sparsity.
 
     Examples
     --------

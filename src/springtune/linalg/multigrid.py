@@ -14,13 +14,16 @@ RESIDUAL = 1e-11
 """Residual over the right-hand side at which a solve ends."""
 
 STEP_RESIDUAL = 1e-6
-"""The same of a step of Newton's method, whose tangent leaves more."""
+"""The same for a step of Newton's method."""
 
 MAX_CG_ITERATIONS = 300
 
 CERTAIN = 1e-7
-"""Residual over a random right-hand side below which every direction has been met: of n unknowns each has a normally
-distributed share of deviation ``n**-0.5``, which is below this in one case of 10 000 of two million unknowns."""
+"""Residual over a random right-hand side below which every direction has been met.
+
+Each of n unknowns has a normally distributed share of deviation ``n**-0.5``, below this in one case of 10 000 for two
+million unknowns.
+"""
 
 COARSENING = 3.0
 """Spacing of the finest grid over the mesh size; of a grid of 2 the product takes longer than it saves steps."""
@@ -29,17 +32,17 @@ COARSEST = 500
 """Unknowns below which the coarsest matrix is factorized, as a dense one."""
 
 MOST_BORROWED = 50
-"""Iterations with the grids of another matrix from which on those of its own take less time."""
+"""Iterations with another matrix's grids above which building own grids is faster."""
 
 IN_LINE = 1e-14
-"""Determinant of a particle's own stiffness, over the product of its two diagonal entries, that is but rounding."""
+"""Determinant of a particle's own stiffness over the product of its diagonal that counts as rounding."""
 
 MOST_LEVELS = 16
 """Grids, each of a quarter of the cells of the last: a narrow body is longer than the coarsest ones have cells for."""
 
 
 class NotPositiveError(SingularError):
-    """Conjugate gradients came to no end."""
+    """Conjugate gradients did not converge."""
 
 
 class IndefiniteError(NotPositiveError):
@@ -57,27 +60,15 @@ class _Level(NamedTuple):
 class Multigrid:
     """Conjugate gradients, preconditioned by multigrid on regular grids laid over the mesh.
 
-    It stands in the place of a factor, see `springtune.linalg.factors.Factor`. Displacements of a grid's nodes are
-    interpolated bilinearly, to the particles and from grid to grid, each twice as wide as the last: rigid motions and
-    even strains are among them whatever the mesh is. Coarse matrices are Galerkin's; a cycle smooths by one sweep of
-    Gauss and Seidel down and one up, in single precision, which loses nothing: what it gives only precondition.
-    Time and memory grow in proportion to the number of unknowns, where those of a factorization grow with its power 3/2
-    and n log n. Method: J. Xu, The auxiliary space method and optimal multigrid preconditioning techniques for
-    unstructured grids, Computing 56:215, 1996.
+    It replaces a factor, see `springtune.linalg.factors.Factor`. Node displacements are interpolated bilinearly to
+    the particles and from grid to grid, each twice as wide, so rigid motions and even strains are exact. Coarse
+    matrices are Galerkin's; a cycle takes one Gauss-Seidel sweep down and one up, in single precision, enough to
+    precondition. Time and memory are proportional to the unknowns n; a factorization's grow as n^(3/2) and n log n.
+    Method: J. Xu, The auxiliary space method and optimal multigrid preconditioning techniques for unstructured grids,
+    Computing 56:215, 1996.
 
-    Parameters
-    ----------
-    matrix : csr_array, shape (unknowns, unknowns)
-        Symmetric.
-    points : ndarray of float, shape (n_points, 2)
-        Particles [m].
-    places : ndarray of int, shape (unknowns,)
-        Direction that each unknown is of: twice the number of its particle, plus 1 for y.
-
-    Attributes
-    ----------
-    name : str
-        ``"multigrid"``, or that of the factor that took over.
+    `matrix` is symmetric; `points` (n_points, 2) in m; `places` (unknowns,) is twice the particle's number, plus 1
+    for y. `name` is ``"multigrid"``, or that of the factor that took over.
     """
 
     def __init__(
@@ -140,7 +131,7 @@ class Multigrid:
         return self._direct
 
     def _precondition(self, right: np.ndarray) -> np.ndarray:
-        """What a cycle makes of a right-hand side."""
+        """Apply a multigrid cycle to a right-hand side."""
         size = np.linalg.norm(right) or 1.0
         single = np.multiply(right, 1.0 / size, out=np.empty(len(right), dtype=np.float32), casting="same_kind")
         return np.multiply(self._cycle(0, single), size, dtype=float)
@@ -161,18 +152,7 @@ class Multigrid:
         return solution
 
     def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:
-        """Solution of the system.
-
-        Parameters
-        ----------
-        right : ndarray of float, shape (unknowns,)
-        tolerance : float, optional
-            Residual over the right-hand side at which it ends [1].
-
-        Returns
-        -------
-        ndarray of float, shape (unknowns,)
-        """
+        """Solve for a right-hand side (unknowns,), to a residual relative to it."""
         if self._direct is None:
             try:
                 return self._gradients(np.array(right, dtype=float), tolerance)
@@ -182,16 +162,15 @@ class Multigrid:
         return self._direct.solve(right)
 
     def _gradients(self, missing: np.ndarray, tolerance: float) -> np.ndarray:
-        """Solution by conjugate gradients.
+        """Solve by conjugate gradients.
 
-        The first one begins with a random residual besides: where that is gone, too, no direction was without
-        stiffness, and the matrix is positive definite. For as long as all stiffnesses met are positive, conjugate
-        gradients make no residual in a direction of negative stiffness smaller. What is random is ``A M^-1`` of a
-        random vector, M being the preconditioner: of a direction of stiffness ``-l``, over that in M, it has a share
-        of about ``l / n**0.5``. So with `RESIDUAL` and a million unknowns a direction of ``l > 1e-4`` is overlooked in
-        one case of 10 000, one of ``l < 1e-8`` mostly; and so is one of no stiffness at all that bears no load: of
-        such only those of single particles are looked for here, and those of parts that nothing holds by the network; a
-        part that turns about one particle, or hangs on a spring or two, is told as solved.
+        The first solve adds a random residual: if it vanishes too and all stiffnesses met are positive, the matrix
+        counts as positive definite. A direction of negative stiffness never loses residual. The random part is ``A
+        M^-1`` of a random vector, with the preconditioner M: a direction of stiffness ``-l``, over that in M, has a
+        share of about ``l / n**0.5``. With `RESIDUAL` and a million unknowns ``l > 1e-4`` is overlooked in one case
+        of 10 000, ``l < 1e-8`` mostly. Trap: directions of zero stiffness without load are found only for single
+        particles here, and for parts without supports by the network. A part that turns about one particle, or hangs
+        on a spring or two, counts as solved.
         """
         solution, scale = np.zeros(len(missing)), np.linalg.norm(missing)
         if scale == 0.0:
@@ -228,7 +207,7 @@ class Multigrid:
         raise NotPositiveError(f"conjugate gradients did not end within {MAX_CG_ITERATIONS} iterations")
 
     def _check_particles(self) -> None:
-        """Refuse a matrix in which a particle alone moves without any stiffness: all its springs are in one line."""
+        """Refuse a matrix with a particle that moves without stiffness: all its springs are in one line."""
         stiffness, coupling = self._matrix.diagonal(), self._matrix.diagonal(1)
         x = np.flatnonzero(np.diff(self._places // 2) == 0)  # of particles that are free along y, too
         both = stiffness[x] * stiffness[x + 1]
@@ -245,11 +224,10 @@ class Multigrid:
 
     @cached_property
     def negative_pivots(self) -> int:
-        """0 where the matrix is positive definite, else 1: they are not counted, but by a factor that takes over.
+        """0 if the matrix is positive definite, else 1; only a factor that takes over counts them.
 
-        Conjugate gradients cannot end in a direction of which the residual they begin with has a part without having
-        met its stiffness, and a random one has a part of every direction: too small a part in one case of 10 000, see
-        `CERTAIN`.
+        A random residual has a part of every direction, too small in one case of 10 000, see `CERTAIN`; conjugate
+        gradients cannot end without having met its stiffness.
         """
         if not self._certain and self._direct is None:
             try:
@@ -260,23 +238,10 @@ class Multigrid:
 
 
 def bilinear(points: np.ndarray, places: np.ndarray, spacing: float) -> tuple[csr_array, np.ndarray]:
-    """Bilinear interpolation from a regular grid that is laid over particles.
+    """Return the bilinear interpolation from a regular grid of about `spacing` [m], and its nodes.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        Particles [m].
-    places : ndarray of int, shape (unknowns,)
-        Direction that each unknown is of: twice the number of its particle, plus 1 for y.
-    spacing : float
-        Of the grid, about: its cells fit the particles' extent [m].
-
-    Returns
-    -------
-    prolong : csr_array of float32, shape (unknowns, 2 * n_nodes)
-        Unknowns from displacements of the nodes, x and y of each by turns.
-    nodes : ndarray of float, shape (n_nodes, 2)
-        Nodes about which there are particles [m].
+    `points` (n_points, 2) [m]; `places` (unknowns,) is twice the particle's number, plus 1 for y. The matrix is
+    (unknowns, 2 n_nodes), x and y of each node in turn; nodes (n_nodes, 2) [m] have particles near by.
 
     Examples
     --------

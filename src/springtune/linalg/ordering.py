@@ -8,26 +8,15 @@ LEAF = 48
 
 
 def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Order of particles in which a factorization fills in little, every cut last.
+    """Return an elimination order of particles with little fill-in, every cut last.
 
-    Parts are cut across their longer side, at the median; the particles beyond the cut that touch it separate the
-    halves (A. George, SIAM J. Numer. Anal. 10:345, 1973).
-
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    edges : ndarray of int, shape (n_edges, 2)
-        Particles that share an entry of the matrix.
-
-    Returns
-    -------
-    ndarray of int, shape (n_points,)
-        Particles in the order of elimination.
+    Parts are cut across their longer side at the median; particles beyond the cut that touch it separate the halves
+    (A. George, SIAM J. Numer. Anal. 10:345, 1973). `points` (n_points, 2) [m]; `edges` (n_edges, 2) share matrix
+    entries.
 
     Examples
     --------
-    Of a line of 99 particles the middle one goes last:
+    In a line of 99 particles the middle one goes last:
 
     >>> line = np.arange(99)
     >>> int(nested_dissection(np.stack([line, 0 * line], axis=1), np.stack([line[:-1], line[1:]], axis=1))[-1])
@@ -70,16 +59,9 @@ def _joined(count: int, edges: np.ndarray) -> csr_array:
 
 
 def narrow(count: int, edges: np.ndarray) -> np.ndarray:
-    """Order of particles in which those that share an edge are near: as they are, or reversed Cuthill-McKee.
+    """Return an order of particles with a small bandwidth: unchanged, or reversed Cuthill-McKee.
 
-    Parameters
-    ----------
-    edges : ndarray of int, shape (n_edges, 2)
-
-    Returns
-    -------
-    ndarray of int, shape (count,)
-        Another order only where it at least halves the bandwidth, the largest distance of an edge's ends.
+    Only changed if that at least halves the bandwidth, the largest distance of an edge's ends.
 
     Examples
     --------
@@ -99,17 +81,9 @@ def narrow(count: int, edges: np.ndarray) -> np.ndarray:
 
 
 def spread(points: np.ndarray, count: int) -> np.ndarray:
-    """Particles spread over a mesh: those next to the middles of parts, which are halved across their longer side.
+    """Return up to `count` particles spread over a mesh, in ascending order.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        At most so many, in ascending order.
+    Those next to the middles of parts, which are halved across their longer side.
 
     Examples
     --------

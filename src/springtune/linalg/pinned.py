@@ -1,14 +1,13 @@
-r"""Indefinite symmetric matrices factorized by Cholesky's method, a few of their unknowns pinned.
+r"""Cholesky factorization of indefinite symmetric matrices, with a few unknowns pinned.
 
-A network that is unstable gives way in a few long waves. Pins, springs from some particles to the ground, hold them:
-with a pin of stiffness s at each unknown that E chooses, ``K + s E E'`` has a Cholesky factor, ``L L'`` in the order of
-elimination, and as sparse a one as K would have. What pins add is taken off again (M. A. Woodbury, Inverting modified
-matrices, Princeton, 1950):
+An unstable network gives way in a few long waves. Pins, springs to the ground, hold them: with stiffness s at each
+unknown that E chooses, ``K + s E E'`` has a Cholesky factor ``L L'``, as sparse as K's. The pins are taken off again
+(M. A. Woodbury, Inverting modified matrices, Princeton, 1950):
 
 .. math:: K^{-1} = L^{-T} (I + G T^{-1} G^T) L^{-1}, \qquad G = L^{-1} E, \qquad T = I / s - G^T G,
 
-and K has as many negative eigenvalues as the small matrix T (E. V. Haynsworth, Linear Algebra Appl. 1:73, 1968). So it
-costs one factorization, half a solve for each pin, and no more memory, where SuperLU takes several times of both.
+and K has as many negative eigenvalues as the small matrix T (E. V. Haynsworth, Linear Algebra Appl. 1:73, 1968). It
+costs one factorization and half a solve a pin; SuperLU takes several times the time and memory.
 """
 
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from scipy.sparse import csc_array
 from .factors import Analysis, CholeskyFactor
 
 CLEAR = 100.0
-"""Least eigenvalue of T, in size, over its error from which on its sign counts."""
+"""Smallest ratio of an eigenvalue of T to its error for which its sign counts."""
 
 BACKWARD_ERROR = 1e-15
 """Residual over what rounding of the solution makes of it, above which a solve is corrected."""
@@ -34,15 +33,7 @@ class UncertainError(ArithmeticError):
 
 
 class PinnedFactor:
-    """A factorized indefinite matrix, see `springtune.linalg.factors.Factor`; made by `factorize_pinned`.
-
-    Parameters
-    ----------
-    matrix : csc_array, shape (unknowns, unknowns)
-        Symmetric.
-    pins : ndarray of int, shape (n_pins,)
-        Unknowns that are pinned.
-    """
+    """Factorized indefinite symmetric matrix with pinned unknowns, made by `factorize_pinned`."""
 
     name = "pinned Cholesky"
 
@@ -86,12 +77,7 @@ class PinnedFactor:
 
 
 def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np.ndarray]) -> PinnedFactor | None:
-    """Factor of an indefinite matrix.
-
-    Parameters
-    ----------
-    matrix : csc_array, shape (unknowns, unknowns)
-        Symmetric, its rows ascending within columns, with all entries of its diagonal.
+    """Factorize an indefinite matrix with a full diagonal and ascending rows; None if no choice of pins helps.
 
     Examples
     --------

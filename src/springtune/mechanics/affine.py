@@ -8,15 +8,10 @@ from .network import Network
 
 
 def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Stiffness in plane stress that a network had if all its particles followed an even strain (Cauchy and Born).
+    """Return the plane-stress stiffness if all particles followed an even strain (Cauchy and Born).
 
-    Of springs it is the closed form ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66 whatever their
-    stiffness; an upper bound of `springtune.mechanics.moduli.outline_stiffness`, which a lattice attains.
-
-    Returns
-    -------
-    ndarray of float, shape (3, 3)
-        As of `springtune.mechanics.moduli.outline_stiffness` [1].
+    For springs ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66; an upper bound of
+    `springtune.mechanics.moduli.outline_stiffness`, with the same shape and unit, which a lattice attains.
 
     Examples
     --------

@@ -12,29 +12,21 @@ from .network import Network
 from .statics import StaticProblem
 
 NEARLY_STRAIGHT = 0.02
-"""Most by which the tangent at 0.4 of a buckling load moves that load, relative, where a column is nearly straight."""
+"""Largest relative change of a buckling load by the tangent at 0.4 of it, for a nearly straight column."""
 
 INCREMENT, MOST_INCREMENTS = 0.05, 20
 """Increment of a path to its buckling load, over the displacements of a straight one there, and how many at most."""
 
 BENDS = "nothing bifurcates: the path bends before; this is the load of the nearly perfect column, about rest"
-"""Message of a buckling load that no path has."""
+"""Message for a path without a buckling load."""
 
 
 @dataclass(frozen=True)
 class Path:
     """Points of an equilibrium path, in order from rest.
 
-    Attributes
-    ----------
-    loads : ndarray of float, shape (n,)
-        Force over the reference stiffness [m].
-    displacements : ndarray of float, shape (n, n_points, 2)
-        [m]
-    negative_pivots : ndarray of int, shape (n,)
-        Negative eigenvalues of the tangent.
-    message : str
-        Why the path ends before its last load, empty where it does not.
+    `loads` (n,) are force over reference stiffness [m], `displacements` (n, n_points, 2) [m]. `negative_pivots` (n,)
+    counts negative eigenvalues of the tangent; `message` says why the path ends early.
     """
 
     loads: np.ndarray
@@ -46,19 +38,11 @@ class Path:
 def follow(
     problem: StaticProblem, s: float, *, increment: float, most_points: int = 200, limit: float | None = None
 ) -> Path:
-    """Follow the path of a network from rest by arc length, through limit points, until it carries a load.
+    """Follow the path from rest by arc length, through limit points, until it carries a load ``s`` [m].
 
-    Riks' method: each point is sought in the plane across the last tangent, with the exact tangent anew in every Newton
-    step (E. Riks, Int. J. Solids Structures 15:529, 1979).
-
-    Parameters
-    ----------
-    s : float
-        Force over the reference stiffness at which it ends [m].
-    increment : float
-        First and largest length of an increment, norm of the displacements of all unknowns [m].
-    limit : float, optional
-        Largest norm of the displacements; the path ends there [m].
+    Riks' method: each point is sought in the plane across the last tangent, with the exact tangent in every Newton
+    step (E. Riks, Int. J. Solids Structures 15:529, 1979). `increment` is the first and largest increment and `limit`
+    the largest displacement, norms over all unknowns [m].
 
     Examples
     --------
@@ -114,30 +98,19 @@ class Buckling(NamedTuple):
 
 
 def buckling(problem: StaticProblem, guess: float) -> Buckling:
-    """Load at which the path from rest bifurcates, or at which it would if it did not bend before.
+    """Find the load at which the path from rest bifurcates, or would bifurcate if it did not bend before.
 
-    The load is that of a linear buckling analysis about two equilibria shortly below the critical load of the one about
-    rest. The path is then followed beyond it: its tangent has a negative pivot in an equilibrium there, and none in one
-    shortly below.
+    The load is that of a linear buckling analysis about two equilibria shortly below the critical load of the one
+    about rest. The tangent must have a negative pivot shortly beyond it and none shortly below. On an unsymmetric
+    mesh a column bends from the first load on and stays stable; then the analysis about rest is returned.
 
-    On a mesh that is no mirror image a column bends from the first load on, as an imperfect one does, and the path
-    stays stable. The load is then that of the analysis about rest, since the bend changes the later equilibria.
-
-    Parameters
-    ----------
-    guess : float
-        A load of its magnitude and sign [m].
-
-    Returns
-    -------
-    Buckling
-        The load is NaN where there is none up to a hundred times the guess, or where the path bends far below it, as
-        that of an arch; the message says which.
+    `guess` is a load of its magnitude and sign [m]. The load is NaN, with a message, if there is none up to a hundred
+    times the guess, or if the path bends far below it, as an arch's does.
 
     Examples
     --------
-    A slender beam of the triangular lattice, whose ``E t`` is ``2 / sqrt(3)``, clamped on the left and pressed on the
-    right, over Euler's load:
+    A slender beam of the triangular lattice, ``E t = 2 / sqrt(3)``, clamped on the left and pressed on the right,
+    over Euler's load:
 
     >>> from springtune.mesh import MESH_TYPES
     >>> mesh = MESH_TYPES["structured"](0.2, 0.02, 0.01 / 27**0.5)  # six rows
@@ -194,17 +167,11 @@ def smallest_share(
     factor: Factor | None = None,
     mirror: np.ndarray | None = None,
 ) -> float:
-    """Where on the line from one tangent to another the first eigenvalue vanishes: 0 at the first, 1 at the second.
+    """Return where on the line from one tangent (0) to another (1) the first eigenvalue vanishes.
 
-    The tangent there is ``K1 + x (K2 - K1)``, singular first at one over the largest eigenvalue of
-    ``(K1 - K2) v = mu K1 v``.
-
-    Parameters
-    ----------
-    first, second : ndarray of float, shape (n_points, 2)
-        Displacements [m]; None at rest.
-    mirror : ndarray of float, shape (n_points, 2), optional
-        As far before the first as the second is beyond it [m]: tangents then change as they do at the first.
+    The tangent ``K1 + x (K2 - K1)`` is first singular at one over the largest eigenvalue of ``(K1 - K2) v = mu K1
+    v``. Displacements [m] are None at rest. `mirror` is as far before the first as the second is beyond it [m]:
+    tangents then change as they do at the first.
     """
     here, there = network.tangent(first), network.tangent(second)
     change = here - there if mirror is None else 0.5 * (network.tangent(mirror) - there)

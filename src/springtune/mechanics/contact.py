@@ -1,18 +1,16 @@
-r"""Contact of bodies that must not penetrate each other, with Coulomb friction or without; no penalty to tune.
+r"""Contact without penetration, with or without Coulomb friction, and without a penalty to tune.
 
-Two polygons penetrate each other the most where a corner of one lies inside the other. So no corner of any outline may
-lie behind the edge of another body that it is nearest to, in both directions; what is left between the bodies is
-nothing but rounding, whichever body is finer. A field that a continuum would have, such as even pressure through a
-plane joint, stays exact whatever the two meshes are, since all functions that the meshes can form and that do not
-penetrate compete.
+Two polygons penetrate each other most where a corner of one lies inside the other. So no corner of any outline may
+lie behind the nearest edge of another body, in both directions. Even pressure through a plane joint is exact on any
+two meshes.
 
-Each Newton step minimises the quadratic energy of all bodies under these conditions, linearised,
+Each Newton step minimises the quadratic energy of all bodies under the linearised conditions,
 
 .. math:: \min_d \tfrac{1}{2} d^T K d - r^T d \quad \text{with} \quad g + G d \ge 0,
 
-by its dual: the contact forces are the minimum over the positive quadrant of a dense problem with as many unknowns as
-corners close or nearly do, each body entering with its own factorized tangent. A body that does not move far is
-factorized once; a rigid one has no unknowns at all, a floor neither.
+by its dual: the contact forces minimise a dense problem over the positive quadrant, with one unknown for each corner
+that is closed or nearly so. Each body enters with its own factorized tangent. Rigid bodies and floors have no
+unknowns.
 """
 
 from __future__ import annotations
@@ -40,7 +38,7 @@ STRAIGHT = 1e-6
 """Sine of the angle below which two edges are taken for one line."""
 
 JOINT = 1e-6
-"""Distance from the joint of two edges within which a corner is at it, over the mesh size."""
+"""Distance from the joint of two edges at which a corner counts as being there, over the mesh size."""
 
 LONGEST_WAY = 0.5
 """Longest way of a particle in one Newton step, over the mesh size."""
@@ -54,13 +52,13 @@ SMALLEST_LOAD_STEP = 1e-4
 """Smallest step of the load [1]."""
 
 SHIFTS = (1e-6, 1e-3, 1e-2, 1e-1, 1.0)
-"""Resistance to any motion that is tried in turn to make a tangent definite, over its mean diagonal."""
+"""Diagonal shifts tried in turn to make a tangent definite, over its mean diagonal."""
 
 GAP = 1e-9
-"""Depth of a corner behind an edge that counts as none, over the mesh size."""
+"""Depth of a corner behind an edge that counts as zero, over the mesh size."""
 
 COMPLIANCE = 1e-11
-"""Of a contact beside the bodies' own at it [1]."""
+"""Compliance added at a contact, over the bodies' own [1]."""
 
 EXCHANGES = 30
 """How often a set of closed contacts is exchanged before non-negative least squares look for it."""
@@ -69,11 +67,10 @@ CHANGES = 4
 """How often a Newton step may change which contacts it takes for closed."""
 
 FRICTION_TOLERANCE = 1e-6
-"""As `CONTACT_TOLERANCE`, where friction lags a step behind."""
+"""As `CONTACT_TOLERANCE`, with friction, which lags a step behind."""
 
 SLIP = 1e-3
-"""Way over which friction grows to its limit, over the mesh size, from where the load step began: what sticks creeps by
-about as much in each."""
+"""Slip over which friction grows to its limit, over the mesh size; what sticks creeps by about as much a load step."""
 
 
 class ContactError(RuntimeError):
@@ -101,18 +98,11 @@ def neighbours(outline: np.ndarray) -> np.ndarray:
 
 
 class Body:
-    """A network that others touch.
+    """Network that other bodies touch.
 
-    Parameters
-    ----------
-    reference : float
-        Reference stiffness of the network [N/m].
-    forces : ndarray of float, shape (n_points, 2), optional
-        Dead forces at full load [N].
-    force : float, optional
-        Its total force at full load [N], positive outwards.
-    prescribed : ndarray of float, shape (n_points, 2), optional
-        Displacements of held directions at full load [m]; zero without.
+    `reference` is its reference stiffness [N/m]; `forces` (n_points, 2) are dead forces at full load [N], and `force`
+    their total, positive outwards; `prescribed` (n_points, 2) are the displacements of held directions at full load
+    [m].
     """
 
     def __init__(
@@ -148,15 +138,7 @@ class Body:
         return load - self.reference * resistance
 
     def tangent(self, share: float, more: sparray | None = None) -> csc_array:
-        """Tangent of resistance less load [N/m], symmetric.
-
-        Parameters
-        ----------
-        share : float
-            Share of the load [1].
-        more : sparse matrix, optional
-            Stiffness to add [N/m].
-        """
+        """Return the symmetric tangent of resistance less load [N/m], plus `more`, at a share of the load."""
         if self.moves_little:
             tangent = self._rest_tangent
         else:
@@ -173,17 +155,9 @@ class Body:
         return (self.reference * self.network.tangent()).tocsc()
 
     def solver(self, tangent: csc_array) -> Callable[[np.ndarray], np.ndarray]:
-        """Function that solves with a tangent, made definite where it is not; that of the last one is kept.
+        """Return a function from forces [N] to displacements [m], shape (unknowns,) or (unknowns, n).
 
-        Parameters
-        ----------
-        tangent : csc_array, shape (unknowns, unknowns)
-            [N/m]
-
-        Returns
-        -------
-        callable
-            Displacements [m] of forces [N], shape (unknowns,) or (unknowns, n).
+        An indefinite tangent is made definite. The solver of the last tangent is cached.
         """
         if self._solver is not None and self._solver[0] is tangent:
             return self._solver[1]
@@ -201,13 +175,7 @@ class Body:
 
 @dataclass
 class Obstacle:
-    """A rigid polygon.
-
-    Parameters
-    ----------
-    points : ndarray of float, shape (n, 2)
-        Corners, counter-clockwise [m].
-    """
+    """Rigid polygon; `points` has shape (n, 2), counter-clockwise [m]."""
 
     points: np.ndarray
     outline: np.ndarray = field(init=False)
@@ -219,20 +187,12 @@ class Obstacle:
 
 
 class _Sides:
-    """Edges and corners of an outline where they are now.
+    """Edges and corners of an outline in its current position.
 
-    Attributes
-    ----------
-    start, along, length, normals : ndarray
-        Of each edge: its start [m], unit vector, length [m] and unit normal out of the body.
-    turn : ndarray of float
-        Sine of the turn at the end of each edge, positive where the body has a corner that sticks out.
-    meeting : ndarray of float, shape (n_corners, 2, 2)
-        Normals of the edges that meet at each corner.
-    outward : ndarray of float, shape (n_corners, 2)
-        Their mean, a unit vector.
-    wraps : ndarray of bool, shape (n_corners,)
-        Whether the body is bent around each corner.
+    `start`, `along`, `length` and `normals` belong to the edges, with normals out of the body; `turn` is the sine of
+    the turn at the end of each edge, positive at convex corners. `meeting` (n_corners, 2, 2) are the normals of the
+    edges that meet at a corner, `outward` their mean as a unit vector; `wraps` marks corners around which the body is
+    bent.
     """
 
     def __init__(self, body: Body | Obstacle) -> None:
@@ -256,18 +216,9 @@ class _Sides:
 class Contacts:
     """Corners near edges.
 
-    Attributes
-    ----------
-    owners, corners : ndarray of int, shape (n,)
-        Body of each corner and the corner's particle.
-    targets, edges : ndarray of int, shape (n,) and (n, 2)
-        Body of each edge, -1 for the floor, and the edge's particles.
-    shares : ndarray of float, shape (n,)
-        Place of the corner along the edge [1].
-    normals : ndarray of float, shape (n, 2)
-        Unit normals of the edges, out of their body.
-    gaps : ndarray of float, shape (n,)
-        Distance of the corner from the edge [m], negative behind it.
+    `owners` and `corners` are each corner's body and particle; `targets` and `edges` (n, 2) each edge's body, -1 for
+    the floor, and particles. `shares` is the corner's place along the edge [1], `normals` point out of the edge's
+    body, and `gaps` [m] are negative behind it.
     """
 
     owners: np.ndarray
@@ -282,12 +233,7 @@ class Contacts:
 class Contact:
     """Bodies, rigid obstacles and a floor at y = 0.
 
-    Parameters
-    ----------
-    size : float
-        Mesh size, the unit of tolerances [m].
-    friction : float, optional
-        Coulomb's coefficient of friction [1].
+    `size` is the mesh size, the unit of tolerances [m]; `friction` is Coulomb's coefficient [1].
     """
 
     def __init__(
@@ -309,10 +255,10 @@ class Contact:
     # -- geometry ------------------------------------------------------------------------------------------------------
 
     def find(self) -> Contacts:
-        """Corners that are near an edge of another body that faces them: the nearest one of each other body.
+        """Return the corners near a facing edge of another body, with the nearest edge of each other body.
 
-        Where the edges of the other body turn towards the corner, it has to stay before the next ones as well; where
-        they turn away and it is at their joint, that joint's own conditions hold it.
+        Where that body's next edges turn towards the corner, they are conditions too. Where they turn away and the
+        corner is at their joint, the joint's own conditions suffice.
         """
         none = np.zeros(0, dtype=int)
         parts = [Contacts(none, none, none, none.reshape(0, 2), np.zeros(0), np.zeros((0, 2)), np.zeros(0))]
@@ -423,13 +369,7 @@ class Contact:
     # -- mechanics -----------------------------------------------------------------------------------------------------
 
     def solve(self, first: float = 0.02, smallest: float = SMALLEST_LOAD_STEP) -> None:
-        """Equilibrium under the whole load, in load steps that are as long as Newton's method allows.
-
-        Parameters
-        ----------
-        first, smallest : float
-            First and smallest load step [1].
-        """
+        """Find the equilibrium under the whole load, in the longest load steps [1] that converge."""
         step = first
         while self.share < 1.0:
             step = min(step, 1.0 - self.share)
@@ -448,13 +388,7 @@ class Contact:
                 step *= 2.0
 
     def newton(self, share: float) -> int | None:
-        """Newton's method at a share of the load.
-
-        Parameters
-        ----------
-        share : float
-            [1]
-        """
+        """Run Newton's method at a share of the load [1]."""
         near = False
         for body in self.bodies:
             if body.prescribed is not None:
@@ -471,9 +405,9 @@ class Contact:
         return None
 
     def _step(self, share: float, near: bool) -> float | None:
-        """One Newton step at a share of the load, no longer than may be: its longest way [m]; None where there is none.
+        """Take one bounded Newton step and return its largest displacement [m]; None if there is no step.
 
-        `near` says whether the step before was short, so that its closed contacts may be taken for those of this one.
+        `near` says that the last step was short, so that its closed contacts are a good guess.
         """
         contacts = self.find()
         with np.errstate(all="ignore"):
@@ -513,10 +447,9 @@ class Contact:
         gaps: np.ndarray,
         likely: np.ndarray,
     ) -> tuple[list[np.ndarray], np.ndarray]:
-        """Steps and contact forces from the quadratic minimum under the conditions of all contacts.
+        """Return steps and contact forces of the quadratic minimum under all contact conditions.
 
-        Of many contacts few close: the minimum is found under the conditions of those that are likely to, and of
-        those that it breaks besides.
+        Few of many contacts close: the minimum takes the likely ones, and then adds those that it violates.
         """
         solves = [body.solver(tangent) for body, tangent in zip(self.bodies, tangents)]
         steps = free = [solve(part) for solve, part in zip(solves, missing)]
@@ -545,11 +478,11 @@ class Contact:
         gaps: np.ndarray,
         closed: np.ndarray,
     ) -> tuple[list[np.ndarray], np.ndarray] | None:
-        """Newton step with the contacts that were closed; None where it is not clear which ones are.
+        """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear.
 
-        Its tangent needs to be definite on what the closed contacts leave free, no more: the step of a true Newton
-        method, where `_opening` adds resistance. Contacts that pull are opened and those that close are added, a few
-        times over.
+        Contacts that pull are opened and those that close are added, a few times over. The tangent needs to be
+        definite only on the motions that closed contacts leave free. This is a true Newton step; `_opening` adds
+        resistance.
         """
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
         stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)
@@ -573,7 +506,7 @@ class Contact:
         return None
 
     def _known(self, contacts: Contacts) -> np.ndarray:
-        """Contact forces of the step before on the corners that are still near [N], shape (n_contacts,)."""
+        """Return the last step's contact forces on corners still near [N], shape (n_contacts,)."""
         old = self.contacts
         if old is None:
             return np.zeros(len(contacts.gaps))
@@ -582,7 +515,7 @@ class Contact:
         return np.array([forces.get(key, 0.0) for key in keys])
 
     def _turning(self, contacts: Contacts, forces: np.ndarray) -> list[csc_array | None]:
-        """Stiffness of the contact forces as the edges turn that they act on: the curvature of the gaps, by body."""
+        """Return the stiffness of contact forces as their edges turn, by body: the curvature of the gaps."""
         parts: list[csc_array | None] = [None] * len(self.bodies)
         for number, body in enumerate(self.bodies):
             met = np.flatnonzero((contacts.targets == number) & (forces > 0))
@@ -659,22 +592,12 @@ def _depth(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
 
 
 def _complementary(schur: np.ndarray, opening: np.ndarray, likely: np.ndarray) -> np.ndarray:
-    """Forces, none negative, that open gaps ``opening + schur @ forces`` to zero or more, and act on closed ones alone.
+    """Return forces >= 0 that open the gaps ``opening + schur @ forces`` to >= 0 and act on closed contacts alone.
 
-    The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and Kunisch,
-    SIAM J. Optim. 13:865, 2002), and by non-negative least squares where that cycles. Corners along a plane joint, or
-    several on one edge, are more conditions than there are ways to move: a hair of compliance lets them share a force.
-
-    Parameters
-    ----------
-    schur : ndarray of float, shape (n, n)
-    opening : ndarray of float, shape (n,)
-    likely : ndarray of bool, shape (n,)
-        Contacts that are closed, as a first guess.
-
-    Returns
-    -------
-    ndarray of float, shape (n,)
+    The minimum of a quadratic over the positive quadrant, by a primal-dual active set (Hintermueller, Ito and
+    Kunisch, SIAM J. Optim. 13:865, 2002), and by non-negative least squares if that cycles. `likely` is the first
+    guess of closed contacts. Corners along a plane joint can be redundant: a small compliance lets them share a
+    force.
     """
     # Corners of stiff and of soft bodies: each in units of its own compliance.
     own = np.diagonal(schur)

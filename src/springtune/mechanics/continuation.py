@@ -9,29 +9,29 @@ from .network import Network
 from .newton import TOLERANCE
 
 BEYOND = 0.25
-"""First increment beyond the last load step, over that step, which is the longest one."""
+"""First increment beyond the last load step, over that step."""
 
 MOST_BEYOND = 24
-"""Points of a path beyond the last load step that are looked at for a limit point."""
+"""Most points beyond the last load step in search of a limit point."""
 
 SHORTEST_BEYOND = 1e-6
 """Shortest increment beyond the last load step, over that step."""
 
 SHORTEST_INVERTED = 1e-3
-"""Shortest increment to a place where a cell turns inside out, over that step."""
+"""Shortest increment to a place where a cell inverts, over that step."""
 
 NEARLY = 1e-3
-"""Load below a limit point, over it, that may be above it all the same: the limit point is estimated."""
+"""Relative distance below a limit point, which is only estimated, at which a load may lie above it."""
 
 MOST_BEHIND = 60
-"""Points of a path behind a limit point that are looked at for a stable one that carries the load."""
+"""Most points behind a limit point in search of a stable one that carries the load."""
 
 FEW, MANY = 3, 8
 """Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
 
 
 class Continued(Protocol):
-    """What has a path: a network under a load, as `springtune.mechanics.statics.StaticProblem`."""
+    """Problem with an equilibrium path, such as `springtune.mechanics.statics.StaticProblem`."""
 
     network: Network
     load_norm: float
@@ -40,10 +40,10 @@ class Continued(Protocol):
         """Load pattern at displacements."""
 
     def rate(self, displacements: np.ndarray) -> np.ndarray:
-        """As `load_at`, with what prescribed displacements pull as they grow."""
+        """As `load_at`, with the forces of growing prescribed displacements."""
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with those that are prescribed at a load in their places."""
+        """Displacements with those prescribed at a load inserted."""
 
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
         """Factor of the tangent of resistance less load."""
@@ -67,23 +67,10 @@ class Point(NamedTuple):
 def next_point(
     problem: Continued, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
 ) -> tuple[Point | None, float]:
-    """Point after the last one, and the length of the increment, halved where Newton's method fails; None beyond.
+    """Return the next point, or None, and its increment's length [m], halved while Newton's method fails.
 
-    Parameters
-    ----------
-    s : float
-        A load, whose sign is the way the path begins [m].
-    direction : ndarray of float, shape (unknowns,), or None
-        From the point before the last to it [m]; None at rest.
-    length : float
-        Of the increment, norm of the displacements of all unknowns [m].
-    shortest : float
-        Length down to which it is halved [m].
-
-    Returns
-    -------
-    length : float
-        Of its increment [m].
+    The sign of the load `s` [m] is the way the path begins; `direction` (unknowns,) [m] points from the point before,
+    None at rest. `length` and `shortest` are norms of the displacements of all unknowns [m].
     """
     displacements = problem.moved(last.load, problem.network.expand(last.u))
     try:
@@ -122,19 +109,19 @@ def _correct(problem: Continued, last: Point, du: np.ndarray, ds: float, scale: 
 
 
 class Continuation(NamedTuple):
-    """Where a path leads beyond an equilibrium.
+    """Path beyond an equilibrium.
 
     Attributes
     ----------
     limit : float
-        Largest load before the path turns back, with one more negative eigenvalue behind it [m]; NaN where it does not.
+        Largest load before the path turns back with one more negative eigenvalue [m], or NaN.
     lost : float
-        First load at which the path was found unstable before it turns back [m]; NaN where it was not.
+        First load at which the path was unstable before it turns back [m], or NaN.
     end : Point or None
-        Stable point at or beyond the load that was asked for, or the last one below it where a limit point is above it;
-        or where the path comes back to that load behind a limit point. None where none was found.
+        Stable point at or beyond the target, the last below it before a limit point, or the one behind it that
+        regains the load.
     inverts : bool
-        Whether a cell turns inside out before the path turns back or gets there.
+        Whether a cell inverts before the path turns back or reaches the target.
     """
 
     limit: float
@@ -148,17 +135,9 @@ def continued(
 ) -> Continuation:
     """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
 
-    Parameters
-    ----------
-    load : float
-        Of the equilibrium, over the reference stiffness [m].
-    last, before : ndarray of float, shape (n_points, 2)
-        Displacements there, and in equilibrium shortly before [m].
-    target : float
-        Load to reach [m].
-    farthest : float, optional
-        Length of an increment behind a limit point, norm of the displacements of all unknowns [m]; the path is not
-        followed behind it without.
+    The equilibrium is at `load` with displacements `last`; `before` is one shortly before. Loads are over the
+    reference stiffness [m]. `farthest` is the increment behind a limit point, norm of all displacements [m]; 0 stops
+    there.
 
     Examples
     --------

@@ -1,16 +1,13 @@
-"""Masses, dampers and time: networks in motion.
+"""Networks in motion: masses, dampers and time steps.
 
-A network whose loads, stiffnesses and energies are over a reference stiffness k moves as
-``(m/k) u'' + (c/k) u' + r(u) = s p``: masses enter as inertia m/k [s2], dampers as c/k [s], and frequencies and steps
-are in seconds all the same.
+With loads and stiffnesses over a reference stiffness k a network moves as ``(m/k) u'' + (c/k) u' + r(u) = s p``.
+Masses enter as inertia m/k [s2] and dampers as c/k [s]; frequencies and steps stay in seconds.
 
-Explicit steps factorize nothing, and assemble nothing but the rows of a linear network. They are bounded before the
-run by `Motion.step_limit`; where the bound is not kept, and in every other case of a run that came to nothing, the
-status and the message of a `Run` say so.
+Explicit steps need no factorization; `Motion.step_limit` bounds them before the run. The status and message of a
+`Run` report failures.
 
-A run ends at rest on any equilibrium, be it one that the least push would end: a straight column above its buckling
-load. The tangent where a run came to rest is therefore factorized, once and for all kinds of runs, and its negative
-pivots are counted.
+A run can rest on an unstable equilibrium, such as a straight column above its buckling load. So the tangent at rest
+is factorized once, and its negative pivots are counted.
 """
 
 from collections.abc import Callable
@@ -32,28 +29,17 @@ from .statics import StaticProblem
 from .stepping import make_stepper
 
 CHECK = 64
-"""Steps between looks at an explicit run: a look costs about two steps, one for rest some twenty."""
+"""Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
 
 BLOWN_UP = 1e3
 """Displacement over the largest of the network's extents beyond which a run has left its model."""
 
 
 def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
-    """Lumped mass of each particle [kg], shape (n_points,): a cell of area A gives ``rho A t / n`` to its n corners.
+    """Return lumped masses [kg], shape (n_points,): a cell of area A gives ``rho A t / n`` to each of its n corners.
 
-    The total is exact; the centre is that of the body for triangles and parallelograms (the paper's equation 1).
-
-    Parameters
-    ----------
-    density : float
-        [kg/m3]
-    thickness : float
-        [m]
-
-    Returns
-    -------
-    ndarray of float, shape (n_points,)
-        [kg]
+    The total is exact; the centre of mass is exact for triangles and parallelograms (equation 1 of the paper).
+    `density` is in kg/m3, `thickness` in m.
     """
     return density * thickness * mesh.particle_areas
 
@@ -64,21 +50,9 @@ def centre(mesh: Mesh, masses: np.ndarray) -> np.ndarray:
 
 
 def rayleigh(ratios: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
-    r"""Damping in proportion to mass and stiffness that has given ratios at two frequencies.
+    r"""Return Rayleigh's alpha [1/s] and beta [s] for given damping ratios at two angular frequencies [rad/s].
 
     .. math:: \xi(\omega) = \frac{\alpha}{2 \omega} + \frac{\beta \omega}{2}
-
-    Parameters
-    ----------
-    ratios : tuple of float
-        Damping ratios [1].
-    frequencies : tuple of float
-        Their angular frequencies [rad/s].
-
-    Returns
-    -------
-    mass_damping, stiffness_damping : float
-        alpha [1/s] and beta [s].
 
     Examples
     --------
@@ -100,25 +74,25 @@ def rayleigh(ratios: tuple[float, float], frequencies: tuple[float, float]) -> t
 
 @dataclass(frozen=True)
 class Run:
-    """What became of a run.
+    """Result of a run.
 
     Attributes
     ----------
     displacements, velocities : ndarray of float, shape (n_points, 2)
-        Where it ended [m], [m/s].
+        Final state [m], [m/s].
     status : str
-        ``"rest"`` (on a stable equilibrium), ``"unstable"`` (at rest on one that is not), ``"moving"`` (all steps are
-        done), ``"diverged"`` or ``"inverted"``.
+        ``"rest"`` (stable), ``"unstable"`` (at rest on an unstable equilibrium), ``"moving"`` (all steps done),
+        ``"diverged"`` or ``"inverted"``.
     message : str
-        What went wrong and what to do; empty where nothing did.
+        What went wrong and what to do; else empty.
     time : float
         [s]
     residual : float
-        Out-of-balance force over the load at the end [1]; over the reference stiffness without a load [m].
+        Final out-of-balance force over the load [1]; without a load, over the reference stiffness [m].
     step_bound : float
-        Step that is safe by each particle's stiffness alone [s], known before the run; infinite for implicit schemes.
+        Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
     samples : ndarray of float, shape (n, 4)
-        Time [s], energy over the reference stiffness [m2], and momentum over it [m s]; only where asked for.
+        Time [s], and energy [m2] and momentum [m s] over the reference stiffness, if asked for.
     """
 
     displacements: np.ndarray
@@ -133,24 +107,15 @@ class Run:
 
 
 class Motion:
-    """A network with masses, dampers and a load.
+    """Network with masses, dampers and a load.
 
-    Parameters
-    ----------
-    inertia : ndarray of float, shape (n_points,)
-        Mass of each particle over the reference stiffness [s2].
-    load : ndarray of float, shape (n_points, 2), optional
-        Force on each particle over the reference stiffness [m]; none without.
-    mass_damping : float, optional
-        Damping over mass, alpha [1/s].
-    dampers : ndarray of float, shape (n_springs,), optional
-        Damping of each spring along its direction over the reference stiffness [s]; ``beta * network.stiffness`` is
-        damping in proportion to the springs' stiffness.
+    `inertia` (n_points,) is mass over reference stiffness [s2] and `load` (n_points, 2) force over it [m].
+    `mass_damping` is alpha [1/s]. `dampers` (n_springs,) is damping along each spring over the reference stiffness
+    [s]; ``beta * network.stiffness`` is Rayleigh damping by stiffness.
 
     Examples
     --------
-    A mass of 1 on a spring of stiffness 1, its frequency 1: explicit steps up to 2 are stable, and it is back after
-    two pi.
+    A mass of 1 on a spring of stiffness 1: explicit steps up to 2 are stable, and the period is two pi.
 
     >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
     >>> held = np.array([[True, True], [False, True], [True, True]])
@@ -214,7 +179,7 @@ class Motion:
 
     @cached_property
     def particle_bound(self) -> float:
-        """Bound of the highest frequency from each particle's springs alone [rad/s]: above `omega_max`, never below.
+        """Return an upper bound of the highest frequency from each particle's springs [rad/s].
 
         ``omega^2 <= max_i 2 sum_j k_ij / m_i``, see `Network.local_stiffness`.
         """
@@ -231,16 +196,11 @@ class Motion:
         return float(np.sqrt(_largest(root @ self.stiffness_matrix @ root)[0]))
 
     def step_limit(self, integrator: str) -> float:
-        r"""Largest stable step about rest [s]; infinite for implicit schemes.
+        r"""Return the largest stable step about rest [s]; infinite for implicit schemes.
 
-        Without damping that lags it is :math:`2/\omega_{max}`. With such damping, steps h are stable as long as
-        :math:`4 M - 2 h C - h^2 K` has no negative eigenvalue; for one mode of damping ratio xi that is
-        :math:`(2/\omega)(\sqrt{1 + \xi^2} - \xi)`.
-
-        Returns
-        -------
-        float
-            [s]
+        Without lagged damping it is :math:`2/\omega_{max}`. With it, steps h are stable while :math:`4 M - 2 h C -
+        h^2 K` has no negative eigenvalue; for one mode of damping ratio xi that is :math:`(2/\omega)(\sqrt{1 + \xi^2}
+        - \xi)`.
         """
         if integrator in IMPLICIT:
             return np.inf
@@ -263,10 +223,9 @@ class Motion:
 
     @cached_property
     def loaded_frequency(self) -> float:
-        """Lowest frequency that the load excites [rad/s]: of the mode with the largest share in the static answer.
+        """Return the frequency [rad/s] of the lowest mode that the load excites, by share in the static answer.
 
-        By Lanczos' method from that answer, which a symmetric load keeps among the modes that it excites; one
-        factorization.
+        By Lanczos' method from the static answer, which keeps to the load's symmetry; one factorization.
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
@@ -288,7 +247,7 @@ class Motion:
         return float(np.sqrt(squares[int(np.argmax(shares))]))
 
     def critical(self) -> "Motion":
-        """As it is, with damping in proportion to mass that is critical for the lowest loaded mode."""
+        """The same motion with critical mass damping of the lowest loaded mode."""
         return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
 
     # -- mechanics --------------------------------------------------------------------------------------------------
@@ -330,16 +289,10 @@ class Motion:
         precision: str = "float64",
         threads: int = 1,
     ) -> Run:
-        """Move for a number of steps, or until rest.
+        """Take a number of steps, or step until rest.
 
-        Parameters
-        ----------
-        step : float
-            [s]
-        start, velocities : ndarray of float, shape (n_points, 2), optional
-            Where it starts [m], [m/s]; at rest without.
-        watch : callable, optional
-            Told time [s], displacements [m] and velocities [m/s], shape (n_points, 2), with every sample.
+        `step` is in s; `start` and `velocities` have shape (n_points, 2) [m], [m/s], zero by default. `watch` gets
+        time, displacements and velocities with every sample.
         """
         name = "backward-euler" if isinstance(integrator, BackwardEuler) else integrator
         if name not in INTEGRATORS:
@@ -390,7 +343,7 @@ class Motion:
     def _end(
         self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int
     ) -> tuple[str, str] | None:
-        """Status and message of a run that came to nothing; None where it may go on."""
+        """Status and message of a failed run; None if it may go on."""
         size = np.abs(u).max()
         if not np.isfinite(size) or size > self._farthest or not np.isfinite(v).all():
             return "diverged", self._why(integrator, step, done)
@@ -413,7 +366,7 @@ class Motion:
         return status, message
 
     def _moving_end(self, u: np.ndarray, rest: float | None, steps: int) -> tuple[str, str]:
-        """Status and message of a run whose steps are all done."""
+        """Status and message after the last step of a run."""
         if self.network.inverted(u):
             return self._inverted_end(steps)
         if rest is None:
@@ -433,13 +386,7 @@ class Motion:
         return 0.5 * float((self.inertia * v**2).sum()) <= rest**2 * work
 
     def judge_rest(self, displacements: np.ndarray) -> tuple[str, str]:
-        """Whether an equilibrium is stable: status and message of a run that came to rest there.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-        """
+        """Return status and message of an equilibrium, by its stability."""
         network = self.network
         if free_motion(network.mesh.points, network.held):
             return "rest", "the body is free to move as a whole, so whether it is stable was not checked"
@@ -494,17 +441,12 @@ def relax(
     tolerance: float = TOLERANCE,
     max_steps: int = 200_000,
 ) -> Run:
-    r"""Equilibrium by dynamic relaxation: explicit steps with masses and damping made for it.
+    r"""Find an equilibrium by dynamic relaxation: explicit steps with fictitious masses and damping.
 
-    Masses of twice the row sums of stiffness make a step of 1 stable and all local frequencies alike; the damping is
-    critical for the frequency :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` of the motion at
-    hand (Underwood, Dynamic relaxation, in: Computational methods for transient analysis, 1983, ch. 5).
-    No step factorizes; what came to rest is judged by one factorization, as a `Motion.run` is.
-
-    Parameters
-    ----------
-    load : ndarray of float, shape (n_points, 2)
-        Force on each particle over the reference stiffness [m].
+    Masses of twice the row sums of stiffness make a step of 1 stable. The damping is critical for the current
+    frequency :math:`\omega^2 = \Delta u \cdot \Delta r / \Delta u \cdot M \Delta u` (Underwood, Dynamic relaxation,
+    in: Computational methods for transient analysis, 1983, ch. 5). `load` (n_points, 2) is force over reference
+    stiffness [m]. One factorization judges the stability of the result.
     """
     # A quarter of the bound makes a step of 1 just stable; a fifth more is room for springs that stiffen.
     inertia = 0.3 * network.local_stiffness.max(axis=1, initial=0.0, where=~network.held)

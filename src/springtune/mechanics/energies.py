@@ -1,12 +1,10 @@
-"""Energies that a network may have besides its springs: of areas, of angles, of squared edge lengths, and of rubber.
+"""Energies besides springs: of areas, of angles, of squared edge lengths, and of rubber.
 
-An energy is a sum over cells of the mesh. It gives its value, the forces with which it resists displacements and its
-exact tangent, cell by cell; a network adds them to those of its springs. Changes of areas, angles and squared lengths
-are taken from the displacements: subtracting two states would lose as many digits as the strain is small. Moduli are
-multiples of the network's reference stiffness.
+An energy is a sum over cells. It gives its value, its forces and its exact tangent cell by cell. Changes of areas,
+angles and lengths are computed from displacements, since subtracting two states would lose digits at small strain.
+Moduli are over the network's reference stiffness.
 
-Inside, fields are held corner by corner, shape (2, m, n_cells): arithmetic on whole rows of cells is several times
-faster than on their short vectors.
+Inside, fields have shape (2, m, n_cells): numpy is several times faster on long rows than on short vectors.
 """
 
 from abc import ABC, abstractmethod
@@ -42,12 +40,7 @@ def preceding(field: np.ndarray) -> np.ndarray:
 class Energy(ABC):
     """Base of the energies.
 
-    Attributes
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        Rest positions of the particles [m].
-    corners : ndarray of int, shape (n_cells, m)
-        Particles of each cell, counter-clockwise: all cells of a mesh with so many corners, or some.
+    `points` (n_points, 2) are rest positions [m]; `corners` (n_cells, m) are each cell's particles, counter-clockwise.
     """
 
     points: np.ndarray
@@ -78,11 +71,10 @@ class Energy(ABC):
         return self._forces(self._at_corners(displacements)).transpose(2, 1, 0)
 
     def couplings(self, displacements: np.ndarray | None = None) -> np.ndarray:
-        """Blocks of the tangent that couple two corners of a cell [1], shape (n_pairs, 2, 2, n_cells).
+        """Return tangent blocks of pairs of corners of a cell [1], shape (n_pairs, 2, 2, n_cells); at rest by default.
 
-        Pairs are in the order of `Mesh.cell_edges`; first axes: pair, direction at its first corner, at its second. An
-        energy does not change with a common displacement, so these are all there is to know of the tangent. At rest
-        without displacements.
+        Axes: pair in the order of `Mesh.cell_edges`, direction at its first corner, direction at its second. They
+        define the whole tangent, since a common displacement changes no energy.
         """
         moved = np.zeros(self._rest.shape) if displacements is None else self._at_corners(displacements)
         return self._couplings(moved)
@@ -99,18 +91,18 @@ class Energy(ABC):
         return tangent.reshape(count, 2 * corners, 2 * corners)
 
     def objection(self, displacements: np.ndarray) -> str:
-        """What there is against its answer at displacements [m] of shape (n_points, 2); empty where nothing is."""
+        """Why the answer at displacements (n_points, 2) [m] is doubtful, or an empty string."""
         return ""
 
     @property
     def key(self) -> bytes:
-        """Bytes that tell energies of one mesh apart."""
+        """Bytes that distinguish energies of one mesh."""
         moduli = (np.ascontiguousarray(part).tobytes() for part in self._moduli())
         return type(self).__name__.encode() + self._cells + b"".join(moduli)
 
     @cached_property
     def _cells(self) -> bytes:
-        """Digest of the cells, which need not be all of the mesh."""
+        """Digest of the cells, which may be a part of the mesh."""
         return sha256(np.ascontiguousarray(self.corners).tobytes()).digest()
 
     @property
@@ -127,14 +119,9 @@ class Energy(ABC):
 
 @dataclass(frozen=True)
 class AreaEnergy(Energy):
-    r"""Energy of the area of each cell, a triangle or any polygon.
+    r"""Energy of the area of each cell; `modulus` (n_cells,) is kappa over the reference stiffness [1].
 
     .. math:: W = \tfrac{1}{2} \kappa (A - A_0)^2 / A_0
-
-    Parameters
-    ----------
-    modulus : ndarray of float, shape (n_cells,)
-        Modulus kappa over the reference stiffness [1].
     """
 
     points: np.ndarray
@@ -181,14 +168,9 @@ class AreaEnergy(Energy):
 
 @dataclass(frozen=True)
 class AngleEnergy(Energy):
-    r"""Energy of the three angles of each triangle.
+    r"""Energy of the angles of each triangle; `modulus` (n_cells,) is beta over the reference stiffness [m2].
 
     .. math:: W = \tfrac{1}{2} \beta \sum_i (\theta_i - \theta_{i,0})^2
-
-    Parameters
-    ----------
-    modulus : ndarray of float, shape (n_cells,)
-        Modulus beta over the reference stiffness [m2].
     """
 
     points: np.ndarray
@@ -256,12 +238,8 @@ class BiquadraticEnergy(Energy):
 
     .. math:: W = \sum_i \tfrac{k_i}{4} q_i^2 + \sum_{i<j} \tfrac{\gamma_{ij}}{2} q_i q_j
 
-    Parameters
-    ----------
-    tensile : ndarray of float, shape (n_cells, 3)
-        Stiffnesses k_i over the reference stiffness [1/m2].
-    coupling : ndarray of float, shape (n_cells, 3), or None
-        Stiffnesses gamma of the two sides that meet in each corner, over the reference stiffness [1/m2].
+    `tensile` is k_i and `coupling` the gamma of the two sides that meet in each corner: both (n_cells, 3), over the
+    reference stiffness [1/m2].
     """
 
     points: np.ndarray
@@ -324,16 +302,15 @@ class BiquadraticEnergy(Energy):
 
 @dataclass(frozen=True)
 class _SheetEnergy(Energy):
-    r"""Base of isotropic laws of rubber: energies of the trace of C and of the ratio J of the areas of a triangle.
+    r"""Base of isotropic rubber laws: energies of the trace of C and of the area ratio J of a triangle.
 
-    On a triangle ``tr C A_0`` is half the sum over its sides of the opposite angle's cotangent times the length
-    squared: springs of zero rest length. So each such law is these springs and areas. What is differentiated is a
+    ``tr C A_0`` is half the sum over the sides of the opposite angle's cotangent times the squared length. A law is a
     function of J and of
 
     .. math:: D = tr C - 2 J = (F_{11} - F_{22})^2 + (F_{12} + F_{21})^2,
 
-    the square of the difference of the principal stretches: both terms are linear in the displacements, so that
-    nothing cancels near rest. There is no energy, and no finite force, of a triangle that is flat or inside out.
+    the squared difference of the principal stretches. Both terms are linear in the displacements, so nothing cancels
+    near rest. Flat or inverted triangles have no finite energy.
     """
 
     points: np.ndarray
@@ -341,10 +318,7 @@ class _SheetEnergy(Energy):
 
     @abstractmethod
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Energy over the rest area; its derivatives by D and by J; by D twice, by D and J, and by J twice.
-
-        Of D and of J - 1, which is above -1.
-        """
+        """Return the energy over the rest area and its derivatives by D, J, DD, DJ and JJ, at D and J - 1 > -1."""
 
     @cached_property
     def _rest_slopes(self) -> np.ndarray:
@@ -355,7 +329,7 @@ class _SheetEnergy(Energy):
         return 0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0)
 
     def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-        """Derivatives of D and of J by each corner's position [1/m], and the law; what is inside out is NaN."""
+        """Derivatives of D and of J by each corner's position [1/m], and the law; NaN for inverted triangles."""
         moved = moved - moved[:, :1]
         area, (along, across) = self._rest_area, self._rest_slopes
         first, second = self._apart(moved)
@@ -418,14 +392,9 @@ class YeohEnergy(_SheetEnergy):
 
     .. math:: W = A_0 \sum_{n \ge 1} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2}
 
-    O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990; with the first term alone a neo-Hookean sheet, ``c_1 = mu t / 2``.
-
-    Parameters
-    ----------
-    coefficients : ndarray of float, shape (n_cells, n)
-        Coefficients times the thickness over the reference stiffness [1], from the linear one on.
-    largest : float or ndarray of float, shape (n_cells,), optional
-        Largest I_1 - 3 of the test that they were fitted to [1]; beyond, they are extrapolated.
+    O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990; one term alone is neo-Hookean, ``c_1 = mu t / 2``. `coefficients`
+    (n_cells, n) are times the thickness over the reference stiffness [1], the linear one first. `largest` is the
+    largest I_1 - 3 of the fitted test; the law extrapolates beyond it.
     """
 
     points: np.ndarray
@@ -437,7 +406,7 @@ class YeohEnergy(_SheetEnergy):
         return self.coefficients, np.array(self.largest)
 
     def objection(self, displacements: np.ndarray) -> str:
-        """As of `Energy`: how many triangles are stretched beyond the data."""
+        """As of `Energy`: the number of triangles stretched beyond the data."""
         if not np.isfinite(self.largest).any():
             return ""
         with np.errstate(invalid="ignore"):
@@ -469,7 +438,7 @@ class YeohEnergy(_SheetEnergy):
 
 
 HALVED = np.log(0.5)
-"""Logarithm of the least volume that `NeoHookeEnergy` has an equilibrium across the sheet for."""
+"""Logarithm of the smallest volume with an equilibrium across the sheet in `NeoHookeEnergy`."""
 
 MOST_ITERATIONS = 60
 """Steps of Newton's method, or halvings, for the volume of a cell: a handful are taken."""
@@ -477,23 +446,19 @@ MOST_ITERATIONS = 60
 
 @dataclass(frozen=True)
 class NeoHookeEnergy(_SheetEnergy):
-    r"""Energy of a compressible neo-Hookean sheet in plane stress, that of CalculiX and Abaqus.
+    r"""Energy of the compressible neo-Hookean sheet in plane stress of CalculiX and Abaqus.
 
     .. math:: W = A_0 \min_z \left[ \tfrac{\mu}{2} (J_3^{-2/3} (tr C + z^2) - 3) + \tfrac{K}{2} (J_3 - 1)^2 \right],
         \quad J_3 = z J
 
-    The stretch z across the sheet has its equilibrium in each cell, to which a scalar Newton's method leads. With
-    ``v = ln J_3`` and ``y = ln J - 2 v / 3`` the bracket is
+    A scalar Newton's method finds the stretch z across the sheet in each cell. With ``v = ln J_3`` and ``y = ln J - 2
+    v / 3`` the bracket is
 
     .. math:: \tfrac{\mu}{2} (e^{y} / J \, D + 2 e^y + e^{-2 y} - 3) + \tfrac{K}{2} (e^v - 1)^2.
 
-    The law lets a sheet that is pressed to less than half of its volume collapse across its thickness: it has no
-    energy there, as it has none inside out. An incompressible sheet, whose K is infinite, is a `YeohEnergy`.
-
-    Parameters
-    ----------
-    shear, bulk : ndarray of float, shape (n_cells,)
-        Shear modulus mu and bulk modulus K at small strain times the thickness over the reference stiffness [1].
+    Under this law a sheet pressed to less than half of its volume collapses across its thickness: it has no energy
+    there, nor when inverted. For infinite K use `YeohEnergy`. `shear` and `bulk` (n_cells,) are mu and K at small
+    strain times the thickness over the reference stiffness [1].
     """
 
     points: np.ndarray

@@ -1,9 +1,8 @@
 """Power series of an equilibrium path about one of its points.
 
-With ``s = F / k`` a uniform network's path u(s) is analytic. A series costs one factorization and one
-back-substitution an order (asymptotic numerical method: Cochelin, Damil and Potier-Ferry, Revue europeenne des elements
-finis 3(2):281, 1994); Pade approximants continue it past its poles. The nearest of these is the buckling load, even for
-a beam in tension.
+The path u(s) of ``s = F / k`` is analytic. A series costs one factorization and one back-substitution an order
+(asymptotic numerical method: Cochelin, Damil and Potier-Ferry, Revue europeenne des elements finis 3(2):281, 1994).
+Pade approximants continue it past its poles; the nearest pole is the buckling load, even for a beam in tension.
 """
 
 from collections.abc import Callable
@@ -16,7 +15,7 @@ from ..linalg.factors import Factor
 from .network import Network
 
 ORDER = 14
-"""Order of a series that gives a whole curve, as a rule."""
+"""Default order of a series for a whole curve."""
 
 STEP = 1e-3
 """Difference of two approximants over the way from the point that ends a step along the path."""
@@ -25,27 +24,13 @@ STEP = 1e-3
 class Expansion:
     """Power series of the equilibrium path about one of its points.
 
-    With a parameter ``sigma`` displacements, loads, a spring's vector d, its length l and ``w = 1/l`` are power series.
-    From ``l^2 = d.d``, ``w l = 1`` and the force ``k (d - L w d)``, order n follows from lower orders by one solve with
-    the tangent at the point. The parameter is the growth of the load; or, where the load may turn, the way along the
-    path: the displacements' share of their first derivative v, ``sigma = (u - u_0).v / v.v``, as the first order of
-    the load is 1 either way.
+    Displacements, loads, a spring's vector d, its length l and ``w = 1/l`` are power series of ``sigma``. From ``l^2
+    = d.d``, ``w l = 1`` and the force ``k (d - L w d)``, order n follows from lower orders by one solve with the
+    tangent. The parameter is the growth of the load; or, where the load may turn, the way along the path ``sigma = (u
+    - u_0).v / v.v`` with the first derivative v, as the first order of the load is 1 either way.
 
-    Parameters
-    ----------
-    load : ndarray of float, shape (unknowns,)
-        Load pattern [1].
-    s : float
-        Force over the reference stiffness at the point [m].
-    displacements : ndarray of float, shape (n_points, 2), or None
-        Equilibrium at the point [m]; None at rest.
-
-    Attributes
-    ----------
-    coefficients : ndarray of float, shape (order + 1, n_points, 2)
-        The displacements are ``sum_n coefficients[n] sigma^n``.
-    loads : ndarray of float, shape (order + 1,)
-        The loads are ``sum_n loads[n] sigma^n`` [m].
+    `load` (unknowns,) is the pattern [1]; `s` [m] and `displacements` (None at rest) are the point. Displacements are
+    ``sum_n coefficients[n] sigma^n``, shape (order + 1, n_points, 2), and loads ``sum_n loads[n] sigma^n`` [m].
 
     Examples
     --------
@@ -86,7 +71,7 @@ class Expansion:
         self._extend(order)
 
     def extended(self, order: int) -> "Expansion":
-        """The series up to a higher order; this one stays what it is, for whoever else has it."""
+        """Return the series up to a higher order; this one does not change."""
         longer = copy(self)
         longer._extend(order)
         return longer
@@ -147,7 +132,7 @@ class Expansion:
         return float((sizes[1] / sizes[-1]) ** (1.0 / (self.order - 1))) if sizes[-1] else 1.0
 
     def _denominator(self, lower: int) -> np.ndarray:
-        """Coefficients of a denominator whose product with the series has least orders beyond the numerator's.
+        """Return the denominator whose product with the series has the smallest orders beyond the numerator's.
 
         In powers of the parameter over the radius.
         """
@@ -164,10 +149,10 @@ class Expansion:
         return self._denominators[lower]
 
     def _shares(self, sigma: float, less: int = 0) -> np.ndarray:
-        """Factors of the coefficients in their approximant of one denominator, shape (order + 1,).
+        """Return the factors of the coefficients in their approximant with one denominator, shape (order + 1,).
 
-        The denominator is of half the order, or of a degree `less`. The numerator has the rest where the series is
-        asked for far beyond its radius, and all orders where the path may turn within it.
+        The denominator has half the order, or a degree `less`. The numerator has the rest far beyond the radius, and
+        all orders where the path may turn within it.
         """
         lower = self.order // 2 - less
         upper = self.order if self.turning else self.order - lower
@@ -181,7 +166,7 @@ class Expansion:
         return shares
 
     def at(self, sigma: float) -> tuple[float, np.ndarray]:
-        """Load [m] and displacements [m], shape (n_points, 2), at a value of the parameter: a vector Pade approximant.
+        """Return load [m] and displacements [m], shape (n_points, 2), at sigma: a vector Pade approximant.
 
         All components share one denominator (Cochelin, Damil and Potier-Ferry, Int. J. Num. Meth. Eng. 37:1187, 1994).
         """
@@ -189,13 +174,7 @@ class Expansion:
         return float(shares @ self.loads), np.tensordot(shares, self.coefficients, axes=1)
 
     def reach(self, sign: float) -> tuple[float, bool]:
-        """How far the series is good to start a solve, 0 where it is not; and whether the load turns there.
-
-        Returns
-        -------
-        sigma : float
-            Parameter [m].
-        """
+        """Return the largest sigma [m] from which a solve can start, or 0, and whether the load turns there."""
         if not np.isfinite(self._products).all():  # next to a singular point
             return 0.0, False
         sigma = 2.0 * sign * self._radius
@@ -230,19 +209,9 @@ class Expansion:
         return float(best), error if np.isfinite(error) else np.inf
 
     def measure(self, weights: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weighted sum of the displacements at each of many ``s``, by Pade approximants.
+        """Return the weighted displacement at each ``s`` [m] by Pade approximants, and its error estimate.
 
-        Parameters
-        ----------
-        weights : ndarray of float, shape (n_points, 2)
-        s : ndarray of float, shape (n,)
-            Force over the reference stiffness [m].
-
-        Returns
-        -------
-        values : ndarray of float, shape (n,)
-        errors : ndarray of float, shape (n,)
-            Largest difference to the approximants of the two lower orders, relative to the value.
+        The error is the largest relative difference to the approximants of the two lower orders.
         """
         series = np.tensordot(self.coefficients, weights, axes=2)
         sigma = np.asarray(s) - self.s

@@ -9,17 +9,10 @@ from ..mesh.cells import Mesh
 
 
 class FollowerPressure:
-    """A pressure that turns and grows with the edges that it acts on.
+    """Pressure that turns and grows with its edges.
 
-    Each edge of vector e carries ``e`` turned to the left by a right angle, times the pressure on it, half of it on
-    either end.
-
-    Parameters
-    ----------
-    edges : ndarray of int, shape (n, 2)
-        Edges of the outline, the body to the left; of one side or of several.
-    pressure : float or ndarray of float, shape (n,)
-        Force over length on each of them, towards the body [1/m].
+    Each edge of vector e carries ``e`` turned left by a right angle times its pressure, half on either end. `edges`
+    (n, 2) have the body to their left; `pressure`, one or (n,), is force over length towards the body [1/m].
     """
 
     def __init__(self, mesh: Mesh, edges: np.ndarray, pressure: float | np.ndarray) -> None:
@@ -32,13 +25,7 @@ class FollowerPressure:
 
     @classmethod
     def of_side(cls, mesh: Mesh, edges: np.ndarray, axis: int) -> "FollowerPressure":
-        """Pressure on a straight side, of total force 1 at rest.
-
-        Parameters
-        ----------
-        edges : ndarray of int, shape (n, 2)
-            Edges of the side, either way round.
-        """
+        """Return the pressure on a straight side of total force 1 at rest; `edges` (n, 2) may run either way."""
         along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
         wanted = 1 if axis == 0 else -1
         turned = np.where((wanted * along < 0)[:, None], edges[:, ::-1], edges)
@@ -52,18 +39,7 @@ class FollowerPressure:
         return load
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
-        """Forces on the particles.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (n_points, 2)
-            [1]
-        """
+        """Return the forces on the particles [1], shape (n_points, 2)."""
         sides = self.rest + displacements[self.edges[:, 1]] - displacements[self.edges[:, 0]]
         field = np.zeros(displacements.shape)
         np.add.at(field, self.edges, (self.half * np.stack([-sides[:, 1], sides[:, 0]], axis=1))[:, None, :])

@@ -1,39 +1,35 @@
-"""Names of time integrators, options of one of them, and what a run makes of noise."""
+"""Time integrators: their names, options and numerical behaviour."""
 
 from dataclasses import dataclass
 
 EXPLICIT = ("symplectic-euler", "central-difference-lagged", "central-difference")
-"""Explicit schemes. Of the same steps, apart from the velocity: that of `symplectic-euler` belongs to the displacements
-it comes with, to first order; that of central differences half a step earlier. `central-difference` takes damping in
-proportion to mass implicitly; dampers along springs lag by half a step in all of them."""
+"""Explicit schemes; they differ in the velocity.
+
+`symplectic-euler` gives it at the time of the displacements, to first order; central differences half a step before.
+`central-difference` takes mass damping implicitly; spring dampers lag by half a step in all schemes.
+"""
 
 IMPLICIT = ("backward-euler", "implicit-midpoint")
-"""Implicit schemes: the first one in the manner of SOFA, one linear solve a step, the second one of second order."""
+"""Implicit schemes: SOFA's with one linear solve a step, and one of second order."""
 
 INTEGRATORS = (*EXPLICIT, *IMPLICIT)
 
 LAGGED = ("symplectic-euler", "central-difference-lagged")
-"""Schemes in which all damping lags, and narrows the step."""
+"""Schemes in which all damping lags, which reduces the stable step."""
 
 PRECISIONS = ("float64", "float32")
 """Floating-point numbers that explicit schemes compute in."""
 
 BEHAVIOURS = ("stable", "decaying", "growing", "nan")
-"""Meanings of the flags of ``behaviour``: what a run makes of noise."""
+"""Meanings of the flags of ``behaviour``: how a run treats noise."""
 
 
 @dataclass(frozen=True)
 class BackwardEuler:
-    """The scheme ``backward-euler`` with options, in the place of its name.
+    """Options of the scheme ``backward-euler``, in place of its name.
 
-    Attributes
-    ----------
-    stiffness_damping : float
-        Rayleigh's beta [s].
-    iterations : int or None
-        Conjugate-gradient iterations of each step; each is solved by a factorization without.
-    tolerance : float
-        Relative residual at which they end earlier [1]; SOFA's default.
+    `stiffness_damping` is Rayleigh's beta [s]. `iterations` are conjugate-gradient iterations a step, or None to
+    factorize; `tolerance` is their relative residual, by default SOFA's.
     """
 
     stiffness_damping: float = 0.0

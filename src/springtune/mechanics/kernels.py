@@ -1,17 +1,16 @@
 r"""Compiled inner loops of explicit time steps.
 
-Both advance displacements u and velocities v by many steps of
+Displacements u and velocities v advance by many steps of
 
 .. math:: v \leftarrow d \, v + g \, (p - r(u) - c(v)), \qquad u \leftarrow u + h \, v
 
-with d given, and g for each direction: g holds the step over the mass, 0 where a direction is held, so that nothing is
-allocated or branched on. In single precision all arrays and numbers are single.
+with the step over the mass in g, 0 for held directions, so that nothing is allocated or branched on. In single
+precision all arrays and numbers are single.
 
-Particles are advanced in blocks, and a block by several steps before those far from it, so that its numbers stay in the
-cache of a core: step after step follows along the network at a distance of its bandwidth. So many steps are a pass;
-where there are several threads, they take passes in turns, and each follows the one before at that distance, too
-(pipelined temporal blocking, Wittmann, Hager and Wellein, 10.1109/IPDPSW.2010.5470813). What is computed, and the order
-in which the forces on a particle are summed, is the same for any number of threads and size of the blocks.
+Particles advance in blocks, a block by several steps (a pass) before distant ones, so that its numbers stay in a
+core's cache; steps follow each other at the distance of the bandwidth. Several threads take passes in turns
+(pipelined temporal blocking, Wittmann, Hager and Wellein, 10.1109/IPDPSW.2010.5470813). The results and the order of
+summation do not depend on threads or block size.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,14 +22,14 @@ from numba import config, njit, types
 from numba.extending import intrinsic
 
 PATIENCE = 1000
-"""Looks at another thread, some microseconds, after which a waiting thread lets others have its core."""
+"""Checks of another thread, some microseconds, before a waiting thread yields its core."""
 
 STRIDE = 8
-"""Numbers of a thread in what tells its progress: a line of the cache, which no other thread writes."""
+"""Array entries between progress counters of threads: a cache line, against false sharing."""
 
 
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiled when first called, and kept on disk where there is a place to write."""
+    """Compile on the first call, and cache on disk if possible."""
     try:
         return njit(cache=True, error_model="numpy", nogil=True)(function)
     except RuntimeError:  # no folder to keep it in
@@ -39,7 +38,7 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextmanager
 def packed() -> Iterator[None]:
-    """Context in which what numba compiles computes both coordinates at once, in less time, with the same digits."""
+    """Context in which numba vectorises both coordinates: faster, with the same digits."""
     options: Any = config
     before = options.SLP_VECTORIZE
     options.SLP_VECTORIZE = 1
@@ -70,15 +69,15 @@ def _acquire(context: Any, array: Any) -> Any:
 
 
 _tell: Any = intrinsic(_release)
-"""Write the first number of an array after all that was written before."""
+"""Store the first number of an array after all previous writes (release)."""
 
 _told: Any = intrinsic(_acquire)
-"""Read the first number of an array before all that is read after."""
+"""Load the first number of an array before all later reads (acquire)."""
 
 
 @_compiled
 def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: int, distance: int) -> bool:
-    """Wait until the pass before is so many blocks ahead; false where it never will."""
+    """Wait until the pass before is so many blocks ahead; False if it never will be."""
     threads = len(progress) - 1
     if threads == 1 or number == 0:
         return True
@@ -143,30 +142,16 @@ def advance_springs(
     depth: int,
     progress: np.ndarray,
 ) -> None:
-    """Steps of springs that keep their length law, each with a damper along it, in the passes of a thread.
+    """Advance springs with their length law and a damper each, in the passes of a thread.
 
-    A particle's force is whole, and nothing needs its displacement any more, when the springs are done whose other ends
-    have smaller numbers, and then its own. A block's springs are done in three loops, of which the second computes
-    several at once.
+    A particle is done after the springs to smaller numbers and then its own. A block takes three loops; the second is
+    vectorised.
 
-    Parameters
-    ----------
-    first, second : ndarray of int, shape (n_springs,)
-        Ends of the springs, in ascending order.
-    rest : ndarray, shape (2, n_springs)
-        Rest vectors [m].
-    lengths, stiffness, dampers : ndarray, shape (n_springs,)
-        Rest length [m], stiffness [1] and damping [s] over the reference stiffness; no dampers have length 0.
-    gain, load : ndarray, shape (n_points, 2)
-        g [s-1] and load [m].
-    keep, step : float
-        d [1] and step [s].
-    force : ndarray, shape (n_points, 2)
-        Loads, and loads again at the end [m].
-    room : ndarray, shape (4, most springs of a block)
-        Of the thread, for what is between the loops.
-    u, v : ndarray, shape (1, n_points, 2)
-        State [m, m/s].
+    `first`, `second` (n_springs,) are ends in ascending order; `rest` (2, n_springs) vectors [m]; `lengths` [m],
+    `stiffness` [1] and `dampers` [s] (n_springs,) over the reference stiffness, or no dampers (length 0). `gain`,
+    `load`, `force` (n_points, 2) are g [1/s] and loads [m]; `force` holds loads at start and end. `keep` is d [1],
+    `step` in s. `room` (4, most springs of a block) is a thread's scratch space; `u`, `v` (1, n_points, 2) the state
+    [m, m/s].
     """
     u, v, damped, count, threads = u[0], v[0], len(dampers) > 0, len(gain), len(progress) - 1
     ax, ay, bx, by = room[0], room[1], room[2], room[3]
@@ -230,15 +215,10 @@ def advance_matrix(
     depth: int,
     progress: np.ndarray,
 ) -> None:
-    """Steps of a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
+    """Advance a linear network in the passes of a thread, from the rows of its stiffness and damping matrices.
 
-    Parameters
-    ----------
-    stiffness, dampers : ndarray, shape (n_entries,)
-        Entries [1] and [s]; no dampers have length 0.
-    gain, load : ndarray, shape (unknowns,)
-    u, v : ndarray, shape (2, unknowns) and (1 or 2, unknowns)
-        State, from one to the other in turns where there are two: v needs two if there are dampers.
+    `stiffness` [1] and `dampers` [s] are entries, shape (n_entries,), or no dampers (length 0); `gain`, `load`
+    (unknowns,). `u` (2, unknowns) and `v` (1 or 2, unknowns) alternate between two states; v needs two with dampers.
     """
     damped, count, threads = len(dampers) > 0, len(gain), len(progress) - 1
     blocks, distance = _passes(count, size, depth, bandwidth)

@@ -6,14 +6,14 @@ r"""Effective moduli of networks: patch tests with an even strain.
         ->|    sheet           |->
           o------o------o------o          both given on the whole outline, as for even shear: G
 
-          <- o---o---o                    an affine displacement of the whole outline, rims of holes included: three of
-         <-  |  ___  | ->                 them are the stiffness of any mesh, whatever its shape; likewise three even
-             o-/   \-o  ->               tractions on the outline of the free body its compliance
+          <- o---o---o                    an affine displacement of the whole outline and the rims of holes: three
+         <-  |  ___  | ->                 of them give the stiffness of any mesh; three even tractions on the free
+             o-/   \-o  ->                body give its compliance
           <- o-\___/-o
 
-Moduli are of the sheet, times its thickness, and over the reference stiffness of the network [1]. They are those of the
-mesh that is given: rows of triangles fitted to a box are stretched, and their moduli differ from the exact lattice's
-(`springtune.mesh.lattice`) by a few percent.
+Moduli are times the thickness and over the reference stiffness [1]. They are those of the given mesh: rows of
+triangles fitted to a box are stretched and differ from the exact lattice (`springtune.mesh.lattice`) by a few
+percent.
 """
 
 from functools import cached_property
@@ -28,18 +28,14 @@ from .energies import Energy
 from .network import Network
 
 EVEN = 1e-6
-"""What a strip's length may differ by, over its extent: coordinates from files have few digits [1]."""
+"""Tolerance of a strip's length over its extent [1]: coordinates from files have few digits."""
 
 
 class Elastic(Protocol):
-    """What a patch test needs to know of springs: `springtune.springs.Springs` has it.
+    """Springs as a patch test needs them; `springtune.springs.Springs` fits.
 
-    Attributes
-    ----------
-    relative : ndarray of float, shape (n_springs,)
-        Stiffness over the reference stiffness [1].
-    lateral : float
-        Pull on the faces over the axial stress [1]; 0 for springs that need none.
+    `relative` (n_springs,) is stiffness over the reference stiffness [1]; `lateral` is the pull on the faces over the
+    axial stress [1], or 0.
     """
 
     @property
@@ -86,10 +82,10 @@ def work_of(fields: list[np.ndarray], forces: list[np.ndarray], mesh: Mesh) -> n
 
 
 def strip_fault(mesh: Mesh) -> str:
-    """Why a patch test between rollers says nothing of a mesh, with the remedy; empty where it does.
+    """Return why a patch test between rollers is not possible on a mesh, with the remedy, or an empty string.
 
-    An even strain is what a continuum has between the ends alone where the mesh is a strip: between a straight lower
-    and a straight upper face, of one length at every height, without a hole. Staggered ends are fine.
+    The mesh must be a strip without holes: straight lower and upper faces, and one length at every height. Staggered
+    ends are fine.
 
     Examples
     --------
@@ -129,12 +125,9 @@ def _one_round(outline: np.ndarray, count: int) -> bool:
 
 
 def free_body(mesh: Mesh) -> np.ndarray:
-    """Directions to hold so that a body cannot move as a whole and is free otherwise.
+    """Return directions to hold, shape (n_points, 2), so that a body is free but cannot move as a whole.
 
-    Returns
-    -------
-    ndarray of bool, shape (n_points, 2)
-        Three are held, at two particles far from each other.
+    Three directions are held, at two distant particles.
     """
     parts = connected(mesh.edges, len(mesh.points)).max() + 1
     if parts > 1:
@@ -149,18 +142,7 @@ def free_body(mesh: Mesh) -> np.ndarray:
 
 
 def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
-    """Mean displacement gradient over the area, by the divergence theorem.
-
-    Parameters
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        [m]
-
-    Returns
-    -------
-    ndarray of float, shape (2, 2)
-        Derivative of row by column [1].
-    """
+    """Return the mean displacement gradient over the area [1], by the divergence theorem; row by column."""
     total = np.zeros((2, 2))
     for corners in mesh.cells.values():
         # Side by side around each cell.
@@ -173,11 +155,11 @@ def mean_gradient(mesh: Mesh, displacements: np.ndarray) -> np.ndarray:
 
 
 class PatchTest:
-    """Patch tests of many networks on one mesh, whose numbering of unknowns they share.
+    """Patch tests of many networks on one mesh, which share its sparsity.
 
     Examples
     --------
-    The triangular lattice, each spring the mean of two triangles: Poisson's ratio is a third and ``G / E`` is 3/8.
+    Triangular lattice, each spring the mean of two triangles: nu = 1/3 and ``G / E`` = 3/8.
 
     >>> from types import SimpleNamespace
     >>> from springtune.mesh import lattice
@@ -225,7 +207,7 @@ class PatchTest:
 
     @cached_property
     def _free_body(self) -> tuple[np.ndarray, np.ndarray]:
-        """Directions held, none but the rigid motions', and forces of three even stresses, shape (3, n_points, 2)."""
+        """Directions held against rigid motions alone, and forces of three even stresses, shape (3, n_points, 2)."""
         return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in UNIT_STRESSES])
 
     def compliance(self, springs: Elastic) -> np.ndarray:
@@ -280,17 +262,10 @@ class PatchTest:
 
 
 def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
-    """Young's modulus and Poisson's ratio: along x between rollers, or of a mesh that is no strip by its whole outline.
+    """Return E t over the reference stiffness and nu [1]: along x between rollers for a strip.
 
-    What is no strip, see `strip_fault`, has no axis of its own: its moduli are means over all directions, see
-    `isotropic_moduli`, of `outline_stiffness`.
-
-    Returns
-    -------
-    young_modulus : float
-        E t over the reference stiffness [1].
-    poisson_ratio : float
-        Mean transverse over mean axial strain, sign changed [1].
+    Other meshes, see `strip_fault`, have no axis: their moduli are means over all directions of `outline_stiffness`,
+    see `isotropic_moduli`.
 
     Examples
     --------
@@ -305,13 +280,7 @@ def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
 
 
 def shear_modulus(mesh: Mesh, springs: Elastic) -> float:
-    """Shear modulus under even shear of the whole outline.
-
-    Returns
-    -------
-    float
-        G t over the reference stiffness [1].
-    """
+    """Return G t over the reference stiffness [1] under even shear of the whole outline."""
     return PatchTest(mesh).shear(springs)
 
 
@@ -325,18 +294,7 @@ def lateral_forces(mesh: Mesh) -> np.ndarray:
 
 
 def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
-    """Forces of an even stress on the outline, rims of holes included.
-
-    Parameters
-    ----------
-    stress : ndarray of float, shape (2, 2)
-        [Pa]
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        Over the thickness [N/m].
-    """
+    """Return the forces over the thickness [N/m], (n_points, 2), of an even stress (2, 2) [Pa] on all outlines."""
     total = np.zeros(mesh.points.shape)
     for corners in mesh.cells.values():
         # Cell by cell; inside they cancel.
@@ -348,16 +306,11 @@ def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
 
 
 def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Stiffness in plane stress under affine displacements of the whole outline, rims of holes included.
+    """Return the plane-stress stiffness under affine displacements of the outline and the rims of holes.
 
-    A continuum has the same even strain inside whatever its outline is, so the test is exact on any mesh: for linear
-    triangles it returns the material's own stiffness. A network relaxes inside. No test of the same mesh is stiffer
-    (Hill's bounds): with `outline_compliance` it encloses what the network is under even loads of other kinds.
-
-    Returns
-    -------
-    ndarray of float, shape (3, 3)
-        Times the thickness, over the reference stiffness [1]; Voigt: xx, yy, shear angle xy.
+    Shape (3, 3), times the thickness over the reference stiffness [1]; Voigt: xx, yy, shear angle xy. A continuum has
+    the same even strain inside, so the test is exact on any mesh. No test of the same mesh is stiffer (Hill's
+    bounds), and none is softer than `outline_compliance`.
 
     Examples
     --------
@@ -379,15 +332,10 @@ def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
 
 
 def outline_compliance(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Compliance in plane stress under even tractions on the whole outline, rims of holes included, the body free.
+    """Return the plane-stress compliance under even tractions on the outline and the rims of holes, the body free.
 
-    Column by column the mean strains under unit stresses xx, yy and xy. Like `outline_stiffness` exact on any mesh; no
-    test of the same mesh is softer.
-
-    Returns
-    -------
-    ndarray of float, shape (3, 3)
-        Over the thickness, times the reference stiffness [1]; Voigt: xx, yy, shear angle xy.
+    Shape (3, 3), over the thickness times the reference stiffness [1]; columns are the mean strains under unit
+    stresses xx, yy and xy. No test of the same mesh is softer.
 
     Examples
     --------
@@ -402,20 +350,10 @@ def outline_compliance(mesh: Mesh, springs: Elastic) -> np.ndarray:
 
 
 def isotropic_moduli(compliance: np.ndarray) -> tuple[float, float]:
-    """Young's modulus and Poisson's ratio of a compliance, means over all directions.
+    """Return Young's modulus and Poisson's ratio [1] of a compliance (3, 3, Voigt), as means over all directions.
 
-    1/E is the mean strain along a unit pull over the directions of the pull, nu/E the mean shortening across it; an
-    isotropic compliance has them exactly, and a turned one has the same.
-
-    Parameters
-    ----------
-    compliance : ndarray of float, shape (3, 3)
-        Voigt: xx, yy, shear angle xy.
-
-    Returns
-    -------
-    poisson_ratio : float
-        [1]
+    1/E is the mean strain along a unit pull, nu/E the mean shortening across it. They are exact for an isotropic
+    compliance and do not change under rotation.
     """
     (xx, xy, _), (_, yy, _), (_, _, shear) = compliance
     along, across = (3 * (xx + yy) + 2 * xy + shear) / 8, (xx + yy + 6 * xy - shear) / 8

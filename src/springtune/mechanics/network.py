@@ -1,13 +1,10 @@
-"""Particles and springs: forces, tangent and the factorized tangent of a network.
+"""Particles and springs: forces, tangent and factorized tangent of a network.
 
-A spring e of stiffness k_e and rest length L_e between particles i and j, now at distance vector d and length l, pulls
-with ``k_e (l - L_e) d / l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
+A spring of stiffness k_e and rest length L_e, with distance vector d and length l, pulls with ``k_e (l - L_e) d /
+l``. Its exact tangent is ``k_e [(1 - L_e/l) I + (L_e/l) n n^T]`` with ``n = d / l``.
 
-Stiffnesses enter a network as multiples of one reference stiffness and loads as force over that stiffness [m]: a
-network of uniform stiffness k under a force F deforms by F/k alone, so one solution serves all pairs of equal F/k.
-
-A network may have energies besides its springs, see `springtune.mechanics.energies`; what has none pays nothing for
-them.
+Stiffnesses are multiples of one reference stiffness and loads are forces over it [m]: one solution serves all forces
+and stiffnesses of equal F/k. A network may have energies besides its springs, see `springtune.mechanics.energies`.
 """
 
 from collections.abc import Sequence
@@ -25,22 +22,23 @@ from .follower import FollowerPressure
 from .pattern import Pattern
 
 LARGE = 200_000
-"""Unknowns beyond which multigrid takes the place of SuperLU: there it is as fast, and takes a third of the memory."""
+"""Unknowns above which multigrid replaces SuperLU: as fast there, with a third of the memory."""
 
 LARGEST = 600_000
-"""Unknowns beyond which it takes the place of a Cholesky factorization, too: it is faster there, in half the memory."""
+"""Unknowns above which multigrid also replaces Cholesky: faster there, with half the memory."""
 
 FACTORIZED = 2_500_000
-"""Unknowns up to which a Cholesky factorization, of 2 kB an unknown, takes over where multigrid comes to no end; up to
-`LARGEST` SuperLU's does, where there is no CHOLMOD or the matrix is not symmetric."""
+"""Unknowns up to which Cholesky (2 kB an unknown) replaces multigrid that does not converge.
+
+Up to `LARGEST` SuperLU does, without CHOLMOD or with an unsymmetric matrix.
+"""
 
 PINNED = 5_000
-"""Unknowns beyond which an indefinite matrix gets a Cholesky factor with pins: a small one is factorized by SuperLU
-as fast."""
+"""Unknowns above which an indefinite matrix gets a Cholesky factor with pins; SuperLU is as fast on smaller ones."""
 
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
-    """Solver that takes over from multigrid where conjugate gradients do not end.
+    """Return the solver that takes over if conjugate gradients with multigrid do not converge.
 
     Examples
     --------
@@ -52,23 +50,11 @@ def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool
 
 
 class Network:
-    """Particles joined by springs, some of their directions held.
+    """Particles joined by springs, with some directions held.
 
-    Parameters
-    ----------
-    held : ndarray of bool, shape (n_points, 2)
-        True where a particle cannot move in x or y.
-    stiffness : ndarray of float, shape (n_springs,)
-        Stiffness of each spring as a multiple of the reference stiffness [1].
-
-    Attributes
-    ----------
-    first, second : ndarray of int, shape (n_springs,)
-        Particles at the two ends of each spring.
-    rest_vectors : ndarray of float, shape (n_springs, 2)
-        From the first end to the second, at rest [m].
-    rest_lengths : ndarray of float, shape (n_springs,)
-        [m]
+    `held` (n_points, 2) is True where a particle cannot move in x or y; `stiffness` (n_springs,) is over the
+    reference stiffness [1]. Springs run from particle `first` to `second`, with `rest_vectors` (n_springs, 2) and
+    `rest_lengths` [m].
 
     Examples
     --------
@@ -143,18 +129,7 @@ class Network:
     # -- mechanics --------------------------------------------------------------------------------------------------
 
     def resistance(self, displacements: np.ndarray) -> np.ndarray:
-        """Force with which the network resists displacements, over the reference stiffness.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (unknowns,)
-            [m]
-        """
+        """Return the force against displacements over the reference stiffness [m], shape (unknowns,)."""
         resistance = np.zeros(self.unknowns)
         if self.has_springs:
             resistance -= self.gather(self._pulls(displacements))
@@ -163,7 +138,7 @@ class Network:
         return resistance
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
-        """As `resistance`, of held directions, too [m], shape (n_points, 2)."""
+        """As `resistance`, with held directions [m], shape (n_points, 2)."""
         total = np.zeros(self.held.shape)
         if self.has_springs:
             total -= self._pattern.sum_springs(self._pulls(displacements))
@@ -172,10 +147,9 @@ class Network:
         return total
 
     def _pulls(self, displacements: np.ndarray) -> np.ndarray:
-        """Force of each spring on its first end, over the reference stiffness [m], shape (n_springs, 2).
+        """Return the force of each spring on its first end over the reference stiffness [m], shape (n_springs, 2).
 
-        The elongation is taken as ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose as many digits as the
-        strain is small.
+        The elongation is ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose digits at small strain.
         """
         relative = self.stretch(displacements)
         vectors = self.rest_vectors + relative
@@ -186,18 +160,7 @@ class Network:
         return pull[:, None] * vectors
 
     def spring_forces(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
-        """Axial force of each spring over the reference stiffness, energies' part left out.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (n_springs,)
-            Positive in tension [m].
-        """
+        """Return axial spring forces over the reference stiffness, tension positive [m]; energies are left out."""
         relative = self.stretch(displacements)
         if linear:
             return self.stiffness * np.einsum("ij,ij->i", self.rest_vectors, relative) / self.rest_lengths
@@ -207,15 +170,9 @@ class Network:
         return self.stiffness * squares / (lengths + self.rest_lengths)
 
     def rounding(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
-        """Size of the rounding errors in the resistance to displacements [m], shape (unknowns,).
+        """Return the size of the rounding errors in the resistance [m], shape (unknowns,).
 
-        The forces of a spring on its two ends are equal but for their sign, and those of a cell balance to rounding:
-        what is left is the rounding of their sums at each particle.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
+        The two end forces of a spring are exactly opposite, so only the sums at each particle round.
         """
         total = np.zeros(self.held.shape)
         if linear:
@@ -232,11 +189,11 @@ class Network:
         return np.finfo(float).eps * self.reduce(total)
 
     def linear_resistance(self, displacements: np.ndarray) -> np.ndarray:
-        """As `resistance`, of a network that is linear in the displacements."""
+        """As `resistance`, with linear kinematics."""
         return self.reduce(self.linear_forces(displacements))
 
     def linear_forces(self, displacements: np.ndarray) -> np.ndarray:
-        """Forces with which a linear network resists, of held directions, too [m], shape (n_points, 2)."""
+        """Forces of a linear network against displacements, with held directions [m], shape (n_points, 2)."""
         normals = self.rest_vectors / self.rest_lengths[:, None]
         apart = self.stretch(displacements)
         pull = self.stiffness * np.einsum("ij,ij->i", normals, apart)
@@ -264,16 +221,9 @@ class Network:
     def tangent(
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> csc_array:
-        """Derivative of the resistance by the unknowns [1], a sparse matrix, symmetric but for a pressure's part.
+        """Return the derivative of the resistance [1], (unknowns, unknowns); symmetric except for a follower's part.
 
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2), optional
-            Where it is taken; at rest without.
-
-        Returns
-        -------
-        csc_array, shape (unknowns, unknowns)
+        It is taken at `displacements` [m], or at rest.
         """
         couplings = self._spring_couplings(displacements) if self.has_springs else np.zeros(())
         if self.energies:
@@ -306,10 +256,10 @@ class Network:
 
     @cached_property
     def local_stiffness(self) -> np.ndarray:
-        """Sums of stiffness about each direction of each particle over the reference stiffness, shape (n_points, 2).
+        """Return the sums of stiffness about each particle over the reference stiffness, shape (n_points, 2).
 
-        No eigenvalue of the stiffness over the masses is above the largest of them over its mass: by Gershgorin's
-        theorem, in blocks of particles for springs, in rows of the rest tangent where there are other energies.
+        By Gershgorin's theorem the largest, over its mass, bounds the eigenvalues of stiffness over mass: in blocks
+        of particles for springs, in rows of the rest tangent with other energies.
         """
         if self.energies:
             return self.expand(np.asarray(abs(self.tangent()).sum(axis=1)).ravel())
@@ -318,18 +268,7 @@ class Network:
         return np.repeat(sums[:, None], 2, axis=1)
 
     def stiffness_of(self, particles: np.ndarray, matrices: np.ndarray) -> csc_array:
-        """Sparse matrix [as `matrices`] of stiffnesses of groups of joined particles, in the place of the tangent's.
-
-        Parameters
-        ----------
-        particles : ndarray of int, shape (n, m)
-            Particles of each group, any two of which are joined by a spring.
-        matrices : ndarray of float, shape (n, 2 m, 2 m)
-
-        Returns
-        -------
-        csc_array, shape (unknowns, unknowns)
-        """
+        """Assemble `matrices` (n, 2 m, 2 m) of groups of joined `particles` (n, m) with the tangent's sparsity."""
         return self._pattern.matrix(self._pattern.entries(particles, matrices))
 
     @cached_property
@@ -340,20 +279,14 @@ class Network:
     def factorize_tangent(
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None
     ) -> Factor:
-        """Factor of the tangent.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2), optional
-            Where it is taken; at rest without.
-        """
+        """Factorize the tangent at `displacements`, or at rest."""
         if self._by_multigrid and self._loose:
             raise SingularError(self._loose)
         return self.factorize_matrix(self.tangent(displacements, follower), symmetric=follower is None)
 
     @cached_property
     def _loose(self) -> str:
-        """Which body is free to move, of those that neither springs nor energies join, and how; empty if none is."""
+        """Which separate body is free to move, and how; or an empty string."""
         edges, whole = self.mesh.edges, self.energies or self.stiffness.all()
         try:
             check_held(self.mesh.points, edges if whole else edges[self.stiffness != 0], self.held, "the network")
@@ -362,12 +295,7 @@ class Network:
         return ""
 
     def factorize_matrix(self, matrix: csc_array, symmetric: bool = True) -> Factor:
-        """Factor of a matrix over the unknowns with the tangent's sparsity, such as `stiffness_of` gives or a sum of.
-
-        Parameters
-        ----------
-        matrix : csc_array, shape (unknowns, unknowns)
-        """
+        """Factorize a matrix over the unknowns with the tangent's sparsity, such as a sum of `stiffness_of`."""
         if symmetric and self._by_cholesky:
             factor = self._cholesky(matrix)
             if factor is not None:
@@ -379,10 +307,10 @@ class Network:
         return SuperLUFactor(csc_array((matrix.data[places], indices, pointers), shape=matrix.shape), order)
 
     def _cholesky(self, matrix: csc_array) -> Factor | None:
-        """Cholesky's factor, with pins where there is none without; None where pins do not help either.
+        """Return Cholesky's factor, with pins if needed; None if pins do not help.
 
-        Where the last matrix was indefinite pins are tried first, which saves the attempt without: a matrix that turns
-        out to be positive definite has the factor that it always has.
+        If the last matrix was indefinite, pins are tried first. A matrix that is positive definite still gets its
+        plain factor.
         """
         tried = self._indefinite
         if tried and (pinned := self._pinned(matrix)):
@@ -392,7 +320,7 @@ class Network:
         return self._pinned(matrix) if self._indefinite and not tried else factor
 
     def _pinned(self, matrix: csc_array) -> Factor | None:
-        """Cholesky's factor with pins; None where they do not hold it, and where it needs none."""
+        """Return Cholesky's factor with pins; None if they do not suffice, or are not needed."""
         from ..linalg.pinned import factorize_pinned  # here: few networks are unstable
 
         factor = factorize_pinned(matrix, self._pattern.analysis, self._pattern.pins)
@@ -411,13 +339,7 @@ class Network:
         return self.solver == "multigrid" or self.solver is None and self.unknowns > LARGE
 
     def is_stable(self, displacements: np.ndarray, follower: tuple[float, FollowerPressure] | None = None) -> bool:
-        """Whether the symmetric part of the tangent is positive definite; cheaper than a factorization for use.
-
-        Parameters
-        ----------
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-        """
+        """Return whether the tangent's symmetric part is positive definite; cheaper than a factorization for use."""
         if follower is not None:
             follower = follower[0], follower[1].symmetric
         matrix = self.tangent(displacements, follower)

@@ -1,4 +1,4 @@
-"""Newton's method for one equilibrium of a network, and how far its answer can be trusted."""
+"""Newton's method for one equilibrium of a network, with an error estimate."""
 
 from __future__ import annotations
 
@@ -17,51 +17,46 @@ TOLERANCE = 1e-10
 MAX_FACTORIZATIONS = 16
 MAX_HALVINGS = 12
 CORRECTION = 1e-6
-"""Largest estimated error of a solution's displacements: a residual alone says nothing where the stiffness is
-ill-conditioned."""
+"""Largest estimated error of displacements; a small residual says little with an ill-conditioned stiffness."""
 
 REFINED = 1e-9
 """Estimated error above which a solution is refined by further steps, as long as each of them halves it."""
 
 REPRESENTATION = 4.0
-"""Residual that counts as balance, over what rounding of the displacements alone makes of it."""
+"""Residual that counts as balance, over that of rounding the displacements."""
 
 WATCHED = 4
-"""Steps in a row that may leave the residual above the least one seen: a slender beam that turns is stretched by one
-step and released by the next."""
+"""Steps in a row that may leave the residual above its minimum: a slender turning beam stretches and releases."""
 
 LONGEST_STEP = 0.5
-"""Largest change of a spring's vector over its length in such a step."""
+"""Largest change of a spring's vector over its length in a watched step."""
 
 KEEP_TANGENT = 0.03
-"""Share of the residual that a step may leave for its tangent to serve once more."""
+"""Largest factor on the residual in a step for which the tangent is reused."""
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """What a solve found.
+    """Result of a solve.
 
     Attributes
     ----------
     displacements : ndarray of float, shape (n_points, 2)
-        Displacement of each particle [m]; of the last iterate where it did not converge.
+        Displacements [m]; of the last iterate if it did not converge.
     residual : float
         Norm of the out-of-balance force over that of the load [1].
     factor : Factor or None
-        Factorized tangent: that at the solution, where it converged.
+        Factorized tangent; at the solution if it converged.
     error_estimate : float
-        Estimated error of the displacements over their size [1]; NaN where there is no balance.
-    unstable_share : float
-        Share of the load at which the path to it is unstable [1]; NaN where no such place is known.
+        Estimated relative error of the displacements [1], or NaN.
+    unstable_share, limit_share : float
+        Shares of the load at which the path is unstable, and at which it turns back [1], or NaN.
     load_share : float
-        Largest share of the load at which there is a good equilibrium [1]; 1 where it converged.
+        Largest share of the load with a good equilibrium [1]; 1 if it converged.
     last : ndarray of float, shape (n_points, 2), or None
-        Displacements at that share, where it is below 1.
-    limit_share : float
-        Share of the load at which the path from rest turns back, unstable from there on [1]; NaN where no such place
-        is known.
+        Displacements at that share, if below 1.
     snapped : bool
-        Whether the path comes back to the load behind that place, in a stable equilibrium.
+        Whether the path regains the load in a stable equilibrium behind the limit point.
     """
 
     displacements: np.ndarray
@@ -79,16 +74,10 @@ class Equilibrium:
 
 
 class Iterate(NamedTuple):
-    """Where Newton's method is.
+    """Iterate of Newton's method.
 
-    Attributes
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        [m]
-    missing : ndarray of float, shape (unknowns,)
-        Load less resistance there [m].
-    residual : float
-        Its norm over that of the load [1].
+    `displacements` (n_points, 2) [m], `missing` load less resistance (unknowns,) [m], and `residual`, its norm over
+    the load's [1].
     """
 
     displacements: np.ndarray
@@ -97,7 +86,7 @@ class Iterate(NamedTuple):
 
 
 class Balance(Protocol):
-    """What is solved: a network under a load, as `springtune.mechanics.statics.StaticProblem`."""
+    """Problem to solve, such as `springtune.mechanics.statics.StaticProblem`."""
 
     network: Network
     load: np.ndarray
@@ -110,21 +99,16 @@ class Balance(Protocol):
         """Factor of the tangent of resistance less load."""
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with those that are prescribed."""
+        """Displacements with the prescribed ones inserted."""
 
 
 class Newton:
-    """Newton's method with the exact tangent, under one load.
+    """Newton's method with the exact tangent, under one load ``s`` [m].
 
-    A few steps may leave the residual above the least one seen, before the iterate with that is taken up again and
-    steps are halved until the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell,
-    Math. Programming Study 16:1, 1982). No step may invert a cell. A factorized tangent serves as long as its steps
-    cut the residual by `keep_tangent`: near the solution a new one costs ten such steps.
-
-    Parameters
-    ----------
-    s : float
-        Force over the reference stiffness [m].
+    A few steps may leave the residual above its minimum. Then the best iterate is restored and steps are halved until
+    the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell, Math. Programming Study
+    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by `keep_tangent`: a
+    new one costs ten such steps.
     """
 
     def __init__(
@@ -138,13 +122,9 @@ class Newton:
         self.max_factorizations, self.keep_tangent = max_factorizations, keep_tangent
 
     def solve(self, start: np.ndarray) -> Equilibrium:
-        """Equilibrium from a first guess of the displacements.
+        """Return the equilibrium from displacements [m], shape (n_points, 2), that contain the prescribed ones.
 
-        Parameters
-        ----------
-        start : ndarray of float, shape (n_points, 2)
-            [m]; rest takes its place where forces are not finite or cells are inside out. Displacements that are
-            prescribed are in their places.
+        It starts from rest if forces there are not finite or cells are inverted.
         """
         here = self._at(start)
         if not np.isfinite(here.residual) or self.network.inverted(start):
@@ -167,7 +147,7 @@ class Newton:
         return Iterate(displacements, *self.problem.balance(self.s, displacements))
 
     def _balanced(self) -> bool:
-        """Whether the residual is within the tolerance, or what rounding of the displacements alone makes of it."""
+        """Return whether the residual is within the tolerance, or that of rounding the displacements."""
         displacements, _, residual = self._here
         if residual <= TOLERANCE:
             return True
@@ -175,7 +155,7 @@ class Newton:
         return residual * abs(self.s) * self.problem.load_norm <= REPRESENTATION * norm(rounding)
 
     def _iterate(self) -> str:
-        """Take a step, or decide to take another one; why none can be taken, empty where one can."""
+        """Take or reject a step; return why none can be taken, or an empty string."""
         if not self._keep:
             if self._factorizations == self.max_factorizations:
                 return "too many iterations"
@@ -207,10 +187,7 @@ class Newton:
         return ""
 
     def _step(self, step: np.ndarray) -> Iterate | None:
-        """Where a step leads: while steps are watched as it is, later halved until the residual falls.
-
-        None where no such step keeps all cells from turning inside out.
-        """
+        """Apply a step, halved until the residual falls unless watched; None if every such step inverts a cell."""
         displacements, _, residual = self._here
         length, halvings = 1.0, 0 if self._watched else MAX_HALVINGS
         if not halvings and 2 * np.abs(step).max() > LONGEST_STEP * self.network.rest_lengths.min():
@@ -224,7 +201,7 @@ class Newton:
         return None
 
     def _refined(self) -> Equilibrium:
-        """The equilibrium found, refined where its estimated error is large, with the tangent there."""
+        """Return the equilibrium with the tangent there, refined if its estimated error is large."""
         here, self._factor = self._here, None
         try:
             self._factor = self.problem.factorize_tangent(self.s, here.displacements)
@@ -249,20 +226,7 @@ class Newton:
 def error_estimate(
     network: Network, factor: Factor, missing: np.ndarray, displacements: np.ndarray, linear: bool = False
 ) -> float:
-    """Estimated error of displacements over their size: the Newton step that is left, and what rounding of forces does.
-
-    Parameters
-    ----------
-    missing : ndarray of float, shape (unknowns,)
-        Load less resistance [m].
-    displacements : ndarray of float, shape (n_points, 2)
-        [m]
-
-    Returns
-    -------
-    float
-        [1]
-    """
+    """Return the estimated relative error of displacements [1], from the Newton step left and rounding of forces."""
     rounding = network.rounding(displacements, linear)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
     return norm(factor.estimate(missing + signs * rounding)) / (norm(displacements.ravel()) or 1.0)
@@ -275,13 +239,7 @@ def refine(
     balance: Callable[[np.ndarray], tuple[np.ndarray, float]],
     linear: bool = False,
 ) -> tuple[Iterate, float]:
-    """Steps with one tangent for as long as each of them halves the estimated error.
-
-    Returns
-    -------
-    error : float
-        Its estimated error [1].
-    """
+    """Take steps with one tangent while each halves the estimated error; return the iterate and that error [1]."""
     error = error_estimate(network, factor, here.missing, here.displacements, linear)
     while error > REFINED:
         displacements = here.displacements + network.expand(factor.solve(here.missing))
@@ -294,7 +252,7 @@ def refine(
 
 
 def uncertainty(error: float) -> str:
-    """Why a solution of this estimated error is not good; empty where it is."""
+    """Return why a solution of this estimated error is refused, or an empty string."""
     return "" if error <= CORRECTION else f"ill-conditioned: {error:.1e} of the displacements is uncertain"
 
 

@@ -16,25 +16,15 @@ DISSECTED = 100_000
 """Unknowns beyond which a Cholesky factorization is faster in the order of nested dissection."""
 
 PIN_PARTICLES = (8, 32)
-"""Particles that are pinned where the matrix is indefinite: so many, or so many where these do not hold it."""
+"""Particles to pin in an indefinite matrix; the second number is tried if the first fails."""
 
 
 class Pattern:
-    """What the matrices of networks with one mesh and one set of held directions have in common.
+    """Sparsity that matrices of networks with one mesh and one set of held directions share.
 
-    All particles of a cell are joined by springs, so the springs' entries are all there are.
-
-    Parameters
-    ----------
-    held : ndarray of bool, shape (n_points, 2)
-        True where a particle cannot move in x or y.
-
-    Attributes
-    ----------
-    number : ndarray of int, shape (n_points, 2)
-        Unknown of each direction of each particle, -1 where it is held.
-    indices, pointers : ndarray of int32
-        Rows of the entries of each column, ascending, and column pointers.
+    All particles of a cell are joined by springs, so springs define all entries. `number` (n_points, 2) is the
+    unknown of each direction, -1 where held; `indices` and `pointers` (int32) are rows, ascending, and column
+    pointers.
     """
 
     def __init__(self, mesh: Mesh, held: np.ndarray) -> None:
@@ -49,10 +39,10 @@ class Pattern:
         self.indices, self.pointers, self.sources = self._sparsity()
 
     def _sparsity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows and column pointers of the matrix; for each entry its place in what `coupling_entries` puts together.
+        """Return rows, column pointers, and each entry's place in what `coupling_entries` assembles.
 
-        Block by block of two directions each. Springs are sorted, so that blocks of a column, first those above its
-        diagonal, then its own, then those below, are in order once they are told apart by column.
+        Springs are sorted, so the blocks above a column's diagonal, its own and those below are in order within a
+        column.
         """
         count, joined = self.shape[0], len(self.springs)
         # Particles that are held in both directions have no blocks.
@@ -80,7 +70,7 @@ class Pattern:
         return indices, pointers, entries.data.astype(np.int64)
 
     def moved(self, mesh: Mesh) -> "Pattern":
-        """The same of a mesh with the same cells at other points; what depends on where these are is found anew."""
+        """Return the pattern of a mesh with the same cells at other points."""
         found = copy(self)
         found.mesh = mesh
         for name in ("order", "elimination", "pins", *(["analysis"] if self.size > DISSECTED else [])):
@@ -100,7 +90,7 @@ class Pattern:
 
     @cached_property
     def analysis(self) -> Analysis:
-        """Symbolic Cholesky factorization; in an order of CHOLMOD's own where ours would not gain what it costs."""
+        """Symbolic Cholesky factorization; in CHOLMOD's own order for meshes too small for nested dissection."""
         return Analysis(self.indices, self.pointers, self.order if self.size > DISSECTED else None)
 
     @cached_property
@@ -125,7 +115,7 @@ class Pattern:
         return order, numbered.data.astype(np.int64), indices, pointers
 
     def _codes(self, particles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which entries of the matrices of groups of particles are kept, and one number for the place of each."""
+        """Return which entries of groups' matrices are kept, and one number for each one's place."""
         local = self.number[particles].reshape(len(particles), -1)
         width = local.shape[1]
         rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()
@@ -193,9 +183,9 @@ class Pattern:
         return (edges + len(self.springs) * turned).T.ravel()
 
     def coupling_entries(self, couplings: np.ndarray) -> np.ndarray:
-        """Entries of the tangent from its blocks that couple the ends of each spring, shape (2, 2, n_springs).
+        """Return the tangent's entries from blocks (2, 2, n_springs) that couple the ends of each spring.
 
-        A common displacement costs nothing: the block of a particle is what its springs' blocks lack to that.
+        A common displacement costs nothing, so a particle's own block is minus the sum of its springs' blocks.
         """
         count = self.shape[0]
         own = np.empty((2, 2, count))

@@ -1,7 +1,7 @@
-"""Curves from the equilibrium path of a network from rest: the displacement under many loads at once.
+"""Sensitivity curves from one equilibrium path: the displacement under many loads at once.
 
-With ``s = F / k`` every stiffness k of a sensitivity curve lies on one path. It is followed by power series of the
-load, or of a way along it, see `springtune.mechanics.expansion`.
+With ``s = F / k`` every stiffness k lies on one path from rest. It is followed by power series of the load, or of the
+arc along it, see `springtune.mechanics.expansion`.
 """
 
 from dataclasses import dataclass
@@ -16,63 +16,54 @@ CURVE_TOLERANCE = 1e-7
 """Largest estimated relative error of a displacement on a sensitivity curve."""
 
 STRETCH = 0.1
-"""Change of a spring's length over that at rest from one tangent that is looked at to the next: networks pulled to
-three times their length lose their stability and gain it again within .25."""
+"""Largest relative length change of a spring between two checked tangents; stability can vary within 0.25."""
 
 WAY_ORDER = 10
 """Order of a series along the path."""
 
 MAX_SERIES = 3
-"""Series of the load, that about rest with them."""
+"""Most series in the load, including that about rest."""
 
 MAX_CORRECTIONS = 4
 """Steps of Newton's method with one tangent that bring a prediction to an equilibrium."""
 
 MOST_UNKNOWNS = 4000
-"""Unknowns beyond which the path is followed to single loads alone: a curve's few samples next to buckling would take
-longer than all others."""
+"""Unknowns above which each load is solved alone: samples next to buckling would take longer than all others."""
 
 MAX_STEPS = 60
 """Steps along the path beyond the series about rest."""
 
 LIMIT = 1e-3
-"""Share of the load that a path may still rise to a limit point where it is left."""
+"""Share of the load by which a path may still rise to a limit point when it is abandoned."""
 
 GROWTH = 8
 """Power of the way along a series with which its error is taken to grow; that of order 10 grows faster."""
 
 MAX_STEP_HALVINGS = 6
-"""Of a step at whose end there is no stable equilibrium."""
+"""Most halvings of a step whose end is not a stable equilibrium."""
 
 FEW_FACTORIZATIONS = 5
-"""Of a solve from a prediction: from near the path one or two do."""
+"""Most factorizations of a solve from a prediction; one or two suffice near the path."""
 
 NEAR = 0.02
 """Distance of a spring's vector from its prediction, over its length, beyond which a solve found another path."""
 
 
 def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted displacement at many loads on one equilibrium path.
+    """Return the weighted displacement at many loads on one equilibrium path, and where it is stable.
 
-    Parameters
-    ----------
-    weights : ndarray of float, shape (n_points, 2)
-        Weights of the displacements to sum.
-    targets : ndarray of float, shape (n,)
-        Force over the reference stiffness, all of one sign [m].
+    `weights` has shape (n_points, 2); `targets` (n,) is force over reference stiffness, all of one sign [m].
 
     Returns
     -------
     values : ndarray of float, shape (n,)
-        NaN where no equilibrium was found: the path from rest does not get there.
+        NaN where the path from rest reaches no equilibrium.
     stable : ndarray of bool, shape (n,)
-        Whether the path from rest gets there and is stable all the way; other values are of equilibria that the beam
-        leaves or does not come to.
+        Whether the path from rest reaches the load and is stable up to there.
 
     Examples
     --------
-    A strip of triangles under a pull at its end, all springs of one stiffness: twice the load, twice the displacement
-    and a little less.
+    A strip of triangles under a pull at its end: twice the load gives a little less than twice the displacement.
 
     >>> from springtune.mechanics.network import Network
     >>> from springtune.mesh import MESH_TYPES
@@ -102,33 +93,16 @@ class _Point:
 
 
 class StablePath:
-    """The stable part of an equilibrium path from rest, as far as many loads need it.
+    """Stable part of an equilibrium path from rest, as far as the loads need it.
 
-    It begins with the series about rest. Where that does not serve, since the path turns away from where it points, as
-    that of a beam of an unsymmetric mesh does next to buckling, the path is followed in steps: a series along it
-    predicts a point, and a solve finds it.
+    It begins with the series about rest. Where that fails, as for a beam of an unsymmetric mesh next to buckling, the
+    path is followed in steps: a series predicts a point and a solve corrects it.
 
-    Between two stable points of one series the path is taken for stable if no spring's length changes by more than
-    `STRETCH` of that at rest. Inertia changes at singular points alone, so the lowest eigenvalue would have to pass
-    zero twice in between. What was once lost is not regained: stable equilibria beyond are not what the beam comes to.
+    Between two stable points of one series the path counts as stable if no spring's length changes by more than
+    `STRETCH`: the lowest eigenvalue would have to pass zero twice. Stability that was lost is not regained.
 
-    Parameters
-    ----------
-    weights : ndarray of float, shape (n_points, 2)
-        Weights of the displacements to sum.
-    targets : ndarray of float, shape (n,)
-        Force over the reference stiffness, all of one sign [m].
-
-    Attributes
-    ----------
-    values : ndarray of float, shape (n,)
-        Weighted displacements at the targets, as of `trace`.
-    stable : ndarray of bool, shape (n,)
-        As of `trace`.
-    stable_to : float
-        Largest load, without its sign, that the path is known to carry [m].
-    end : str
-        Why the path ends before the last target; empty where it does not, or was not followed that far.
+    Arguments, `values` and `stable` are those of `trace`. `stable_to` is the largest load, without its sign, known to
+    be carried [m]; `end` says why the path ends before the last target.
     """
 
     def __init__(self, problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> None:
@@ -156,7 +130,7 @@ class StablePath:
         self.values, self.stable = values[places], stable[places]
 
     def value(self, s: float) -> float:
-        """Weighted displacement [m] at a load [m] on the stable path; NaN where it does not get there."""
+        """Return the weighted displacement [m] at a load [m] on the stable path, or NaN beyond it."""
         load = abs(s)
         series = self._series_of(load)
         if series is None:
@@ -166,14 +140,7 @@ class StablePath:
     # -- series of the load -----------------------------------------------------------------------------------------
 
     def _by_series(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """Displacements by the series about rest, and by some about points that it gives where all beyond need them.
-
-        Returns
-        -------
-        values : ndarray of float, shape (n,)
-        good : ndarray of bool, shape (n,)
-            Whether the estimated error of the series about rest is small.
-        """
+        """Return displacements by series, whether that about rest is accurate, and the number of proved loads."""
         self._rest = series = self.problem.rest
         values, errors = series.measure(self.weights, loads)
         if (errors > CURVE_TOLERANCE).any():
@@ -208,7 +175,7 @@ class StablePath:
     def _proved(
         self, series: Expansion, loads: np.ndarray, values: np.ndarray, served: np.ndarray
     ) -> tuple[int, _Point | None]:
-        """How many loads in a row a series serves, proved by the point at the last of them; and that point."""
+        """Return how many successive loads a series serves, and the corrected point at the last of them."""
         number = len(served) if served.all() else int(np.argmin(served))
         while number > 0:
             point = self._point(series, loads[number - 1], values[number - 1])
@@ -297,9 +264,9 @@ class StablePath:
         return least
 
     def _check_between(self, loads: np.ndarray, values: np.ndarray, stable: np.ndarray) -> None:
-        """Correct values that differ from what those on both sides say: an approximant may have a pole beside a zero.
+        """Correct values that differ from their neighbours' trend: an approximant may have a pole next to a zero.
 
-        A factor from near by is good enough to see it.
+        A tangent factorized near by is accurate enough to see it.
         """
         count = int(stable.sum())
         doubtful = np.abs(left_out(loads[:count], values[:count])) > CURVE_TOLERANCE * np.abs(values[:count])
@@ -314,7 +281,7 @@ class StablePath:
                 stable[place] = np.isfinite(values[place])
 
     def _check_others(self, loads: np.ndarray, values: np.ndarray, good: np.ndarray, found: np.ndarray) -> None:
-        """Keep values of the series about rest beyond the stable path: of equilibria, though not of that path."""
+        """Keep series values beyond the stable path: equilibria, though not on that path."""
         rest, others = self._rest, np.flatnonzero(good & ~found)
         for group in np.split(others, np.flatnonzero(np.diff(others) > 1) + 1):
             while len(group):
@@ -346,14 +313,14 @@ class StablePath:
                 return
 
     def _elsewhere(self, s: float) -> bool:
-        """Whether the series about rest is by now of another path, which the beam would leave."""
+        """Return whether the series about rest now follows another, unstable path."""
         network, displacements = self.problem.network, self._rest.at(s)[1]
         missing = s * self.problem.load - network.resistance(displacements)
         near = bool(np.linalg.norm(missing) <= 1e-3 * abs(s) * self.problem.load_norm)
         return near and not network.is_stable(displacements)
 
     def _reach(self, load: float) -> float:
-        """Weighted displacement at a load beyond the series; NaN where the stable path does not get there."""
+        """Return the weighted displacement at a load beyond the series, or NaN off the stable path."""
         while self.stable_to < load and not self.end:
             self._advance(load)
         if load > self.stable_to:
@@ -372,12 +339,7 @@ class StablePath:
         return float(abs(np.tensordot(guess, self.weights, axes=2) / value - 1.0))
 
     def _solve(self, s: float, guess: np.ndarray) -> tuple[np.ndarray | None, Factor | None]:
-        """Displacements of the equilibrium next to a guess and its tangent factorized; None where there is none.
-
-        Returns
-        -------
-        displacements : ndarray of float, shape (n_points, 2), or None
-        """
+        """Return displacements (n_points, 2) and factor of the equilibrium next to a guess; None if there is none."""
         network = self.problem.network
         if network.inverted(guess):
             return None, None
@@ -461,17 +423,9 @@ class LinearPath:
 
 
 def left_out(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """What values differ by from the polynomials through three neighbours on either side.
+    """Return how far values differ from the polynomials through three neighbours on either side; 0 without enough.
 
-    Parameters
-    ----------
-    x, y : ndarray of float, shape (n,)
-        Places, ascending or descending, and values.
-
-    Returns
-    -------
-    ndarray of float, shape (n,)
-        0 where there are fewer neighbours.
+    `x`, `y` have shape (n,); `x` is sorted either way.
     """
     result = np.zeros(len(x))
     if len(x) < 7:

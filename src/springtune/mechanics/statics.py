@@ -1,9 +1,9 @@
-"""Equilibria of a network under a growing load: linear, nonlinear, and the whole path of them.
+"""Equilibria of a network under a growing load: linear, nonlinear, and along the whole path.
 
-The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is the force over the reference stiffness
-[m]. Nothing else enters: a path over ``s`` serves every force, material and uniform stiffness of a mesh. Where
-displacements are prescribed they are ``s`` times a pattern of their own: with a pattern of forces in N, ``s = 1 / k``
-and displacements times k, forces and displacements grow together.
+The load is ``s`` times a fixed pattern of forces of total 1; ``s = F / k`` is force over reference stiffness [m]. So
+one path over ``s`` serves every force, material and uniform stiffness of a mesh. Prescribed displacements are ``s``
+times their own pattern. With a pattern of forces in N, ``s = 1 / k`` and displacements times k, forces and
+displacements grow together.
 """
 
 from collections.abc import Callable
@@ -26,27 +26,29 @@ FAR = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
 
 TURNED = 0.3
-"""Change of a spring's vector over its length, turns included, beyond which it is, too."""
+"""Change of a spring's vector over its length above which this applies too."""
 
 UNSNAPPED = 1e-3
-"""Change of a spring's vector over its length within which no path turns back: a shallow arch of the thinnest sheet
-that can be solved turns by more before it snaps."""
+"""Change of a spring's vector over its length below which no path turns back."""
 
 SURPRISE = 0.1
-"""Distance of a spring's vector from where it was expected, over its length, beyond which a load step is halved."""
+"""Distance of a spring's vector from its prediction, over its length, above which a load step is halved."""
 
 SMALLEST_STEP = 1 / 64
 """Load step in which Newton's method has to converge, over the load."""
 
 SHORTEST = 1 / 2048
-"""Load step down to which springs that turn fast are told from springs that snap."""
+"""Smallest load step that distinguishes springs that turn fast from springs that snap."""
 
 BENT = 0.1
-"""Distance of the middle of a parabola from that of the straight way, over its length, up to which it is taken."""
+"""Largest distance of a parabola's middle from the straight way's, over its length, to use it."""
 
 FORESEEN, SLACK = 0.25, 0.02
-"""Distance of an equilibrium from a guess over the way to it, and work of the forces out of balance in the middle of
-that way over the load's, below which no snap can lie on the way: of 153 snaps of arches the least are 0.35 and 0.05."""
+"""Limits below which no snap can lie on the way to an equilibrium.
+
+Its distance from a guess over the way to it; and the work of out-of-balance forces in the middle of the way over the
+load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05.
+"""
 
 WAY = 8
 """Increments of a path behind a limit point, over the straight way from there to a stable equilibrium."""
@@ -58,31 +60,19 @@ MERGED = 1e-6
 """Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
 
 HIGH_ORDER = 16
-"""Order of a series that the rule does not serve."""
+"""Order of a series if the default order fails."""
 
 START_ORDER = 3
 """Orders of the series that starts Newton's method: together they cost half of a factorization."""
 
 
 class StaticProblem:
-    """A network under a load pattern.
+    """Network under a load pattern.
 
-    Parameters
-    ----------
-    pattern : ndarray of float, shape (n_points, 2)
-        Forces on the particles [1]; scaled by ``s``.
-    dead : ndarray of float, shape (n_points, 2), optional
-        Forces besides those of the follower, that stay as they are [1]; the pattern is both together.
-    given : ndarray of float, shape (n_points, 2), optional
-        Prescribed displacements of held directions over ``s`` [1]; zero without, and in all other directions.
-
-    Attributes
-    ----------
-    load : ndarray of float, shape (unknowns,)
-        The pattern's part on free directions [1].
-    load_norm : float
-        What residuals are over: the norm of the load [1]; where displacements are prescribed, of the load and of the
-        forces that they take of the linear network.
+    `pattern` (n_points, 2) are forces [1], scaled by ``s``; `dead` is its part that does not follow the deformation.
+    `given` (n_points, 2) are prescribed displacements of held directions over ``s`` [1]. `load` (unknowns,) is the
+    pattern on free directions, and `load_norm` the norm that residuals are over; it includes the reactions of the
+    linear network to prescribed displacements.
 
     Examples
     --------
@@ -157,31 +147,17 @@ class StaticProblem:
 
     @cached_property
     def long_rest(self) -> Expansion:
-        """As `rest`, for a curve that it does not serve."""
+        """As `rest`, of higher order."""
         return self.rest.extended(HIGH_ORDER)
 
     def linear(self, s: float) -> Equilibrium:
-        """Equilibrium of the network with linear kinematics.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        """
+        """Return the equilibrium with linear kinematics."""
         slope, residual, error = self._slope
         reason = uncertainty(error)
         return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, error)
 
     def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
-        """Whether an equilibrium is stable.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-        """
+        """Return the number of negative pivots of an equilibrium's tangent, and whether it is singular."""
         if self.follower is None or factor is self.rest_factor:
             return factor.negative_pivots, False
         modes = self.modes(s, displacements, factor)
@@ -189,23 +165,12 @@ class StaticProblem:
         return int((modes.real < 0)[~merged].sum()), bool(merged.any())
 
     def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
-        """Eigenvalues nearest to zero of the tangent over the masses, at an equilibrium under a follower pressure.
+        """Return the eigenvalues nearest to zero of the tangent over the masses, under a follower pressure.
 
-        Such a tangent is not symmetric: besides one of them passing zero, where a beam buckles, two may merge and leave
-        the real axis, and the beam flutters (Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are
-        those of a uniform sheet; damping, which can lower the critical load, is none.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of complex, shape (n,)
-            Squares of the frequencies, over stiffness and mass of the whole sheet; at most `MODES`.
+        This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real
+        axis (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform
+        sheet, without damping, which can lower the critical load. The complex values are squared frequencies over
+        stiffness and mass of the whole sheet; at most `MODES`.
         """
         network = self.network
         mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
@@ -219,18 +184,7 @@ class StaticProblem:
         return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
 
     def judge(self, s: float, found: Equilibrium) -> tuple[Status, str, float]:
-        """What an equilibrium is worth.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-
-        Returns
-        -------
-        negative_pivots : int or float
-            Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
-        """
+        """Return status, message and negative pivots of an equilibrium; NaN pivots if it has no regular tangent."""
         if found.limit_share < 1 and not found.unstable_share < found.limit_share:
             share = f"{100 * found.limit_share:.3g} %"
             said = f"limit point: the path from rest turns back, unstable, at {share} of the load"
@@ -263,17 +217,11 @@ class StaticProblem:
         return Status.SOLVED, "; ".join(filter(None, objections)), pivots
 
     def nonlinear(self, s: float) -> Equilibrium:
-        """Equilibrium of the network with its springs' full length law.
+        """Return the equilibrium with the springs' full length law.
 
-        Newton's method from the series about rest; where that fails, from the linear solution, which next to buckling
-        is the nearer guess; where that fails, in load steps from rest. So are solutions with springs stretched beyond
-        `FAR` or turned beyond `TURNED`, and those to which the straight way from rest is unstable half-way: there may
-        be other equilibria, and the one asked for is on the path from rest.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
+        Newton's method starts from the series about rest; if it fails, from the linear solution; then in load steps
+        from rest. Load steps also replace solutions with springs stretched beyond `FAR` or turned beyond `TURNED`, or
+        with an unstable point half-way from rest: the solution must lie on the path from rest.
         """
         iterations = 0
         starts: list[Callable[[float], np.ndarray]] = [lambda s: s * self.slope]
@@ -292,15 +240,7 @@ class StaticProblem:
         return self._in_steps(s, found, iterations)
 
     def departure(self, s: float, displacements: np.ndarray) -> str:
-        """Why the path from rest does not lead to a stable equilibrium: a limit point, or another one; mostly empty.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-        """
+        """Return why the path from rest does not lead to a stable equilibrium; mostly empty."""
         network = self.network
         if network.largest_change(displacements) <= UNSNAPPED or self.holds(0.5 * s, 0.5 * displacements):
             return ""
@@ -318,11 +258,11 @@ class StaticProblem:
     def _joined(
         self, s: float, here: np.ndarray, to: float, there: np.ndarray, guess: np.ndarray, bend: float = 0.25
     ) -> bool:
-        """Whether the way from one equilibrium to the next one is stable in its middle: no snap lies between.
+        """Return whether the way from one equilibrium to the next is stable in its middle, without a snap.
 
-        The straight way shortens what turns, so its middle is moved by a share of the distance from a guess, the path
-        extended from here: that of the parabola through both. Where that is much the path is no parabola, and the
-        straight way is taken. Where the guess was good, and the middle is all but in balance, nothing has snapped.
+        The straight way shortens springs that turn. So its middle is moved towards the parabola through a guess,
+        extended from `here`; if that is far off, the straight way is used. If the guess was good and the middle
+        nearly in balance, nothing has snapped.
         """
         network = self.network
         middle, off, way = 0.5 * (here + there), there - guess, there - here
@@ -337,19 +277,11 @@ class StaticProblem:
         return self.holds(half, middle)
 
     def holds(self, s: float, displacements: np.ndarray) -> bool:
-        """Whether no cell is inside out and the symmetric part of the tangent is positive definite at displacements.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            In equilibrium or not [m].
-        """
+        """Return whether no cell is inverted and the symmetric part of the tangent is positive definite."""
         return not self.network.inverted(displacements) and self.network.is_stable(displacements, self._follower_at(s))
 
     def _unstable(self, s: float, found: Equilibrium) -> bool:
-        """Whether a path leaves an equilibrium; flutter on the way is no matter of where it leads."""
+        """Return whether a path leaves an equilibrium; flutter does not count."""
         assert found.factor is not None  # of what converged
         try:
             return self.stability(s, found.displacements, found.factor)[0] > 0
@@ -357,22 +289,7 @@ class StaticProblem:
             return True
 
     def balance(self, s: float, displacements: np.ndarray) -> tuple[np.ndarray, float]:
-        """Load less resistance, and its norm over that of the load.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-
-        Returns
-        -------
-        missing : ndarray of float, shape (unknowns,)
-            [m]
-        residual : float
-            [1]
-        """
+        """Return load less resistance [m], shape (unknowns,), and its norm over that of the load [1]."""
         missing = s * self.load_at(displacements) - self.network.resistance(displacements)
         return missing, norm(missing) / (abs(s) * self.load_norm)
 
@@ -385,7 +302,7 @@ class StaticProblem:
 
     @cached_property
     def _free(self) -> Network:
-        """The network with nothing held."""
+        """The network without held directions."""
         network, none = self.network, np.zeros(self.network.held.shape, dtype=bool)
         return Network(network.mesh, none, network.stiffness, network.energies)
 
@@ -398,19 +315,11 @@ class StaticProblem:
         return load - self.network.reduce(pull.reshape(self.given.shape))
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements [m] with those that are prescribed at ``s`` in their places, shape (n_points, 2)."""
+        """Displacements [m], shape (n_points, 2), with those prescribed at ``s`` inserted."""
         return displacements if self.given is None else np.where(self.network.held, s * self.given, displacements)
 
     def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
-        """Factor of the tangent of resistance less load, see `Network.factorize_tangent`.
-
-        Parameters
-        ----------
-        s : float
-            Force over the reference stiffness [m].
-        displacements : ndarray of float, shape (n_points, 2)
-            [m]
-        """
+        """Factorize the tangent of resistance less load, see `Network.factorize_tangent`."""
         return self.network.factorize_tangent(displacements, self._follower_at(s))
 
     def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
@@ -423,10 +332,7 @@ class StaticProblem:
         max_factorizations: int = MAX_FACTORIZATIONS,
         keep_tangent: float = KEEP_TANGENT,
     ) -> Equilibrium:
-        """Equilibrium by Newton's method from a first guess of the displacements [m], shape (n_points, 2).
-
-        Parameters are those of `springtune.mechanics.newton.Newton`.
-        """
+        """Run Newton's method from displacements [m], shape (n_points, 2); see `springtune.mechanics.newton.Newton`."""
         return Newton(self, s, max_factorizations, keep_tangent).solve(self.moved(s, start))
 
     def _in_steps(self, s: float, direct: Equilibrium, iterations: int) -> Equilibrium:
@@ -482,7 +388,7 @@ class StaticProblem:
                 step *= 0.5
 
     def _snaps(self, s: float, direct: Equilibrium, here: float, last: np.ndarray, before: np.ndarray) -> bool:
-        """Whether a path that turns back beyond a load comes to a stable equilibrium under the whole one."""
+        """Return whether a path that turns back beyond a load regains the whole load in a stable equilibrium."""
         if not direct.converged or self._unstable(s, direct):
             return False
         way = float(np.linalg.norm(self.network.reduce(direct.displacements - last)))

@@ -1,4 +1,4 @@
-"""How a network in motion advances: one class of steps for each kind of integrator."""
+"""Time steps of a network in motion: one class for each kind of integrator."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FEWEST = 5000
 """Springs, or entries of a matrix, of a thread: with fewer, threads cost more than they save."""
 
 ROWS_AT_ONCE = 256
-"""Rows that are advanced at once: what is between the loops stays next to the processor."""
+"""Rows advanced at once, so that data between the loops stay in the cache."""
 
 CACHE = 2**19
 """Bytes that a thread may expect to keep near its core."""
@@ -31,7 +31,7 @@ DEEPEST_PASS = 8
 
 
 class Moving(Protocol):
-    """What advances: a network with masses and dampers under a load, as `springtune.mechanics.dynamics.Motion`."""
+    """Problem that moves, such as `springtune.mechanics.dynamics.Motion`."""
 
     network: Network
     linear: bool
@@ -62,13 +62,7 @@ class Moving(Protocol):
 def make_stepper(
     motion: Moving, integrator: str | BackwardEuler, step: float, precision: str = "float64", threads: int = 1
 ) -> Stepper:
-    """State of a run of one integrator.
-
-    Parameters
-    ----------
-    step : float
-        [s]
-    """
+    """Return the state of a run of one integrator; `step` in s."""
     if integrator in EXPLICIT:
         return ExplicitSteps(motion, integrator, step, precision, threads)
     if integrator == "implicit-midpoint":
@@ -94,14 +88,11 @@ class Stepper(ABC):
         """Take a number of steps."""
 
     def close(self) -> None:  # noqa: B027  most have nothing to do
-        """End what was begun for the run, threads."""
+        """Stop the threads of the run."""
 
 
 class ExplicitSteps(Stepper):
-    """Compiled steps, of springs that keep their length law or of a linear network; others are taken in numpy.
-
-    Parameters are those of `make_stepper`.
-    """
+    """Explicit steps: compiled for springs with their length law or linear networks, else in numpy."""
 
     def __init__(self, motion: Moving, integrator: str, step: float, precision: str, threads: int) -> None:
         self.motion, self.step = motion, step
@@ -252,7 +243,7 @@ class ExplicitSteps(Stepper):
 
     @cached_property
     def threads(self) -> ThreadPoolExecutor:
-        """Threads beside the caller's; they stay on their cores from one call to the next."""
+        """Threads besides the caller's; they keep their cores between calls."""
         return ThreadPoolExecutor(max(1, len(self._threads) - 1))
 
     def close(self) -> None:
@@ -311,14 +302,9 @@ def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray |
 
 
 class BackwardEulerSteps(Stepper):
-    r"""One linear solve a step, as SOFA's EulerImplicitSolver does.
+    r"""One linear solve a step, as SOFA's EulerImplicitSolver does; `step` h in s.
 
     .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
-
-    Parameters
-    ----------
-    step : float
-        [s]
     """
 
     def __init__(self, motion: Moving, step: float, options: BackwardEuler) -> None:
@@ -354,13 +340,7 @@ class BackwardEulerSteps(Stepper):
 
 
 class MidpointSteps(Stepper):
-    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``.
-
-    Parameters
-    ----------
-    step : float
-        [s]
-    """
+    """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``."""
 
     def __init__(self, motion: Moving, step: float) -> None:
         self.motion, self.step = motion, step

@@ -4,17 +4,14 @@ A cell of area A in which forces f act on corners at x has the mean stress (viri
 
 .. math:: \sigma = \frac{1}{A t} \sum_{corners} x \otimes f
 
-Energies give the forces of each cell exactly: with `springtune.springs.delingette` this is the stress of linear
-triangles. A spring of force f, length l and direction n belongs to the cells on both of its sides, each of which has
-half of it, :math:`f l\, n \otimes n / 2`; an edge of the outline or a diagonal has one cell, which has all. So do
-`springtune.springs.lattice` and `springtune.springs.patch` give springs to cells, and whatever share it is the sum over
-all cells is the same. Where two materials meet, both cells get half of a spring that is the sum of theirs: there the
-stress of springs, not that of energies, is a mean of both sides, in the cells that have such an edge.
+Energies give each cell's forces exactly: with `springtune.springs.delingette` this is the stress of linear triangles.
+A spring of force f, length l and direction n gives half, :math:`f l\, n \otimes n / 2`, to the cell on each side; an
+outline edge or a diagonal gives all to its one cell. Where two materials meet, the stress of springs is a mean of
+both sides in the cells next to the joint.
 
-Stress at particles is that of a linear field, fitted by least squares to the cells around a particle at their middles,
-where it is better than elsewhere (superconvergent patch recovery: O. C. Zienkiewicz and J. Z. Zhu, Int. J. Numer.
-Methods Eng. 33:1331, 1992). Particles on the outline have cells on one side only, and too few: there the fits of their
-neighbours inside are continued to them, by the mean of these.
+Stress at particles is a linear field fitted by least squares to the surrounding cells at their middles
+(superconvergent patch recovery: O. C. Zienkiewicz and J. Z. Zhu, Int. J. Numer. Methods Eng. 33:1331, 1992). Outline
+particles have too few cells: they take the mean of their inner neighbours' fits.
 """
 
 from collections.abc import Mapping
@@ -26,17 +23,9 @@ from .network import Network
 
 
 def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> dict[int, np.ndarray]:
-    """Stress of each cell, times the thickness and over the reference stiffness.
+    """Return the stress of each cell times the thickness over the reference stiffness [1].
 
-    Parameters
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        [m]
-
-    Returns
-    -------
-    dict of int to ndarray of float, shape (n_cells, 3)
-        By number of corners: components xx, yy and xy [1].
+    By number of corners, shape (n_cells, 3): xx, yy, xy.
     """
     mesh = network.mesh
     place = mesh.points if linear else mesh.points + displacements
@@ -66,19 +55,10 @@ def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> 
 def particle_stresses(
     mesh: Mesh, stresses: Mapping[int, np.ndarray], chosen: Mapping[int, np.ndarray] | None = None
 ) -> np.ndarray:
-    """Stress at the particles, recovered from that of the cells.
+    """Return the stress at the particles, shape (n_points, 3), from that of the cells, in the same unit.
 
-    Parameters
-    ----------
-    stresses : dict of int to ndarray of float, shape (n_cells, 3)
-        As of `cell_stresses`.
-    chosen : dict of int to ndarray of bool, shape (n_cells,), optional
-        Cells of one part of the body: stress jumps from one material to another. All without.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 3)
-        In the unit of the cells'; NaN at particles of no such cell.
+    `chosen` selects the cells of one part of the body, by number of corners, since stress jumps between materials.
+    NaN at particles without such a cell.
     """
     corners, values, middles = [], [], []
     for count, cells in mesh.cells.items():

@@ -1,7 +1,7 @@
-"""Meshes of a beam: their types, their quality and their files.
+"""Meshes of a beam: their types, quality and files.
 
-The decorator `mesh_type` declares a function that meshes a box where it stands; `MESH_TYPES` finds all that the modules
-of this package declare, and those of one's own.
+The decorator `mesh_type` declares a function that meshes a box; `MESH_TYPES` finds all that this package's modules
+and the user declare.
 
 Examples
 --------

@@ -1,4 +1,4 @@
-"""Whether a mesh fills a box exactly once, and if not, where and what to do about it."""
+"""Check that a mesh fills a box exactly once."""
 
 import numpy as np
 
@@ -7,13 +7,7 @@ from .sheets import DIGITS, edge_in_words, in_words, not_convex, opening, outlin
 
 
 def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
-    """Mesh of a box with the lower left corner at the origin, its sides made straight.
-
-    Parameters
-    ----------
-    box : ndarray of float, shape (2,)
-        Length and height [m].
-    """
+    """Return a mesh of a box (2,) [m] at the origin with its sides made straight."""
     near = np.abs(mesh.points - box) <= DIGITS * box
     points = np.where(near, box, np.where(mesh.points <= DIGITS * box, 0.0, mesh.points))
     for corners in mesh.cells.values():
@@ -25,7 +19,7 @@ def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
 
 
 def box_fault(mesh: Mesh) -> str:
-    """Why a mesh does not fill the box around it exactly once, with the remedy; empty where it does.
+    """Return why a mesh does not fill its bounding box exactly once, with the remedy, or an empty string.
 
     Examples
     --------
@@ -52,11 +46,11 @@ def box_fault(mesh: Mesh) -> str:
 
 
 def _fault(mesh: Mesh, box: np.ndarray) -> str:
-    """Why a mesh does not fill a box exactly once, and what to do about it; empty where it does.
+    """Return why a mesh does not fill a box exactly once, with the remedy, or an empty string.
 
-    All cells are convex and counter-clockwise, no two lie on the same side of an edge, and the edges that have one cell
-    only make one round of the box. As many cells lie over a point as that round winds about it: one. So there is no
-    slit, hole or overlap, however thin, and there are no parts that meet in a point alone.
+    All cells are convex and counter-clockwise, no two lie on one side of an edge, and the edges with one cell make
+    one round of the box. So as many cells cover a point as that round winds about it: one. This excludes slits, holes
+    and overlaps of any width, and parts that meet in a point.
     """
     points = mesh.points
     fault = not_convex(mesh)

@@ -1,4 +1,4 @@
-"""A mesh of triangles and quadrilaterals, and what a network needs to know of it."""
+"""Meshes of triangles and quadrilaterals."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,7 +18,7 @@ def no_cells(corners: int) -> np.ndarray:
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be used; the message says why and what to do.
+    """A mesh that cannot be used; the message gives the reason and the remedy.
 
     Examples
     --------
@@ -56,8 +56,8 @@ class Mesh:
     Raises
     ------
     MeshError
-        If an array has another shape, a coordinate is no finite number, a cell is clockwise or flat or has a point that
-        is not there, or there are no cells.
+        If an array has the wrong shape, a coordinate is not finite, a cell is clockwise, flat or has a missing point,
+        or there are no cells.
 
     Examples
     --------
@@ -142,7 +142,7 @@ class Mesh:
         return edges, counts, of_cells
 
     def shares_cells(self, other: "Mesh") -> bool:
-        """Whether the cells are those of another mesh; what follows from these alone is then taken over from it.
+        """Return whether another mesh has the same cells; data that depend only on cells are then shared.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class Mesh:
         return float(sum(signed_areas(self.points, corners).sum() for corners in self.cells.values()))
 
     def sum_to_edges(self, values: dict[int, np.ndarray]) -> np.ndarray:
-        """Sum of values given on the edges of each cell.
+        """Sum values given on the edges of each cell.
 
         Parameters
         ----------
@@ -239,7 +239,7 @@ class Mesh:
         return shares
 
     def side_shares(self, edges: np.ndarray, axis: int) -> np.ndarray:
-        """Share of each particle in the extent of edges along an axis: half of each edge's.
+        """Return each particle's share in the extent of edges along an axis: half of each edge's.
 
         Parameters
         ----------
@@ -255,7 +255,7 @@ class Mesh:
 
         Examples
         --------
-        By which an even force on the right side is spread over its particles:
+        Shares of an even force on the right side:
 
         >>> import springtune as st
         >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "right", "20 mm")
@@ -269,14 +269,14 @@ class Mesh:
         return shares
 
     def outline_edges(self, coordinate: int, value: float) -> np.ndarray:
-        """Outline edges that lie on a line ``x = value`` or ``y = value``.
+        """Return the outline edges on a line ``x = value`` or ``y = value``.
 
         Parameters
         ----------
         coordinate : int
             0 for x, 1 for y.
         value : float
-            Where the line is [m].
+            Position of the line [m].
 
         Returns
         -------
@@ -294,12 +294,12 @@ class Mesh:
         return outline[(np.abs(self.points[outline, coordinate] - value) <= tolerance).all(axis=1)]
 
     def inverted(self, points: np.ndarray) -> bool:
-        """Whether any corner of any cell is turned inside out at other positions of the particles.
+        """Return whether any corner of any cell is inverted at other positions of the particles.
 
         Parameters
         ----------
         points : ndarray of float, shape (n_points, 2)
-            Those positions [m].
+            The positions [m].
 
         Returns
         -------
@@ -307,7 +307,7 @@ class Mesh:
 
         Examples
         --------
-        Not where the mesh is turned by half a turn, but where it is mirrored:
+        A rotated mesh is not inverted, a mirrored one is:
 
         >>> import springtune as st
         >>> mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "structured", "5 mm")
@@ -336,16 +336,7 @@ def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
 
 
 def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Rows of some cells among all with as many corners.
-
-    Parameters
-    ----------
-    cells, chosen : ndarray of int, shape (n_cells, m) and (n_chosen, m)
-        Corners of all, and of some of them; the same numbers in the same order.
-
-    Returns
-    -------
-    ndarray of int, shape (n_chosen,)
+    """Return the rows of `chosen` cells (n_chosen, m) among all `cells` (n_cells, m), with corners in the same order.
 
     Examples
     --------
@@ -381,13 +372,10 @@ def corner_angles(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def quality(mesh: Mesh) -> dict[str, float]:
-    """Quality figures of a mesh.
+    """Return quality figures of a mesh.
 
-    Returns
-    -------
-    dict
-        ``minimum_angle`` : smallest angle of all cells [degree];
-        ``edge_length_spread`` : standard deviation of the edge lengths over their mean [1].
+    ``minimum_angle`` is the smallest angle of all cells [degree], ``edge_length_spread`` the standard deviation of
+    the edge lengths over their mean [1].
     """
     smallest = min(corner_angles(mesh.points, corners).min() for corners in mesh.cells.values())
     lengths = mesh.edge_lengths

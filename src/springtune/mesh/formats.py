@@ -32,7 +32,7 @@ LEFT_OUT = ("line", "vertex")
 """Cells that carry no springs: boundaries and tags, left out."""
 
 COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
-"""Endings of files that have a part of a mesh."""
+"""Endings of files that hold only a part of a mesh."""
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
@@ -50,14 +50,14 @@ MOST_IN_FILE = 1_000_000
 """Most points of a file; such a mesh is read within seconds and in less than a gigabyte."""
 
 LONGEST_SAID = 120
-"""Most characters of what meshio says that are shown."""
+"""Most characters of a message of meshio that are shown."""
 
 
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
-    """Write a mesh, with its groups if it has some; the file appears whole or not at all.
+    """Write a mesh atomically, with its groups.
 
-    Sides become lines and points vertices. In ``.vtu``, cell data of zeros and ones mark the cells of each group; in
-    ``.msh``, format 2.2 of Gmsh, groups are physical ones. `springtune.read_shape` reads both.
+    Sides become lines and points vertices. ``.vtu`` has cell data of zeros and ones for each group, ``.msh`` (Gmsh
+    format 2.2) physical groups. `springtune.read_shape` reads both.
     """
     if not isinstance(mesh, Mesh | GroupedMesh):
         raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
@@ -126,9 +126,9 @@ def _gmsh_tags(
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """Read a mesh of any format that meshio knows.
+    """Read a mesh of any format that meshio supports.
 
-    Particles that belong to no cell are left out, clockwise cells are turned.
+    Particles without cells are dropped, clockwise cells are turned.
 
     Parameters
     ----------
@@ -143,26 +143,14 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     Raises
     ------
     MeshError
-        If the file cannot be read, is too large, has cells other than linear triangles and quadrilaterals or none of
-        these, cells of points that it does not have, points that are nowhere or not in one plane, or cells without
-        area.
+        If the file is unreadable or too large, has no linear triangles or quadrilaterals or other cells, cells with
+        missing points, points that are not finite or not in one plane, or cells without area.
     """
     return assembled(path, file_content(path), unit)[0]
 
 
 def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
-    """Mesh of what meshio read, as of `read_mesh`.
-
-    Parameters
-    ----------
-    unit : float
-        Of the coordinates [m].
-
-    Returns
-    -------
-    used : ndarray of int, shape (n_points,)
-        Numbers of its particles in the file.
-    """
+    """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
     cells = _read_cells(path, content)
     used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
     with np.errstate(over="ignore"):  # what is too far away is refused
@@ -176,14 +164,14 @@ def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.nda
 
 
 def _is_the_machines(error: BaseException, memory: float) -> bool:
-    """Whether a file cannot be read for reasons that are not its own: the system's errors, and a lack of memory."""
+    """Return whether a read failed for the system's reasons, such as a lack of memory."""
     if isinstance(error, MemoryError) and not isinstance(error, BeyondBound):
         return float(np.prod(getattr(error, "shape", 0), dtype=float)) * 8 <= memory
     return isinstance(error, OSError) and (error.errno or 0) > 0  # netCDF has numbers of its own, below
 
 
 def file_content(path: str | Path) -> Any:
-    """What meshio reads from a file; a MeshError says why it does not."""
+    """Read a file by meshio; a MeshError gives the reason for a failure."""
     if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
     size = Path(path).stat().st_size
@@ -308,15 +296,7 @@ def _counter_clockwise(path: str | Path, points: np.ndarray, corners: np.ndarray
 
 
 def read_beam_mesh(path: str | Path, length: float, height: float, unit: float = 1.0) -> Mesh:
-    """Read a mesh that is to fill a box, and put its lower left corner at the origin.
-
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    unit : float, optional
-        Unit of the coordinates in the file [m].
-    """
+    """Read a mesh that must fill a box, and move its lower left corner to the origin; lengths in m."""
     mesh = read_mesh(path, unit)
     box = np.array([length, height])
     mesh = Mesh(mesh.points - mesh.points.min(axis=0), mesh.triangles, mesh.quads)

@@ -18,17 +18,10 @@ def _stretch(length: float, height: float, size: float) -> float:
 
 @mesh_type("free", order=20, row_height=ROW_HEIGHT, own_stretch=_stretch)
 def free(length: float, height: float, size: float) -> Mesh:
-    """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
+    """Delaunay triangulation inside an outline of imposed edge size [m], by netgen's advancing front.
 
-    The sides are divided into equal edges no longer than `size`; inside, netgen places points so that triangles come
-    out near-equilateral. Same input, same mesh.
-
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    size : float
-        Imposed length of the edges on the outline [m].
+    The sides are divided into equal edges no longer than `size`; inside, netgen makes near-equilateral triangles.
+    Deterministic.
     """
     from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
     from netgen.meshing import NgException

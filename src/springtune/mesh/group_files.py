@@ -15,12 +15,11 @@ from .sheets import in_words, outline_of, sheet_fault
 
 
 def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
-    """Read a mesh with its groups, of any format that meshio knows.
+    """Read a mesh with its groups, of any format that meshio supports.
 
-    Groups are physical groups of Gmsh (by number where they have no name), sets of cells and points of Abaqus and
-    others, and arrays of zeros and ones in VTU, of cells or points, by their name; cell data ``part`` numbers parts of
-    the body. Lines, and points that are joined by the outline, make sides; one point makes a point; triangles and
-    quadrilaterals make a part, unless they are all that there are.
+    Groups are physical groups of Gmsh (by number if unnamed), sets of cells and points of Abaqus and others, and
+    named arrays of zeros and ones in VTU; cell data ``part`` numbers parts. Lines, and points joined by the outline,
+    make sides; one point makes a point; triangles and quadrilaterals make a part, unless they are all cells.
 
     Parameters
     ----------
@@ -31,12 +30,12 @@ def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
     Returns
     -------
     GroupedMesh
-        `unusable` says of groups that can be none why.
+        `unusable` says why groups of the file are not usable.
 
     Raises
     ------
     MeshError
-        As `read_mesh`, and if the cells are no conforming plane sheet.
+        As `read_mesh`, and if the cells are not a conforming plane sheet.
     """
     content = file_content(path)
     mesh, used = assembled(path, content, unit)

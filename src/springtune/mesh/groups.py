@@ -12,20 +12,20 @@ from .sheets import edge_in_words, outline_of
 
 @dataclass(frozen=True, eq=False)
 class GroupedMesh:
-    """A mesh and the names of some of its edges, points and cells.
+    """A mesh and named groups of its edges, points and cells.
 
     Parameters
     ----------
     mesh : Mesh
     sides : mapping of str to ndarray of int, shape (n, 2), optional
-        Edges of the outline, holes included, by group: indices of the particles at their ends, the body to the left.
+        Edges of the outline, holes included, by group, the body to the left.
     points : mapping of str to ndarray of float, shape (2,), optional
         Coordinates of named points [m], in the body.
     parts : mapping of str to dict of int to ndarray of bool, shape (n_cells,), optional
-        Cells by part and number of corners, as in `Mesh.cells`; each cell is in at most one. Cells that are in none are
-        the body's main part, ``""``.
+        Cells by part and number of corners, as in `Mesh.cells`; each is in at most one part. The rest are the main
+        part, ``""``.
     unusable : mapping of str to str, optional
-        Groups of a file that can be none here, and why, as in ``"is not on the outline: ..."``.
+        Groups of a file that are not usable, and why, as in ``"is not on the outline: ..."``.
 
     Examples
     --------
@@ -44,7 +44,7 @@ class GroupedMesh:
     unusable: Mapping[str, str] = field(default_factory=dict)
 
     def particle(self, name: str) -> int | None:
-        """Particle at a named point.
+        """Return the particle at a named point.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class GroupedMesh:
         Returns
         -------
         int or None
-            None where none is within rounding.
+            None if no particle is within rounding.
 
         Examples
         --------
@@ -69,7 +69,7 @@ class GroupedMesh:
         return nearest if distances[nearest] <= 1e-9 * np.ptp(self.mesh.points, axis=0).max() else None
 
     def particles(self, name: str) -> np.ndarray:
-        """Particles of a group.
+        """Return the particles of a group.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class GroupedMesh:
         Returns
         -------
         ndarray of int
-            Sorted, each once; none of a point at which there is none.
+            Sorted, each once; empty for a point without particle.
 
         Examples
         --------
@@ -99,14 +99,14 @@ class GroupedMesh:
         return outline_of(self.mesh)[0] @ [len(self.mesh.points), 1]
 
     def side_fault(self, name: str, *, directed: bool = False) -> str:
-        """Why a group of sides is none, with the remedy; empty where it is.
+        """Return why a group of sides is not usable, with the remedy, or an empty string.
 
         Parameters
         ----------
         name : str
             Key of `sides`.
         directed : bool, optional
-            Whether the body has to be on the left of its edges, as a pressure needs it.
+            Whether the body must be on the left of its edges, as for a pressure.
 
         Returns
         -------

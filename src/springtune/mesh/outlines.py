@@ -19,10 +19,10 @@ Point = tuple[float, float]
 """Coordinates [m]."""
 
 LEAST_AROUND = 6
-"""Fewest edges of a full turn of an arc: a small hole stays one."""
+"""Fewest edges of a full turn of an arc, so that a small hole remains."""
 
 FINEST = 4e-6
-"""Least mesh size over the extent of a shape: netgen takes points for one that are a millionth apart."""
+"""Smallest mesh size over the extent of a shape: netgen merges points a millionth apart."""
 
 GRADING = 0.3
 """How much longer edges get over the distance from shorter ones, at most: netgen's."""
@@ -66,7 +66,7 @@ class Round(Protocol):
 
 
 class Outlined(Protocol):
-    """What can be meshed: a `springtune.Shape`."""
+    """Shape that can be meshed: a `springtune.Shape`."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -98,9 +98,9 @@ def mesh_shape(
 ) -> GroupedMesh:
     """Mesh a shape.
 
-    Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn, with its
-    particles on the arc; where much shorter ones are near, edges are divided further. Named points are particles.
-    Inside, netgen places points so that triangles come out near-equilateral. Same input, same mesh.
+    Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn with
+    particles on the arc; edges are divided further near much shorter ones. Named points are particles. Inside, netgen
+    makes near-equilateral triangles. Same input, same mesh.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ def mesh_shape(
     size : float
         Length of edges [m].
     mesh_type : str, optional
-        ``"free"``: no other one meshes an outline.
+        Only ``"free"`` meshes an outline.
     refined : mapping of str to float, optional
-        Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
+        Shorter edges [m] at named groups of sides, points and parts; they grow from there.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def mesh_shape(
     Raises
     ------
     MeshError
-        If the shape is that of a file, the mesh type another one, a size absurd or no number, or netgen fails.
+        If the shape is a file's, the mesh type is another one, a size is absurd or not a number, or netgen fails.
     """
     what = f"shape '{shape.name}'"
     if not shape.rounds:
@@ -259,7 +259,7 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """What netgen made: points in m, triangles, their regions, and the points in order along each stretch."""
+    """Result of netgen: points in m, triangles, their regions, and the points in order along each stretch."""
 
     points: np.ndarray
     triangles: np.ndarray

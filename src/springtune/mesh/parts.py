@@ -1,18 +1,10 @@
-"""Parts of a mesh that no edge joins, and whether they are held against rigid motions."""
+"""Connected parts of a mesh, and their supports against rigid motions."""
 
 import numpy as np
 
 
 def connected(edges: np.ndarray, count: int) -> np.ndarray:
-    """Number of the part that each of so many points belongs to, where edges join those of a part.
-
-    Parameters
-    ----------
-    edges : ndarray of int, shape (n_edges, 2)
-
-    Returns
-    -------
-    ndarray of int, shape (count,)
+    """Return the number of each of `count` points' connected part; `edges` has shape (n_edges, 2).
 
     Examples
     --------
@@ -31,17 +23,9 @@ def connected(edges: np.ndarray, count: int) -> np.ndarray:
 
 
 def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
-    """Refuse supports that leave a body free to move; what no edge joins are bodies of their own.
+    """Refuse supports that leave a connected body free to move, unless all its points are held.
 
-    Nothing is asked of a body whose points are all held.
-
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        Coordinates [m].
-    edges : ndarray of int, shape (n_edges, 2)
-    held : ndarray of bool, shape (n_points, 2)
-        Whether a point is held along x and y.
+    `points` (n_points, 2) [m], `edges` (n_edges, 2), `held` (n_points, 2).
     """
     components = connected(edges, len(points))
     count = components.max() + 1
@@ -59,14 +43,9 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
 
 
 def free_motion(points: np.ndarray, held: np.ndarray) -> str:
-    """Rigid motion that supports leave a body, in words; empty where they leave none.
+    """Return a rigid motion that supports leave free, in words, or an empty string.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        Coordinates [m].
-    held : ndarray of bool, shape (n_points, 2)
-        Whether a point is held along x and y.
+    `points` (n_points, 2) [m], `held` (n_points, 2).
 
     Examples
     --------

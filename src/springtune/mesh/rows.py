@@ -16,22 +16,14 @@ ROW_HEIGHT = math.sqrt(3) / 2
 def structured(length: float, height: float, size: float) -> Mesh:
     r"""Rows of near-equilateral triangles along x, fitted to the box.
 
-    The number of cells along x and of rows are the whole numbers nearest to the exact lattice; both directions are
-    then stretched to fit. Every other line of points is shifted by half a cell and closed with a point on either end,
-    so that the ends are straight::
+    The numbers of cells and rows are nearest to the exact lattice, then stretched to fit; lengths in m. Every other
+    line of points is shifted by half a cell and closed with a point on either end::
 
         +---+---+---+      4 points, as the lowest line
         |\ / \ / \ /|
         +-+---+---+-+      shifted by half an edge, closed at both ends: 5 points
         |/ \ / \ / \|
         +---+---+---+
-
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    size : float
-        Asked length of an edge [m].
     """
     return _fitted(length, height, *nearest_counts(length, height, size, ROW_HEIGHT))
 
@@ -39,22 +31,9 @@ def structured(length: float, height: float, size: float) -> Mesh:
 def isosceles(length: float, height: float, size: float, poisson_ratio: float) -> Mesh:
     """Rows of isosceles triangles whose shape sets Poisson's ratio under load along x.
 
-    Only the row springs of such a network carry a uniaxial load along the rows, so ``nu = (a / 2h)^2`` whatever the
-    stiffness is: rows of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper.
-
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    size : float
-        Asked length a of an edge along the rows [m].
-    poisson_ratio : float
-        Poisson's ratio that the shape is for, above 0 [1].
-
-    Returns
-    -------
-    Mesh
-        As `structured`; the number of rows is the nearest whole one, that of cells along x keeps the shape best.
+    Only the row springs carry a uniaxial load along the rows, so ``nu = (a / 2h)^2`` whatever their stiffness: rows
+    of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper. `size` is a [m]; the number
+    of rows is the nearest, that of cells along x keeps the shape best.
     """
     return _fitted(length, height, *_isosceles_counts(length, height, size, poisson_ratio))
 
@@ -69,7 +48,7 @@ def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: 
 
 
 def row_height(size: float, poisson_ratio: float) -> float:
-    """Height of a row of isosceles triangles of base `size` that sets Poisson's ratio [m].
+    """Return the height [m] of a row of isosceles triangles of base `size` [m] that sets Poisson's ratio.
 
     Examples
     --------
@@ -106,17 +85,11 @@ def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
 
 
 def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None = None) -> Mesh:
-    """Exact lattice with staggered ends: every particle inside sees the same neighbours.
+    """Exact lattice with staggered ends: every particle inside has the same neighbours.
 
-    Each line of points has the same length, every other one shifted by half an edge; no triangle is cut. It is what
-    closed forms of a lattice hold on exactly.
-
-    Parameters
-    ----------
-    size : float, optional
-        Length of an edge along the rows [m].
-    row_height : float, optional
-        Height of a row [m]; that of equilateral triangles without.
+    Closed forms of a lattice are exact on it: lines of points have one length, every other one is shifted by half an
+    edge, and no triangle is cut. `size` is the edge along the rows [m]; `row_height` [m] is by default that of
+    equilateral triangles.
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
     for name, value in (("cells", cells), ("rows", rows)):

@@ -1,4 +1,4 @@
-"""Whether a mesh is a conforming plane sheet, and if not, where and what to do about it."""
+"""Check that a mesh is a conforming plane sheet."""
 
 from collections.abc import Sequence
 
@@ -7,21 +7,20 @@ import numpy as np
 from .cells import Mesh, signed_areas
 
 DIGITS = 1e-6
-"""What coordinates in a file may be off, over the extent of the mesh: formats in text have few digits."""
+"""Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
 
 MOST_SEARCHED = 2000
-"""So many ends of edges are looked at for one that hangs on another edge."""
+"""Most ends of edges checked for one that hangs on another edge."""
 
 MOST_PAIRS = 4_000_000
 """Pairs of edges that are compared at a time."""
 
 
 def sheet_fault(mesh: Mesh) -> str:
-    """Why the cells of a mesh are no conforming plane sheet, with the remedy; empty where they are.
+    """Return why the cells of a mesh are not a conforming plane sheet, with the remedy, or an empty string.
 
-    Cells of a sheet are convex and meet in entire edges, two at most in each; none overlap, and its outline is made of
-    rounds that meet neither themselves nor each other: there are no slits, no hanging points, and no cells that hang
-    together in a point alone.
+    Cells must be convex and meet in entire edges, at most two in each, without overlaps. Rounds of the outline must
+    not touch themselves or each other: no slits, hanging points, or cells that meet only in a point.
 
     Examples
     --------
@@ -75,13 +74,7 @@ def not_convex(mesh: Mesh) -> str:
 
 
 def outline_of(mesh: Mesh) -> tuple[np.ndarray, str]:
-    """Sides of cells that have no neighbour, and why edges have more cells than a plane has sides.
-
-    Returns
-    -------
-    edges : ndarray of int, shape (n, 2)
-        Particles at their ends, the cell on the left.
-    """
+    """Return the sides (n, 2) without a neighbour, the cell on the left, and why edges have too many cells."""
     edges = np.concatenate(
         [np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2) for corners in mesh.cells.values()]
     )
@@ -96,14 +89,7 @@ def outline_of(mesh: Mesh) -> tuple[np.ndarray, str]:
 
 
 def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
-    """Why edges have one cell only where others are near, and what to do; empty where no reason is found.
-
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    edges : ndarray of int, shape (n, 2)
-    """
+    """Return why edges (n, 2) have one cell although others are near, with the remedy, or an empty string."""
     from scipy.spatial import cKDTree  # here, since a good mesh needs none
 
     small = DIGITS * np.ptp(points, axis=0).max()
@@ -140,22 +126,9 @@ def _touching(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of edges that are as near as they reach together, and share no end.
+    """Return pairs of disjoint edges nearer than their reaches together, and their distances [m].
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    edges : ndarray of int, shape (n, 2)
-    reach : ndarray of float, shape (n,)
-        Of each edge [m].
-
-    Returns
-    -------
-    one, other : ndarray of int, shape (n_pairs,)
-        Numbers of the edges.
-    distances : ndarray of float, shape (n_pairs,)
-        [m]
+    `points` (n_points, 2) [m], `edges` (n, 2), `reach` (n,) [m].
     """
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     # Along a direction in which few sides of shapes run, an edge overlaps few others.

@@ -8,7 +8,7 @@ from .types import mesh_type, nearest_counts
 
 @mesh_type("right", order=30)
 def right(length: float, height: float, size: float) -> Mesh:
-    r"""Squares cut by parallel diagonals.
+    r"""Squares of about `size` cut by parallel diagonals, stretched to fit the box; lengths in m.
 
     ::
 
@@ -17,13 +17,6 @@ def right(length: float, height: float, size: float) -> Mesh:
         +---+---+
         | / | / |
         +---+---+
-
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    size : float
-        Asked side of a square [m]; both directions are stretched to fit whole numbers of them.
     """
     points, a, b, c, d = _grid(length, height, size)
     return Mesh(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
@@ -32,8 +25,6 @@ def right(length: float, height: float, size: float) -> Mesh:
 @mesh_type("alternating", order=40)
 def alternating(length: float, height: float, size: float) -> Mesh:
     r"""Squares whose diagonals alternate like a chequerboard.
-
-    Parameters and returns as of `right`.
 
     ::
 
@@ -54,8 +45,6 @@ def alternating(length: float, height: float, size: float) -> Mesh:
 @mesh_type("braced", order=50, corners=4)
 def braced(length: float, height: float, size: float) -> Mesh:
     r"""Squares with both diagonals.
-
-    Parameters and returns as of `right`.
 
     ::
 

@@ -1,4 +1,4 @@
-"""How a mesh type is declared: a function that meshes a box, and what others must know of its meshes."""
+"""Declaration of mesh types: functions that mesh a box."""
 
 import math
 from collections.abc import Callable
@@ -31,13 +31,7 @@ def check_box(length: float, height: float, size: float) -> None:
 
 
 def too_many(count: float, size: float, side: float, body: str) -> str:
-    """Why no mesh of so many particles is made, with the remedy; empty where one is.
-
-    Parameters
-    ----------
-    size, side : float
-        Mesh size and smaller extent of the body [m].
-    """
+    """Return why so many particles are refused, with the remedy, or an empty string; `size`, `side` in m."""
     if count <= MOST_MESHED:
         return ""
     least = 1.1 * size * math.sqrt(count / MOST_MESHED)
@@ -46,21 +40,14 @@ def too_many(count: float, size: float, side: float, body: str) -> str:
 
 
 def nearest_whole(ratio: float) -> int:
-    """Nearest whole number, at least 1, halves to even ones: 2.5000000000000004 is a half, too."""
+    """Return the nearest whole number, at least 1, halves to even; 2.5000000000000004 counts as a half."""
     return max(1, round(round(ratio, 9)))
 
 
 def nearest_counts(length: float, height: float, size: float, row_height: float = 1.0) -> tuple[int, int]:
-    """Whole numbers of cells along a box and of rows over its height that come nearest to a size.
+    """Return the numbers of cells along a box and of rows over its height nearest to a size; lengths in m.
 
-    Parameters
-    ----------
-    length, height : float
-        Extent of the box [m].
-    size : float
-        Asked length of an edge [m].
-    row_height : float, optional
-        Height of a row over the length of an edge [1].
+    `row_height` is over the length of an edge [1].
 
     Examples
     --------
@@ -76,16 +63,10 @@ Function = TypeVar("Function", bound=Callable[..., Mesh])
 
 @dataclass(frozen=True, eq=False)
 class MeshType(Declared):
-    """A mesh type as a study knows it; made by the decorator `mesh_type`, called to make a mesh.
+    """A mesh type of studies, made by the decorator `mesh_type`; call it to make a mesh.
 
-    Attributes
-    ----------
-    function : callable
-        (length, height, size) -> `Mesh`.
-    row_height : float
-        Height of a row of cells over the mesh size [1].
-    own_stretch : callable or None
-        (length, height, size) -> `stretch`, where the numbers of cells are not the whole ones nearest to the size.
+    `function` takes (length, height, size) [m]. `row_height` is over the mesh size [1]. `own_stretch`, with the same
+    arguments, replaces `stretch` if the counts are not the nearest.
     """
 
     corners: int = 3
@@ -93,15 +74,7 @@ class MeshType(Declared):
     own_stretch: Callable[[float, float, float], float] | None = None
 
     def __call__(self, length: float, height: float, size: float) -> Mesh:
-        """Mesh a box.
-
-        Parameters
-        ----------
-        length, height : float
-            Extent of the box [m].
-        size : float
-            Asked length of an edge [m].
-        """
+        """Mesh a box; lengths in m."""
         found = self.function(length, height, size)
         if not isinstance(found, Mesh):
             what = type(found).__name__
@@ -109,9 +82,9 @@ class MeshType(Declared):
         return found
 
     def stretch(self, length: float, height: float, size: float) -> float:
-        """How much wider cells come out than high, over what they should be, as whole numbers of them fit a box [1].
+        """Return the cells' ratio of width to height over the nominal one, in a box [1]; lengths in m.
 
-        Known without making the mesh; parameters as of a call.
+        Known without making the mesh.
         """
         if self.own_stretch:
             return self.own_stretch(length, height, size)
@@ -142,14 +115,14 @@ def mesh_type(
     row_height: float = 1.0,
     own_stretch: Callable[[float, float, float], float] | None = None,
 ) -> Callable[[Function], Function]:
-    """Declare a function to be a mesh type, by a decorator that returns it as it is.
+    """Declare a function as a mesh type, by a decorator that returns it unchanged.
 
     Parameters
     ----------
     name : str
         Label in a study and in the dataset.
     order : float, optional
-        Place in the order of labels: a number between those of its neighbours; at the end without.
+        Place in the order of labels, between its neighbours' numbers; by default last.
     corners, row_height, own_stretch
         As of `MeshType`.
 
@@ -161,7 +134,7 @@ def mesh_type(
     Raises
     ------
     ValueError
-        If another function is the mesh type of that name; the same one, declared again, replaces the former.
+        If another function has that name; the same function, declared again, replaces the former.
 
     Examples
     --------

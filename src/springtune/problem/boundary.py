@@ -1,8 +1,7 @@
-"""How a load holds and pulls a mesh, and what is read from it, by its groups.
+"""Supports, forces and measured quantities of load cases on a mesh.
 
-A load case speaks of groups of sides and of points; here each becomes directions that are held, displacements that are
-prescribed there, forces on particles, and weights of displacements or of reactions. Beams are the special case whose
-groups are the sides of their box.
+Groups become held directions, prescribed displacements, forces, and weights of displacements or reactions. Beams are
+the special case whose groups are the sides of their box. Held directions and weights have shape (n_points, 2).
 """
 
 from collections.abc import Iterable, Mapping
@@ -22,7 +21,7 @@ ON_POINT = 1e-9
 """Distance from a particle below which a point is that particle, over the extent of the mesh [1]."""
 
 OUTSIDE = 0.25
-"""How far a point may lie beyond the nearest cell, as on the arc that a straight edge cuts short, over its size [1]."""
+"""How far outside the nearest cell a point may lie, over its size [1], as next to an arc."""
 
 MAX_ITERATIONS = 50
 """Newton steps that look for a point in a quadrilateral."""
@@ -34,54 +33,32 @@ def box(mesh: Mesh, sides: Iterable[Side]) -> GroupedMesh:
 
 
 def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
-    """Edges on a side of a box with its lower left corner at the origin.
-
-    Returns
-    -------
-    ndarray of int, shape (n, 2)
-    """
+    """Return the edges (n, 2) on a side of a box with its lower left corner at the origin."""
     return mesh.outline_edges(side.axis, side.place(*mesh.points.max(axis=0)))
 
 
 def loaded_edges(mesh: Mesh, kind: LoadKind) -> tuple[np.ndarray, int]:
-    """Edges of the loaded side of a box.
-
-    Returns
-    -------
-    edges : ndarray of int, shape (n, 2)
-    """
+    """Return the edges (n, 2) of the loaded side of a box, and the axis of the force."""
     return side_edges(mesh, kind.loaded), kind.along
 
 
 def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
-    """Directions that a kind of load holds, see `springtune.problem.loads`.
-
-    Returns
-    -------
-    ndarray of bool, shape (n_points, 2)
-    """
+    """Return the directions that a kind of load holds, see `springtune.problem.loads`."""
     return supported(box(mesh, (side for side, _ in kind.held)), kind.case)[0]
 
 
 def weights(mesh: Mesh, kind: LoadKind) -> np.ndarray:
-    """Weight of each particle in an even distribution over the loaded side, along the force: the pattern of a load.
+    """Return the load pattern: each particle's weight in an even distribution over the loaded side.
 
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        Sum 1 along the force, zero across.
+    Sum 1 along the force, zero across.
     """
     return even(box(mesh, [kind.loaded]), kind.loaded.name, kind.axis)
 
 
 def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
-    """Weights of the displacements that make the displacement of a load.
+    """Return the weights, sum 1, of the displacements that make the displacement of a load.
 
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        Sum 1: the mean over the loaded side; of a pressed side its middle, by interpolation along the edge that it
-        lies on.
+    The mean over the loaded side; for pressure its middle, interpolated along its edge.
     """
     if not kind.pressed:
         return weights(mesh, kind)
@@ -92,14 +69,7 @@ def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 
 
 def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
-    """Directions that a load case holds, and by how much they are moved.
-
-    Returns
-    -------
-    held : ndarray of bool, shape (n_points, 2)
-    given : ndarray of float, shape (n_points, 2)
-        Prescribed displacements [m]; zero in all other directions.
-    """
+    """Return the directions that a load case holds and their prescribed displacements [m], zero elsewhere."""
     points = grouped.mesh.points
     held, given = np.zeros(points.shape, dtype=bool), np.zeros(points.shape)
     for support in case.supports:
@@ -121,12 +91,9 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
 
 
 def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
-    """Weights of an even distribution over a group, by length: each edge gives half of its share to either particle.
+    """Return the weights of an even distribution over a group, by length; sum 1 along `axis`, zero across.
 
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        Sum 1 along the direction, zero across.
+    Each edge gives half of its share to either particle.
     """
     mesh, field = grouped.mesh, np.zeros(grouped.mesh.points.shape)
     if group not in grouped.sides:
@@ -146,19 +113,9 @@ def forces(
     densities: Mapping[str, float | None] | None = None,
     followers: bool = True,
 ) -> np.ndarray:
-    """Forces of a load case on the particles, at rest.
+    """Return the forces of a load case on the particles at rest [N], shape (n_points, 2).
 
-    Parameters
-    ----------
-    thickness : float, optional
-        Of the sheet [m].
-    densities : mapping of str to float, optional
-        Density of each part [kg/m3], of the main one at ``""``; for gravity.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        [N]
+    `thickness` is in m; `densities` [kg/m3] by part, the main one at ``""``, are for gravity.
     """
     field = np.zeros(grouped.mesh.points.shape)
     for traction in case.tractions:
@@ -177,20 +134,7 @@ def forces(
 
 
 def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Edges whose pressure follows them, and that pressure.
-
-    Parameters
-    ----------
-    thickness : float, optional
-        Of the sheet [m].
-
-    Returns
-    -------
-    edges : ndarray of int, shape (n, 2)
-        The body to the left.
-    pressure : ndarray of float, shape (n,)
-        Force over length, towards the body [N/m].
-    """
+    """Return the edges (n, 2) with follower pressure, the body to the left, and it (n,) times the thickness [N/m]."""
     found = [(sides_of(grouped, one.group), one.pressure * thickness) for one in case.pressures if one.follower]
     edges = [np.zeros((0, 2), dtype=np.int64), *(edges for edges, _ in found)]
     return np.concatenate(edges), np.concatenate(
@@ -199,19 +143,9 @@ def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tu
 
 
 def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
-    """Lumped mass of each particle: a cell gives the same part of its own to each of its corners.
+    """Return lumped masses [kg], shape (n_points,): a cell gives equal shares to its corners.
 
-    Parameters
-    ----------
-    thickness : float
-        Of the sheet [m].
-    densities : mapping of str to float
-        Density of each part [kg/m3], of the main one at ``""``.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points,)
-        [kg]
+    `thickness` is in m; `densities` [kg/m3] by part, the main one at ``""``.
     """
     points, labels = grouped.mesh.points, part_names(grouped)
     masses = np.zeros(len(points))
@@ -228,12 +162,7 @@ def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[s
 
 
 def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
-    """Part of each cell, by number of corners: ``""`` where it is in none.
-
-    Returns
-    -------
-    dict of int to ndarray of str, shape (n_cells,)
-    """
+    """Return the part of each cell, by number of corners: ``""`` for the main part."""
     found = {}
     for count, corners in grouped.mesh.cells.items():
         found[count] = np.full(len(corners), "", dtype=object)
@@ -244,13 +173,7 @@ def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
 
 
 def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray:
-    """Weights of the displacements that make a quantity: the mean one of sides, or that of a point.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        Sum 1.
-    """
+    """Return the weights, sum 1, of a displacement quantity: the mean of sides, or a point's."""
     axis = "xy".index(quantity.component)
     if quantity.of in grouped.sides:
         return even(grouped, quantity.of, axis)
@@ -261,14 +184,10 @@ def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray
 
 
 def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -> np.ndarray:
-    """Weights of the support's forces on the particles that make a reaction.
+    """Return the weights of the support forces that make a reaction.
 
-    Where sides of two groups hold a particle in the same direction, its force belongs to each by its share in their
-    lengths; a point on sides that are held so has none of it, as in a continuum.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
+    A particle that sides of two groups hold in one direction divides its force by their lengths. A point on such
+    sides has no force of its own, as in a continuum.
     """
     axis = "xy".index(quantity.component)
     holding = [one for one in case.supports if (one.x, one.y)[axis] is not None]
@@ -302,24 +221,14 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
 
 
 def sides_of(grouped: GroupedMesh, group: str) -> np.ndarray:
-    """Edges of a group.
-
-    Returns
-    -------
-    ndarray of int, shape (n, 2)
-    """
+    """Return the edges (n, 2) of a group."""
     if group not in grouped.sides:
         raise ValueError(f"group: {group!r} is no group of sides; {nearest(group, grouped.sides)}")
     return grouped.sides[group]
 
 
 def particles_of(grouped: GroupedMesh, group: str) -> np.ndarray:
-    """Particles of a group of sides, some of them twice, or of a point.
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-    """
+    """Return the particles of a group of sides, some of them twice, or of a point."""
     if group in grouped.sides:
         return grouped.sides[group].ravel()
     point, found = _point(grouped, group), grouped.particle(group)
@@ -342,13 +251,9 @@ def _shown(point: np.ndarray) -> str:
 
 
 def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Weights that interpolate a field at a named point: along the edge of the outline, or in the cell, that has it.
+    """Return particles and weights, sum 1, that interpolate a field at a named point; exact at particles.
 
-    Returns
-    -------
-    particles : ndarray of int, shape (n,)
-    weights : ndarray of float, shape (n,)
-        Sum 1; exact at particles. Linear in triangles, bilinear in quadrilaterals.
+    Along its edge of the outline, or in its cell: linear in triangles, bilinear in quadrilaterals.
     """
     mesh, point = grouped.mesh, _point(grouped, name)
     outline = mesh.edges[mesh.on_outline]
@@ -364,12 +269,9 @@ def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarr
 
 
 def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
-    """Cell that a named point is in, or next to where a straight edge cuts off the arc that it is on.
+    """Return the cell of a named point and its corners' interpolation weights.
 
-    Returns
-    -------
-    weights : ndarray of float, shape (corners,)
-        Those of the corners, by interpolation.
+    The nearest cell if a straight edge cuts off the arc that the point is on.
     """
     mesh, point = grouped.mesh, _point(grouped, name)
     slack, found = ON_POINT * np.ptp(mesh.points, axis=0).max(), None

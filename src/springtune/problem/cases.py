@@ -1,4 +1,4 @@
-"""Whether a load case fits a mesh with groups: its names, and whether supports hold each part of the body."""
+"""Checks of load cases on meshes with groups: names, and supports of each part."""
 
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def check_case(grouped: "GroupedMesh", case: LoadCase) -> None:
-    """Refuse a load case that a mesh does not have the groups for, or that leaves cells free to move.
+    """Refuse a load case whose groups a mesh lacks, or that leaves cells free to move.
 
     Examples
     --------

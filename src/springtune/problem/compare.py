@@ -1,4 +1,4 @@
-"""Comparing networks with references: errors, and the stiffness at which a sensitivity curve has none."""
+"""Errors of networks against references, and the stiffness at which a sensitivity curve has none."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,31 +12,20 @@ ROOT_TOLERANCE = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""
 
 HALVINGS = 12
-"""Of the way to where a curve ends, in search of its best stiffness there."""
+"""Bisections in search of a best stiffness where a curve ends."""
 
 
 def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:
     """Signed deformation error ``(network - reference) / |reference|`` [1].
 
-    Positive where the end has moved further along +x than the reference's: in tension a network that is too soft, in
-    compression one that is too stiff.
-
-    Parameters
-    ----------
-    displacement, reference : array_like of float
-        Displacement of network and reference [m].
+    Positive means further along +x: too soft in tension, too stiff in compression.
     """
     displacement, reference = np.asarray(displacement), np.asarray(reference)
     return (displacement - reference) / np.abs(reference)
 
 
 def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float]:
-    """Error of each quantity of interest, as `deformation_error`.
-
-    Returns
-    -------
-    dict of str to float
-        [1]; NaN where the reference has none, or exactly zero.
+    """Return the `deformation_error` of each quantity of interest; NaN if its reference is missing or zero.
 
     Examples
     --------
@@ -51,15 +40,10 @@ def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> 
 
 @dataclass(frozen=True)
 class Best:
-    """Stiffness at which a sensitivity curve meets the reference.
+    """Stiffness [N/m] at which a sensitivity curve meets the reference, or NaN.
 
-    Attributes
-    ----------
-    stiffness : float
-        [N/m]; NaN where there is none.
-    status : Status
-        Solved; unstable where the curve meets the reference where it is unstable alone; not converged where it may in a
-        gap; failed where it does not, or there is no reference.
+    `status` is solved; unstable if they meet only where the curve is unstable; not converged if they may meet in a
+    gap; failed if they do not meet, or without reference.
     """
 
     stiffness: float
@@ -74,24 +58,13 @@ def best_stiffness(
     reference: float,
     solve: Callable[[float], float],
 ) -> Best:
-    """Stiffness at which the stable part of a sensitivity curve meets the reference.
+    """Find the stiffness at which the stable part of a sensitivity curve meets the reference.
 
-    Between two stable points on either side of the reference the equation ``solve(k) = reference`` is solved for
-    ``1/k``, in which the curve is nearly straight. Between the last stable point and the next one, where the curve
-    loses its stability or was not followed, stable points are sought by bisection.
+    Between stable points on either side ``solve(k) = reference`` is solved for ``1/k``, in which the curve is nearly
+    straight. Between the last stable point and the next one, stable points are sought by bisection.
 
-    Parameters
-    ----------
-    stiffness : ndarray of float, shape (n,)
-        Ascending [N/m].
-    displacement : ndarray of float, shape (n,)
-        Displacement of the network [m]; NaN where there is none.
-    stable : ndarray of bool, shape (n,)
-        Whether it is of a stable equilibrium.
-    reference : float
-        Displacement of the reference [m].
-    solve : callable
-        Displacement [m] of the stable equilibrium at a stiffness [N/m], NaN where there is none.
+    `stiffness` (n,) is ascending [N/m]; `displacement` (n,) in m, NaN if missing; `solve` returns the stable
+    displacement [m], or NaN.
     """
     if not np.isfinite(reference):
         return Best(np.nan, Status.FAILED, "the reference has no displacement")
@@ -160,18 +133,9 @@ def _last_root(
 def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Largest error of each mesh size and all finer ones that were run, on both beams [1].
 
-    An error that happens to cross zero at one mesh size, or on one beam, promises nothing: what is finer, or another
-    beam, shows it. Nothing does for the finest one.
-
-    Parameters
-    ----------
-    errors, second : ndarray of float, shape (n_approaches, n_sizes)
-        Errors on the beam and on the second one, from the finest mesh size to the coarsest [1].
-
-    Returns
-    -------
-    ndarray of float, shape (n_approaches, n_sizes)
-        NaN for the finest size that was run, and from where a finer one failed or has no second beam.
+    An error that crosses zero by chance at one size or on one beam promises nothing: finer sizes or the other beam
+    show it. `errors`, `second` and the result have shape (n_approaches, n_sizes), finest size first. NaN at the
+    finest size, and from where a finer one failed or has no second beam.
     """
     errors, second = np.abs(errors), np.abs(second)
     found = np.full(errors.shape, np.nan)
@@ -183,20 +147,7 @@ def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-    """Whether no other case has a smaller error in no more time.
-
-    Parameters
-    ----------
-    errors : ndarray of float
-        Errors of all cases [1]; NaN where one has none.
-    seconds : ndarray of float
-        Times of all cases [s], in the same shape.
-
-    Returns
-    -------
-    ndarray of bool
-        In the same shape; not where an error is NaN.
-    """
+    """Return whether no other case has a smaller error in no more time; False for NaN errors."""
     best = np.zeros(errors.shape, dtype=bool)
     for place in map(tuple, np.argwhere(np.isfinite(errors))):
         best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
@@ -204,21 +155,11 @@ def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
 
 
 def band(values: Sequence[float]) -> float:
-    """Band in which a value is known that scatters from mesh to mesh: twice the largest difference of some meshes'.
+    """Return the half-width of the band of a value that scatters from mesh to mesh: twice their largest difference.
 
-    The elongation of a laid strip does not converge in order: a corner of what it lies on catches between two of its
-    particles, and where it lets go depends on the mesh. So no extrapolation holds. Of a few values that scatter alike
-    the next one lies beyond their extremes as often as not, hence twice.
-
-    Parameters
-    ----------
-    values : sequence of float
-        NaN where a mesh has no value.
-
-    Returns
-    -------
-    float
-        Half the width of the band; NaN where fewer than two meshes have a value.
+    A laid strip's elongation does not converge in order: a corner catches between two of its particles, which depends
+    on the mesh. Of a few such values the next one often lies beyond their extremes, hence twice. NaN with fewer than
+    two values.
     """
     known = [value for value in values if np.isfinite(value)]
     return 2 * (max(known) - min(known)) if len(known) > 1 else float("nan")

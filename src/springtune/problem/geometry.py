@@ -8,19 +8,11 @@ from .quantities import positive
 
 
 class AssumptionWarning(UserWarning):
-    """What is asked for breaks an assumption of the model, such as that of a thin sheet."""
+    """An input violates an assumption of the model, such as that of a thin sheet."""
 
 
 def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -> None:
-    """Warn where a body is thicker than its smaller side: plane stress is an assumption about thin sheets.
-
-    Parameters
-    ----------
-    thickness : float
-        [m]
-    sides : tuple of float
-        Its length and height [m].
-    """
+    """Warn if a body is thicker than its smaller side [m]: plane stress is for thin sheets."""
     smaller = min(sides)
     if thickness > smaller:
         warnings.warn(
@@ -33,24 +25,24 @@ def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -
 
 @dataclass(frozen=True)
 class Beam:
-    """A rectangular sheet, its lower left corner at the origin.
+    """A rectangular sheet with its lower left corner at the origin.
 
     Parameters
     ----------
     length, height, thickness : float or str
         Extent along x, along y and out of the plane [m], or texts with their unit.
     name : str, optional
-        Label of the beam; its length and height in mm without, e.g. ``"200x40"``.
+        Label; by default length and height in mm, e.g. ``"200x40"``.
 
     Raises
     ------
     ValueError
-        If a length is not above zero, a text no length, or the name no text.
+        If a length is not above zero, a text not a length, or the name not a text.
 
     Warns
     -----
     AssumptionWarning
-        If it is thicker than its smaller side: plane stress is an assumption about thin sheets.
+        If it is thicker than its smaller side: plane stress is for thin sheets.
 
     Examples
     --------
@@ -81,7 +73,7 @@ class Beam:
 
     @property
     def label(self) -> str:
-        """Name with what the sheet measures, for titles, as `beam_label` gives it.
+        """Name and size of the sheet, for titles, see `beam_label`.
 
         Examples
         --------
@@ -93,13 +85,7 @@ class Beam:
 
 
 def beam_label(name: str, length: float, height: float) -> str:
-    """A beam's name with what it measures: ``"200x40 mm"``, or ``"pad (80 x 30 mm)"`` of a name that does not say it.
-
-    Parameters
-    ----------
-    length, height : float
-        [m]; NaN where they are not known, then it is the name alone.
-    """
+    """Return ``"200x40 mm"``, or ``"pad (80 x 30 mm)"`` for a name without the size [m]; only the name for NaN."""
     long, high = (round(1e3 * side, 9) for side in (length, height))
     if long != long or high != high:
         return name
@@ -108,13 +94,7 @@ def beam_label(name: str, length: float, height: float) -> str:
 
 @dataclass(frozen=True)
 class Strip:
-    """A strip that is laid.
-
-    Attributes
-    ----------
-    length, height, thickness : float
-        Extent along x, along y and out of the plane [m].
-    """
+    """Strip to be laid; lengths in m."""
 
     length: float
     height: float
@@ -123,13 +103,7 @@ class Strip:
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """A symmetric trapezoid, upright on its lower base.
-
-    Attributes
-    ----------
-    lower_base, upper_base, height : float
-        Lengths of its bases and their distance [m].
-    """
+    """Symmetric trapezoid on its lower base; lengths in m."""
 
     lower_base: float
     upper_base: float

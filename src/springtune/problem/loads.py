@@ -16,9 +16,9 @@
     +----------------+
     ////// clamped
 
-A load's displacement is the mean one of the loaded side, along the force; under pressure, that of the side's middle.
+A load's displacement is the mean of the loaded side along the force; under pressure, that of the side's middle.
 
-A new load is a row of `LOADS`, and a `LoadKind` where none of those here has its supports, its side and its direction.
+To add a load, add a row to `LOADS`, and a `LoadKind` if its supports, side or direction are new.
 """
 
 from dataclasses import dataclass
@@ -36,13 +36,7 @@ MIDDLE = "middle"
 
 @dataclass(frozen=True, order=True)
 class Side:
-    """A side of a rectangle whose lower left corner is the origin.
-
-    Attributes
-    ----------
-    far : bool
-        Whether it is the side of the larger coordinate.
-    """
+    """Side of a rectangle at the origin; `far` is True at the larger coordinate."""
 
     axis: int
     far: bool
@@ -70,16 +64,10 @@ BOTH = (0, 1)
 
 @dataclass(frozen=True)
 class LoadKind:
-    """What loads that differ by a factor have in common: supports, the loaded side and the direction of the force.
+    """Supports, loaded side and direction of the force.
 
-    Attributes
-    ----------
-    name : str
-        Label in tasks and in the keys of stored results.
-    held : tuple of (Side, tuple of int)
-        Sides that are held, and along which axes: ``(0, 1)`` is a clamp, ``(1,)`` are rollers on a horizontal side.
-    pressed : bool
-        Whether the displacement of the load is that of the loaded side's middle, rather than the mean one.
+    `held` has sides and their held axes: ``(0, 1)`` is a clamp, ``(1,)`` rollers on a horizontal side. `pressed`
+    measures the middle of the loaded side instead of its mean.
 
     Examples
     --------
@@ -127,9 +115,9 @@ class LoadKind:
 
     @property
     def mirrored(self) -> bool:
-        """Whether the supports are their own mirror image across the middle of the loaded side.
+        """Whether the supports are symmetric across the middle of the loaded side.
 
-        The displacements along the force are then even across it in small strain, those across the force odd.
+        At small strain displacements along the force are then even across it, those across the force odd.
         """
         held = {(side, *directions) for side, directions in self.held}
         across = ((side.opposite if side.axis == self.along else side, *axes) for side, axes in self.held)
@@ -176,17 +164,9 @@ FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, BOTH),), pressed=True
 
 @dataclass(frozen=True)
 class Load:
-    """A load.
+    """Load of a `kind`; `sign` is positive in tension.
 
-    Attributes
-    ----------
-    kind : LoadKind
-        What is held, and where and along what the force acts.
-    sign : float
-        Sign of the force of a load [1]; tension is positive.
-    follower : bool
-        Whether the force turns and grows with the side that it acts on, in nonlinear kinematics; the force of its kind
-        acts across the side.
+    A `follower` force turns and grows with its side in nonlinear kinematics; its kind must load across the side.
     """
 
     kind: LoadKind

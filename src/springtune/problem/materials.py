@@ -1,6 +1,6 @@
-r"""Materials: linearly elastic, isotropic or not, and rubber of a law that a test was fitted by.
+r"""Materials: linear elastic, isotropic or anisotropic, and rubber fitted to a test.
 
-Sheets are in plane stress. With stresses and strains in Voigt's order, xx, yy and xy, the shear strain being the angle,
+Sheets are in plane stress. With stresses and strains in Voigt's order, xx, yy and xy, and the shear angle as strain,
 
 .. math:: \begin{pmatrix} \sigma_{xx} \\ \sigma_{yy} \\ \sigma_{xy} \end{pmatrix} =
           \begin{pmatrix} C_{11} & C_{12} & C_{16} \\ C_{12} & C_{22} & C_{26} \\ C_{16} & C_{26} & C_{66}
@@ -29,28 +29,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic linearly elastic material.
+    """An isotropic linear elastic material.
 
     Parameters
     ----------
     young_modulus : float or str
         Young's modulus E [Pa], or a text with its unit.
     poisson_ratio : float
-        Poisson's ratio nu [1], above -1 and at most 0.5, which is legal, since sheets are in plane stress.
+        Poisson's ratio nu [1], above -1 and at most 0.5: plane stress allows 0.5.
     density : float, str or None
-        Density rho [kg/m3], or a text with its unit; statics need none.
+        Density rho [kg/m3], or a text with its unit; not needed in statics.
     name : str
         Label of the material, e.g. ``"steel"``.
 
     Attributes
     ----------
     isotropic : bool
-        True: it has one Young's modulus and one Poisson's ratio.
+        True.
 
     Raises
     ------
     ValueError
-        If a quantity is not above zero or of another kind, the name no text, or Poisson's ratio out of its range.
+        If a quantity is not above zero or has the wrong unit, the name is not a text, or Poisson's ratio is out of
+        range.
 
     Examples
     --------
@@ -113,37 +114,37 @@ MOST_TERMS = 3
 
 @dataclass(frozen=True, init=False)
 class Rubber(Material):
-    r"""Incompressible rubber of Yeoh's law, as `springtune.fit_rubber` makes it of a uniaxial test.
+    r"""Incompressible rubber of Yeoh's law, see `springtune.fit_rubber`.
 
-    To whatever knows small strain alone it is a `Material` of E = 6 c_1 and nu = 0.5.
+    At small strain it is a `Material` of E = 6 c_1 and nu = 0.5.
 
     Parameters
     ----------
     coefficients : sequence of float
-        c_1 to c_3 or fewer [Pa].
+        One to three coefficients c_n [Pa].
     largest : float
-        Largest I_1 - 3 of the data that it was fitted to [1]; infinite without any. Beyond, what it says is
-        extrapolated: answers of networks say so.
+        Largest I_1 - 3 of the fitted data [1], or infinite. Networks strained beyond it report that the law is
+        extrapolated.
     test_errors : sequence of (str, float)
-        Of each test that it was compared with the root mean square of its relative errors [1].
+        Root mean square of the relative errors [1] by compared test.
     density : float, str or None
-        Density rho [kg/m3], or a text with its unit; statics need none.
+        Density rho [kg/m3], or a text with its unit; not needed in statics.
     name : str
         Label of the material.
 
     Raises
     ------
     ValueError
-        If there is another number of coefficients, or one is no number, or the first not above zero.
+        If there are no or too many coefficients, one is not a number, or the first is not above zero.
 
     Notes
     -----
     The energy per volume is (O. H. Yeoh, Rubber Chem. Technol. 63:792, 1990)
 
-    .. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n,
+    .. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n;
 
-    with one term that of neo-Hooke's law. A stretch q has the nominal stress ``2 (q - b) W'(I_1)``, where b is
-    ``q^-2``, ``q^-5`` or ``q^-3`` in uniaxial tension, equibiaxial tension and pure shear.
+    one term alone is neo-Hooke's law. A stretch q has the nominal stress ``2 (q - b) W'(I_1)``, where b is ``q^-2``,
+    ``q^-5`` or ``q^-3`` in uniaxial tension, equibiaxial tension and pure shear.
 
     Examples
     --------
@@ -186,7 +187,7 @@ class Rubber(Material):
 
     @property
     def errors(self) -> dict[str, float]:
-        """Root mean square of the relative errors of its stress, by the test that it was compared with [1].
+        """Root mean square of the relative errors of its stress, by compared test [1].
 
         Examples
         --------
@@ -198,14 +199,14 @@ class Rubber(Material):
 
     @staticmethod
     def excess(test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """I_1 - 3 of stretches in a test.
+        """Return I_1 - 3 at stretches in a test.
 
         Parameters
         ----------
         test : str
             ``"uniaxial"``, ``"equibiaxial"`` or ``"pure shear"``.
         stretch : float or ndarray of float
-            Length over the one at rest [1].
+            Length over rest length [1].
 
         Returns
         -------
@@ -215,7 +216,7 @@ class Rubber(Material):
         Raises
         ------
         ValueError
-            If the test is another.
+            If the test is unknown.
 
         Examples
         --------
@@ -230,7 +231,7 @@ class Rubber(Material):
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
 
     def stress(self, test: str, stretch: np.ndarray | float) -> np.ndarray:
-        """Nominal stress at stretches in a test.
+        """Return the nominal stress at stretches in a test.
 
         Parameters
         ----------
@@ -245,7 +246,7 @@ class Rubber(Material):
         Raises
         ------
         ValueError
-            If the test is another.
+            If the test is unknown.
 
         Examples
         --------
@@ -267,34 +268,34 @@ class Rubber(Material):
 
 @dataclass(frozen=True)
 class AnisotropicMaterial:
-    """A linearly elastic sheet of any anisotropy, by its six constants in plane stress.
+    """A linear elastic sheet of any anisotropy, by its six constants in plane stress.
 
-    `orthotropic` makes one of engineering constants and the angle of its fibres, `laminate` one of plies.
+    See `orthotropic` for engineering constants and a fibre angle, `laminate` for plies.
 
     Parameters
     ----------
     C11, C22 : float or str
-        Stiffness along x and along y, the strain across held [Pa], or a text with its unit.
+        Stiffness along x and along y without strain across [Pa], or a text with its unit.
     C12 : float or str
         Stress along x for a strain along y [Pa].
     C66 : float or str
         Shear stress for a shear angle [Pa].
     C16, C26 : float or str
-        Shear stress for strains along x and y [Pa]; none where x and y are axes of the material.
+        Shear stress for strains along x and y [Pa]; 0 if x and y are axes of the material.
     density : float, str or None
-        Density rho [kg/m3], or a text with its unit; statics need none.
+        Density rho [kg/m3], or a text with its unit; not needed in statics.
     name : str
         Label of the material, e.g. ``"ply"``.
 
     Attributes
     ----------
     isotropic : bool
-        False: what needs one Young's modulus and one Poisson's ratio refuses it, whatever its constants.
+        False, whatever its constants: definitions that need one E and one nu refuse it.
 
     Raises
     ------
     ValueError
-        If a quantity is of another kind, or if the six are not positive definite: a strain would take no work.
+        If a quantity has the wrong unit, or the stiffness is not positive definite.
 
     Examples
     --------
@@ -351,18 +352,18 @@ class AnisotropicMaterial:
         density: float | str | None = None,
         name: str = "material",
     ) -> AnisotropicMaterial:
-        """Material with two axes of its own, such as a ply of fibres, of its engineering constants.
+        """Make a material with two axes, such as a ply of fibres, from engineering constants.
 
         Parameters
         ----------
         young_modulus_x, young_modulus_y : float or str
-            Young's modulus along the fibres and across [Pa], or a text with its unit.
+            Young's modulus along and across the fibres [Pa], or a text with its unit.
         poisson_ratio_xy : float
             Contraction across over extension along the fibres, pulled along them [1].
         shear_modulus : float or str
             [Pa]
         angle : float or str
-            By which the fibres are turned from the sheet's x axis, counter-clockwise [rad], or a text with its unit.
+            Angle of the fibres from the sheet's x axis, counter-clockwise [rad], or a text with its unit.
         density : float, str or None
             [kg/m3]
         name : str
@@ -374,8 +375,8 @@ class AnisotropicMaterial:
         Raises
         ------
         ValueError
-            If a quantity is not above zero or of another kind, or Poisson's ratio beyond sqrt(E_x / E_y), where the
-            energy of a strain would be negative.
+            If a quantity is not above zero or has the wrong unit, or the size of Poisson's ratio exceeds sqrt(E_x /
+            E_y).
 
         Examples
         --------
@@ -410,18 +411,18 @@ class AnisotropicMaterial:
         density: float | str | None = None,
         name: str = "laminate",
     ) -> AnisotropicMaterial:
-        """Plies that are bonded to one another, as one sheet: the mean of their stiffnesses by thickness.
+        """Make one sheet of bonded plies: the mean of their stiffnesses by thickness.
 
-        The in-plane part A / t of classical lamination theory. It takes stackings for symmetric: others bend out of
-        their plane as they are stretched.
+        The in-plane part A / t of classical lamination theory, for symmetric stackings: others bend out of their
+        plane when stretched.
 
         Parameters
         ----------
         plies : sequence of (material, angle, thickness)
-            Of each ply its material, isotropic or not, the angle by which it is turned [rad] and its thickness, which
-            counts over that of all; angle and thickness may be texts with their units.
+            Material of each ply, its angle [rad] and its thickness, which counts relative to the total; angle and
+            thickness may be texts with units.
         density : float, str or None
-            [kg/m3]; the plies' mean without, if each has one.
+            [kg/m3]; by default the plies' mean, if each has one.
         name : str
 
         Returns
@@ -431,7 +432,7 @@ class AnisotropicMaterial:
         Raises
         ------
         ValueError
-            If there are no plies, or one is of another kind.
+            If there are no plies, or one has the wrong form.
 
         Examples
         --------
@@ -465,7 +466,7 @@ class AnisotropicMaterial:
     def of(
         cls, stiffness: np.ndarray, density: float | str | None = None, name: str = "material"
     ) -> AnisotropicMaterial:
-        """Material of a stiffness in plane stress.
+        """Make a material from a stiffness in plane stress.
 
         Parameters
         ----------
@@ -482,7 +483,7 @@ class AnisotropicMaterial:
         Raises
         ------
         ValueError
-            If it is no symmetric matrix of that shape, or not positive definite.
+            If it is not a symmetric positive definite matrix of that shape.
 
         Examples
         --------
@@ -515,7 +516,7 @@ class AnisotropicMaterial:
         )
 
     def rotated(self, angle: float | str) -> AnisotropicMaterial:
-        """The material, turned counter-clockwise in the sheet.
+        """Return the material, turned counter-clockwise in the sheet.
 
         Parameters
         ----------
@@ -529,7 +530,7 @@ class AnisotropicMaterial:
         Raises
         ------
         ValueError
-            If it is no angle.
+            If it is not an angle.
 
         Examples
         --------
@@ -544,7 +545,7 @@ class AnisotropicMaterial:
         return AnisotropicMaterial.of(turned, self.density, self.name)
 
     def constants_at(self, angle: float | str = 0.0) -> EngineeringConstants:
-        """Engineering constants along axes that are turned from x and y, as of a coupon cut out at that angle.
+        """Return the engineering constants along turned axes, as of a coupon cut out at that angle.
 
         Parameters
         ----------
@@ -558,7 +559,7 @@ class AnisotropicMaterial:
         Raises
         ------
         ValueError
-            If it is no angle.
+            If it is not an angle.
 
         Examples
         --------
@@ -585,7 +586,7 @@ ANY_MATERIAL = (Material, AnisotropicMaterial)
 
 
 class EngineeringConstants(NamedTuple):
-    """What coupons of a sheet show, cut out along two axes and pulled, or sheared along them.
+    """Engineering constants of a sheet along two axes, as coupons show them.
 
     Attributes
     ----------
@@ -607,14 +608,7 @@ class EngineeringConstants(NamedTuple):
 
 
 def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> EngineeringConstants:
-    """Engineering constants of a stiffness in plane stress.
-
-    Parameters
-    ----------
-    stiffness : ndarray of float, shape (3, 3)
-        As of `Material.plane_stress` [Pa].
-    angle : float, optional
-        By which the axes are turned from x and y, counter-clockwise [rad].
+    """Return engineering constants of a stiffness in plane stress (3, 3) [Pa], along axes turned by `angle` [rad].
 
     Examples
     --------
@@ -630,17 +624,7 @@ def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> Engineer
 
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
-    """Stiffness in plane stress of what is turned counter-clockwise [as given], shape (3, 3).
-
-    Parameters
-    ----------
-    stiffness : ndarray of float, shape (3, 3)
-    angle : float
-        [rad]
-
-    Returns
-    -------
-    ndarray of float, shape (3, 3)
+    """Return a stiffness in plane stress (3, 3) turned counter-clockwise by `angle` [rad].
 
     Examples
     --------
@@ -659,12 +643,7 @@ def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
 
 
 def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0, c26: float = 0.0) -> str:
-    """Why constants in plane stress are none of a material, with the bound; empty where they are positive definite.
-
-    Parameters
-    ----------
-    c11, c22, c12, c66, c16, c26 : float
-        [Pa]
+    """Return why constants in plane stress [Pa] are not positive definite, with the bound, or an empty string.
 
     Examples
     --------
@@ -691,7 +670,7 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
 
 
 def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
-    """Material of its fields, as `dataclasses.asdict` gives them.
+    """Return the material of its fields, as `dataclasses.asdict` gives them.
 
     Examples
     --------
@@ -707,7 +686,7 @@ def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
 
 
 def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
-    """The material, refused where it is not isotropic.
+    """Return an isotropic material; raise ValueError with the remedy for any other.
 
     Examples
     --------

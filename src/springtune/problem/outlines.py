@@ -1,4 +1,4 @@
-"""Sides of an outline, straight or along an arc: where they run, how long they are, and whether they meet."""
+"""Sides of an outline, straight or arcs: points, lengths and intersections."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -9,10 +9,10 @@ Point = tuple[float, float]
 """Coordinates [m]."""
 
 SAME = 1e-9
-"""What the distances of two ends from a centre differ by at most on a circle, over these: coordinates are rounded."""
+"""Largest relative difference of two ends' distances from the centre of a circle."""
 
 APART = 1e-9
-"""What sides are apart at least, over the extent of the shape; nearer ones touch."""
+"""Smallest distance of sides over the extent of the shape; nearer ones touch."""
 
 PANELS = 64
 """Panels of an ellipse's arc on which its length is integrated."""
@@ -30,15 +30,10 @@ GAUSS = (
 
 @dataclass(frozen=True)
 class OutlineSide:
-    """A side of an outline: straight, or an arc of less than half a turn.
+    """Side of an outline: straight, or an arc of less than half a turn; ends in m.
 
-    Parameters run from 0 at the start to 1 at the end; along an arc they go with the angle, of an ellipse the eccentric
-    one. The body is on the left of the sides of an outline that runs counter-clockwise.
-
-    Attributes
-    ----------
-    start, end : tuple of float
-        [m]
+    Parameters run from 0 to 1, by angle along an arc (the eccentric angle of an ellipse). The body is on the left of
+    a counter-clockwise outline.
 
     Examples
     --------
@@ -169,7 +164,7 @@ class OutlineSide:
         return self._lengths[panel] + self._length(panel / PANELS, parameter)
 
     def parameter_of(self, length: float) -> float:
-        """Parameter that is so far from the start, along the side [m]."""
+        """Parameter at a length from the start along the side [m]."""
         if self.arc is None or self.circular:
             return length / self.length
         from bisect import bisect_right
@@ -250,14 +245,10 @@ class OutlineSide:
 
 @dataclass(frozen=True)
 class Round:
-    """A closed round of sides, counter-clockwise, and what is on both sides of it.
+    """Closed counter-clockwise round of sides.
 
-    Attributes
-    ----------
-    inner, outer : str or None
-        Part of the body on the left and on the right; None where there is nothing.
-    around : int or None
-        Number of the round whose inside is on the right; None where there is nothing.
+    `inner` and `outer` are the parts on its left and right, None outside the body. `around` is the number of the
+    round whose inside is on the right, or None.
     """
 
     sides: tuple[OutlineSide, ...]
@@ -313,13 +304,7 @@ def winds_about(sides: Sequence[OutlineSide], point: Point) -> bool:
 
 
 def meeting(rounds: Sequence[Sequence[OutlineSide]]) -> tuple[tuple[int, int], tuple[int, int], Point] | None:
-    """Where two sides meet that are not neighbours in a round, or neighbours away from their corner.
-
-    Returns
-    -------
-    tuple or None
-        Number of round and side, of both, and where [m].
-    """
+    """Return where sides of rounds meet off shared corners, or None: round and side of both, and the point [m]."""
     (left, low), (right, high) = extent([side for sides in rounds for side in sides])
     small = APART * max(right - left, high - low)
     for one, other in _near(rounds, small):

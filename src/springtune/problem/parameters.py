@@ -7,7 +7,7 @@ SWEPT = {
     "poisson_ratio": ("Poisson's ratio", "1"),
     "stiffness_scale": ("factor on the stiffness that the definition gives", "1"),
 }
-"""What each is, and its unit, by its name in a study and in the dataset."""
+"""Description and unit of each by its name in studies and datasets."""
 
 OF_BODIES = {
     "thickness": "beam_thickness",
@@ -20,7 +20,7 @@ STATED = {"force": "force", **OF_BODIES}
 """Variable that holds a parameter where it is not swept; of a force its size, since the load says the direction."""
 
 UNCHANGED = {"stiffness_scale": 1.0}
-"""What a parameter is where it is not swept, and no variable holds it."""
+"""Values of parameters that are not swept and have no variable."""
 
 MOST_SCENES = 1_000_000
 """Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
@@ -30,12 +30,12 @@ MOST_SCENES_VARIABLE = "SPRINGTUNE_MAX_SCENES"
 
 
 def shown_order(name: str, value: float) -> float:
-    """Rank of a value of a swept parameter: where only one can be shown, it is the last of those that are there."""
+    """Rank of a swept parameter's value: if only one can be shown, it is the last one present."""
     return -abs(value - 1) if name == "stiffness_scale" else value
 
 
 def with_unit(name: str, value: float, digits: int = 4) -> str:
-    r"""A value of a swept parameter as it is read, of words that stay on a line.
+    r"""Return a swept parameter's value with its unit, without line breaks.
 
     Examples
     --------

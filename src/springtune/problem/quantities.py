@@ -1,4 +1,4 @@
-"""What a person gives: quantities, as a text with its unit or a number in SI units, and names of what there is."""
+"""User input: quantities as texts with units or numbers in SI units, and known names."""
 
 import math
 from collections.abc import Iterable
@@ -6,7 +6,7 @@ from difflib import get_close_matches
 
 
 def quantity(value: float | str, kind: str, name: str) -> float:
-    """Number in SI units of a text with its unit, or of a number that is in SI units already.
+    """Return the number in SI units of a text with its unit, or of a number in SI units.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def quantity(value: float | str, kind: str, name: str) -> float:
 
 
 def positive(value: float | str, kind: str, name: str) -> float:
-    """As `quantity`, of one that has to be above zero."""
+    """As `quantity`, refusing values that are not above zero."""
     number = quantity(value, kind, name)
     if not number > 0:
         raise ValueError(f"{name}: {value!r} is not above zero; {_remedy(kind)}")
@@ -62,7 +62,7 @@ MOST_WORDS = 50
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """``did you mean ...?`` if one of the words is near, and all of them.
+    """Return ``did you mean ...?`` if one of the words is near, and all of them.
 
     Examples
     --------

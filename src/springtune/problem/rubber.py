@@ -1,4 +1,4 @@
-"""Tests of rubber as a testing machine writes them, and Yeoh's law fitted to one: see `fit_rubber`."""
+"""Rubber tests in CSV files, and Yeoh's law fitted to one: see `fit_rubber`."""
 
 import csv
 from dataclasses import dataclass, replace
@@ -23,21 +23,17 @@ TWO_COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa
 
 
 class TestDataError(ValueError):
-    """A test that no law can be fitted to; the message says why and what to do."""
+    """A test to which no law can be fitted; the message gives the reason and the remedy."""
 
     __test__ = False  # to pytest
 
 
 @dataclass(frozen=True, eq=False)
 class TensileTest:
-    """A tensile test of rubber, uniaxial, equibiaxial or in pure shear: nominal stress over stretch.
+    """Tensile test of rubber: uniaxial, equibiaxial or in pure shear.
 
-    Attributes
-    ----------
-    stretch : ndarray of float, shape (n,)
-        Length over the one at rest [1], ascending.
-    stress : ndarray of float, shape (n,)
-        Force over the cross-section at rest [Pa].
+    `stretch` (n,) is length over rest length [1], ascending; `stress` (n,) is force over the cross-section at rest
+    [Pa].
     """
 
     stretch: np.ndarray
@@ -67,7 +63,7 @@ class TensileTest:
 
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
-        """Test data of a CSV file: stretch, and nominal stress with its unit in the head of its column.
+        """Read a CSV file of stretch and nominal stress, with the unit in the column's head.
 
         Examples
         --------
@@ -107,7 +103,7 @@ class TensileTest:
 
 
 def told(test: TensileTest | str | Path) -> TensileTest:
-    """A test, read where its file is given."""
+    """Return a test; read it if its file is given."""
     return test if isinstance(test, TensileTest) else TensileTest.read(test)
 
 
@@ -118,13 +114,7 @@ def _weights(test: TensileTest) -> np.ndarray:
 
 
 def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
-    """Coefficients of columns that add up to a test's stress, by least squares of relative errors.
-
-    Parameters
-    ----------
-    columns : ndarray of float, shape (n, n_terms)
-        Stress for a coefficient of 1 at each stretch of the test.
-    """
+    """Return coefficients of stress `columns` (n, n_terms) by least squares of relative errors."""
     weights = _weights(test)
     scaled = columns * weights[:, None]
     sizes = np.linalg.norm(scaled, axis=0)
@@ -152,18 +142,17 @@ def fit_rubber(
     density: float | str | None = None,
     name: str = "rubber",
 ) -> Rubber:
-    """Rubber of Yeoh's law, fitted to a uniaxial test, with its errors beside that and other tests.
+    """Fit Yeoh's law to a uniaxial test, and compare it with other tests.
 
     Parameters
     ----------
     uniaxial : str or Path
-        CSV file of two columns, stretch and nominal stress with its unit in the column's head, such as
-        ``stretch,nominal stress [MPa]``; lines that begin with # are left out. Or a
-        `springtune.problem.rubber.TensileTest`.
+        CSV file of two columns, stretch and nominal stress with its unit in the head, such as ``stretch,nominal
+        stress [MPa]``; lines with # are comments. Or a `springtune.problem.rubber.TensileTest`.
     equibiaxial, pure_shear : str or Path, optional
-        Such files of other tests, which the law is compared with, not fitted to.
+        Files of other tests, only compared.
     terms : int, optional
-        1 to 3; with one it is neo-Hooke's law.
+        1 to 3; 1 is neo-Hooke's law.
     density : float, str or None
         [kg/m3]
     name : str
@@ -175,10 +164,10 @@ def fit_rubber(
     Raises
     ------
     TestDataError
-        If a file cannot be read as a test, by its line, or the fitted law is unstable within the data's range: its true
-        stress has to rise with the stretch in all of the three tests. It is a ValueError.
+        If a file cannot be read, with its line, or the fitted law is unstable within the data's range: the true
+        stress must rise with the stretch in all three tests. It is a ValueError.
     ValueError
-        If the number of terms or the density is out of its range.
+        If the number of terms or the density is out of range.
 
     Examples
     --------

@@ -1,16 +1,16 @@
-r"""Shapes: bodies of any outline with named groups, and what is done to them.
+r"""Shapes: bodies of any outline with named groups, and their load cases.
 
 ::
 
-                 upper                     an outline is a round of sides, counter-clockwise; each side is named by
-          4 ---------------- 3             the group that it belongs to, and runs from its corner to the next one,
-          |      ____        |             straight or along an arc about a centre.
+                 upper                     An outline is a closed round of sides, counter-clockwise. A side runs from
+          4 ---------------- 3             its corner to the next one, straight or along an arc about a centre, and
+          |      ____        |             may belong to a named group.
      left |     / hole\      | right
-          |     \____/       |             Groups hold what supports, loads and quantities speak of: sides of the
-          1 ---------------- 2             outline and of holes, points, and parts of the body that have a material
-                 lower                     of their own.
+          |     \____/       |             Supports, loads and quantities refer to groups: sides of the outline and of
+          1 ---------------- 2             holes, points, and parts of the body with their own material.
+                 lower
 
-Nothing here knows a mesh: `springtune.mesh.groups` has the groups of one.
+The module does not depend on meshes: `springtune.mesh.groups` has the groups of one.
 """
 
 import math
@@ -45,7 +45,7 @@ def _place(value: Any, name: str) -> Point:
 
 
 def _named(value: object, what: str, *, empty: bool = False) -> None:
-    """Refuse what cannot name something."""
+    """Refuse what is not allowed as a name."""
     if not (isinstance(value, str) and (NAME.fullmatch(value) or (empty and not value))):
         raise ValueError(f"{what}: {value!r} cannot be a name; {NAME_RULE}")
 
@@ -71,15 +71,15 @@ class Segment:
     start : tuple of float or str
         Its corner [m], or texts with their unit.
     centre : tuple of float or str, optional
-        Of the arc that it is: of a circle, or of an ellipse with its axes along x and y where its ends are not equally
-        far from it; the way of less than half a turn. Straight without.
+        Centre of an arc of less than half a turn; straight without. The arc is of a circle, or of an ellipse with its
+        axes along x and y if its ends are not equally far from the centre.
     group : str, optional
-        Name of the group that it belongs to; none where it is empty.
+        Name of its group, or empty.
 
     Raises
     ------
     ValueError
-        If coordinates are no lengths, or the group's name cannot be one.
+        If coordinates are not lengths, or the group's name is not allowed.
 
     Examples
     --------
@@ -120,20 +120,20 @@ def _round(segments: Sequence[Segment], what: str) -> tuple[OutlineSide, ...]:
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole, or what fills it.
+    """A hole, or an inclusion.
 
     Parameters
     ----------
     outline : tuple of Segment
         A closed round, in either sense.
     part : str, optional
-        Part of the body that fills it, of a material of its own; nothing does where it is empty.
+        Part of the body, of its own material, that fills it; a hole if empty.
 
     Raises
     ------
     ValueError
-        If the round is none, the part's name cannot be one, or sides of what is filled have a group: they are inside
-        the body.
+        If the round is not closed, the part's name is not allowed, or sides of an inclusion have a group: they are
+        inside the body.
 
     Examples
     --------
@@ -160,7 +160,7 @@ class Hole:
 
     @classmethod
     def circle(cls, centre: Place, radius: float | str, group: str | None = None, part: str = "") -> "Hole":
-        """A circle, of four arcs.
+        """Make a circle of four arcs.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class Hole:
         radius : float or str
             [m]
         group : str, optional
-            Of its sides; ``"hole"`` without, none where a part fills it.
+            Group of its sides; by default ``"hole"``, or no group if a part fills it.
         part : str, optional
             As of `Hole`.
 
@@ -194,7 +194,7 @@ class Hole:
         group: str | None = None,
         part: str = "",
     ) -> "Hole":
-        """An ellipse, of four arcs.
+        """Make an ellipse of four arcs.
 
         Parameters
         ----------
@@ -225,19 +225,19 @@ class Hole:
 
 @dataclass(frozen=True)
 class Support:
-    """What a group's displacement is.
+    """Prescribed displacements of a group.
 
     Parameters
     ----------
     group : str
         Sides or a point.
     x, y : float or str, optional
-        Prescribed displacement [m], or a text with its unit; zero where it is held; free without.
+        Prescribed displacement [m], or a text with its unit; 0 holds, None is free.
 
     Raises
     ------
     ValueError
-        If it holds nothing, or a displacement is no length.
+        If it holds nothing, or a displacement is not a length.
 
     Examples
     --------
@@ -268,7 +268,7 @@ class Support:
 
 @dataclass(frozen=True)
 class Traction:
-    """A force that is spread evenly over a group, by length.
+    """A force spread evenly over a group, by length.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ class Traction:
     Raises
     ------
     ValueError
-        If it is no force.
+        If it is not a force.
 
     Examples
     --------
@@ -318,7 +318,7 @@ class Pressure:
     Raises
     ------
     ValueError
-        If it is no pressure.
+        If it is not a pressure.
 
     Examples
     --------
@@ -349,7 +349,7 @@ COMPONENTS = {
     "area": (),
     "energy": (),
 }
-"""What a quantity of interest may be of, and its components."""
+"""Kinds of quantities of interest, and their components."""
 
 
 @dataclass(frozen=True)
@@ -361,22 +361,22 @@ class Quantity:
     name : str
         Label in the dataset.
     kind : str
-        ``"displacement"``: of a point, or the mean one of sides, by length [m]; ``"reaction"``: force of the supports
-        on a group [N]; ``"stress"``: at a point, recovered from cells [Pa]; ``"area"``: growth of the area of the body
-        [m2]; ``"energy"``: strain energy [J].
+        ``"displacement"``: of a point, or the mean of sides, by length [m]; ``"reaction"``: force of the supports on
+        a group [N]; ``"stress"``: at a point, recovered from cells [Pa]; ``"area"``: growth of the body's area [m2];
+        ``"energy"``: strain energy [J].
     of : str, optional
-        Group, or point; empty for area and energy.
+        Group or point; empty for area and energy.
     component : str, optional
         ``"x"`` or ``"y"``; of stress ``"xx"``, ``"yy"`` or ``"xy"``; empty for area and energy.
     expected : float or str, optional
-        Value that others give, in SI units, or a text with its unit.
+        Published value in SI units, or a text with its unit.
     source : str, optional
-        Who gives it.
+        Its source.
 
     Raises
     ------
     ValueError
-        If the kind is none, or it lacks what its kind needs or has what it does not.
+        If the kind is unknown, or the other fields do not fit it.
 
     Examples
     --------
@@ -427,7 +427,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class LoadCase:
-    """What is done to a shape, and what is asked of it; the first quantity stands for all where one is wanted.
+    """Supports, loads and quantities of interest of a shape; the first quantity is the main one.
 
     Parameters
     ----------
@@ -442,8 +442,7 @@ class LoadCase:
     Raises
     ------
     ValueError
-        If there are no supports or nothing is done, a direction of a group is held twice, or two quantities have one
-        name.
+        If there are no supports or no load, a direction of a group is held twice, or two quantities have one name.
 
     Examples
     --------
@@ -502,19 +501,19 @@ class LoadCase:
     def check_names(
         self, sides: Iterable[str], points: Iterable[str], unusable: Mapping[str, str] | None = None
     ) -> None:
-        """Refuse names that are not those of groups of the kind that they are used for.
+        """Refuse unknown names of groups, and names of groups of the wrong kind.
 
         Parameters
         ----------
         sides, points : iterable of str
             Names of groups of sides, and of points.
         unusable : mapping of str to str, optional
-            Names that a mesh file has, and why they are no groups.
+            Names in a mesh file that are not usable groups, with the reason.
 
         Raises
         ------
         ValueError
-            With what is there.
+            With the known names.
 
         Examples
         --------
@@ -564,29 +563,28 @@ class Shape:
     thickness : float or str
         [m], or a text with its unit.
     outline : tuple of Segment
-        A closed round that does not meet itself; a clockwise one is turned. Nothing where the body is that of a mesh
-        file.
+        A closed round that does not cross itself; a clockwise one is turned. Empty if the body is a mesh file's.
     holes : tuple of Hole, optional
-        In the body, apart from its outline and from each other; one may be in what fills another.
+        Inside the body, apart from its outline and each other; one may be inside an inclusion.
     points : mapping of str to tuple of float, optional
-        Named points of the body [m]: particles of every mesh. Those within a millionth of its extent from a side are
-        put on that side.
+        Named points of the body [m]: particles of every mesh. Points within a millionth of its extent from a side are
+        moved onto it.
     loads : mapping of str to LoadCase, optional
     file : str, optional
-        Mesh file whose cells are the body; empty where it has an outline.
+        Mesh file whose cells are the body; empty with an outline.
     unit : float or str, optional
         Unit of the coordinates in the file [m].
 
     Raises
     ------
     ValueError
-        If there is neither an outline nor a file, sides meet where they are not to, holes or points are not in the
-        body, or names cannot be some, are of two things, or of nothing.
+        If there is neither an outline nor a file, sides meet where they must not, holes or points are outside the
+        body, or names are not allowed, used twice or unknown.
 
     Warns
     -----
     AssumptionWarning
-        If it has an outline and is thicker than the smaller side of the box around it.
+        If a shape with an outline is thicker than the smaller side of its bounding box.
 
     Examples
     --------
@@ -712,7 +710,7 @@ class Shape:
 
     @cached_property
     def rounds(self) -> tuple[Round, ...]:
-        """The outline and those of holes, each counter-clockwise; none where the body is that of a file.
+        """The outline and those of holes, each counter-clockwise; empty for a mesh file.
 
         Examples
         --------
@@ -736,7 +734,7 @@ class Shape:
         return tuple(found)
 
     def part_at(self, point: Point) -> str | None:
-        """Part of the body at a point that is on no side; None where there is nothing.
+        """Return the part of the body at a point that is on no side; None outside the body.
 
         Parameters
         ----------
@@ -760,7 +758,7 @@ class Shape:
 
     @cached_property
     def area(self) -> float:
-        """Area of the body [m2], of arcs in closed form; NaN where it is that of a file.
+        """Area of the body [m2], exact for arcs; NaN for a mesh file.
 
         Examples
         --------
@@ -772,7 +770,7 @@ class Shape:
 
     @cached_property
     def extent(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner of the box around it [m]; NaN where the body is that of a file.
+        """Lower left and upper right corner of the bounding box [m]; NaN for a mesh file.
 
         Examples
         --------
@@ -785,7 +783,7 @@ class Shape:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Names of the groups of its sides, each once; none where they are those of a file.
+        """Names of the groups of its sides, each once; empty for a mesh file.
 
         Examples
         --------
@@ -811,7 +809,7 @@ class Shape:
 
     @property
     def label(self) -> str:
-        """Name with what it measures, for titles; the name alone where the body is that of a file.
+        """Name and size, for titles; only the name for a mesh file.
 
         Examples
         --------
@@ -833,14 +831,14 @@ class Shape:
         points: Mapping[str, Place] | None = None,
         loads: Mapping[str, LoadCase] | None = None,
     ) -> "Shape":
-        """A rectangle with its lower left corner at the origin, its sides ``lower``, ``right``, ``upper``, ``left``.
+        """Make a rectangle at the origin with the sides ``lower``, ``right``, ``upper`` and ``left``.
 
         Parameters
         ----------
         length, height, thickness : float or str
             [m], or texts with their unit.
         name : str, optional
-            Its length and height in mm without, e.g. ``"200x40"``.
+            By default its length and height in mm, e.g. ``"200x40"``.
         holes, points, loads
             As of `Shape`.
 

@@ -1,27 +1,27 @@
-"""What became of a solve: one set of flags from the equilibrium to the dataset."""
+"""Status of a solve: one set of flags from the equilibrium to the dataset."""
 
 from enum import IntEnum
 
 
 class Status(IntEnum):
-    """What became of a scene, a curve's point or any other solve; the flags of a dataset's variables ``status``.
+    """Status of a solve, such as a scene or a point of a curve; flags of a dataset's variables ``status``.
 
-    Its text is the flag's meaning in a dataset, and it is stored as a number.
+    Stored as a number; its text is the flag's meaning.
 
     Attributes
     ----------
     NOT_REQUESTED
-        Nobody asked for it.
+        Was not requested.
     SOLVED
         A stable equilibrium.
     LINEAR_ONLY
-        The linear equilibrium alone.
+        Only the linear equilibrium.
     NOT_CONVERGED
         No equilibrium was found.
     UNSTABLE
-        An equilibrium that the body would leave, or the path to it would.
+        An unstable equilibrium, or an unstable path to it.
     FAILED
-        There is nothing to solve: a definition refuses the mesh, a reference is missing, the program failed.
+        Nothing to solve: a definition refuses the mesh, a reference is missing, or the program failed.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""The finite-element side: converged answers that the networks are compared with, one module a kind of reference."""
+"""Converged finite-element references for the networks, one module a kind."""

@@ -1,7 +1,7 @@
-"""CalculiX as a second opinion and as an approach of the benchmark: its input, its run and its answer.
+"""CalculiX as a second opinion and as an approach of the benchmark: input, run and answer.
 
-Beams and loads are those of `springtune.problem.loads`; the program is `ccx` (Debian package calculix-ccx), run as its
-users run it, in a folder of its own.
+Beams and loads are those of `springtune.problem.loads`. The program is `ccx` (Debian package calculix-ccx), run in
+its own folder.
 """
 
 import re
@@ -22,21 +22,9 @@ def installed() -> bool:
 
 
 def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Serendipity quadrilaterals of even size.
+    """Return points (n_points, 2) [m] and serendipity quadrilaterals (n_elements, 8) of about even size [m].
 
-    Parameters
-    ----------
-    length, height : float
-        Extent of the beam [m].
-    size : float
-        Length of a side of the elements, about [m].
-
-    Returns
-    -------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    elements : ndarray of int, shape (n_elements, 8)
-        Corners counter-clockwise, then the middles of the sides from the first corner on.
+    Corners counter-clockwise, then the middles of the sides from the first corner on.
     """
     columns, rows = max(1, round(length / size)), max(1, round(height / size))
     # Nodes on a grid of half the element size; the middles of elements stay without one.
@@ -51,20 +39,7 @@ def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarra
 
 
 def side_weights(points: np.ndarray, normal: int, along: int, value: float, quadratic: bool) -> np.ndarray:
-    """Shares of the points in an even load on the side where ``points[:, normal] == value``.
-
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    value : float
-        Coordinate of the side [m].
-
-    Returns
-    -------
-    ndarray of float, shape (n_points,)
-        Sum 1; zero off the side.
-    """
+    """Return each point's share, sum 1, of an even load on the side ``points[:, normal] == value`` [m]."""
     tolerance = 1e-9 * np.ptp(points[:, normal])
     side = np.flatnonzero(np.abs(points[:, normal] - value) <= tolerance)
     side = side[np.argsort(points[side, along])]
@@ -131,25 +106,10 @@ def solve(
     held: np.ndarray,
     finite: bool = False,
 ) -> np.ndarray:
-    """Displacements by plane stress at small strain, or neo-Hookean ones at finite strain.
+    """Return displacements [m] by plane stress at small strain, or neo-Hookean ones at finite strain.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    elements : ndarray of int, shape (n_elements, 3 or 8)
-        Numbers of points.
-    thickness : float
-        [m]
-    load : ndarray of float, shape (n_points, 2)
-        Forces [N].
-    held : ndarray of bool, shape (n_points, 2)
-        Directions that are held.
-
-    Returns
-    -------
-    ndarray of float, shape (n_points, 2)
-        [m]
+    `points` (n_points, 2) [m], `elements` (n_elements, 3 or 8), `thickness` [m], `load` (n_points, 2) [N], `held`
+    (n_points, 2).
     """
     with tempfile.TemporaryDirectory() as folder:
         deck = _deck(points, elements, kind, material, thickness, load, held, finite)

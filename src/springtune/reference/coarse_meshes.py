@@ -36,19 +36,19 @@ PIECE_SAMPLES = 7
 """Points on a piece of an outline at which distances are taken."""
 
 SMALLEST = 1e-9
-"""Distance that is taken for none, over the extent of a shape."""
+"""Distance that counts as zero, over the extent of a shape."""
 
 STRAIGHT = 1e-6
-"""Turn of a polygon that is taken for none [rad]."""
+"""Turn of a polygon that counts as zero [rad]."""
 
 SMOOTH_TURN = np.radians(12)
 """Turn of an outline that needs no smaller triangles [rad]: a polygon that stands for a circle."""
 
 SMALL_TURN = 1e-3
-"""Turn of an outline that is taken for none where stresses are concerned [rad]."""
+"""Turn of an outline that counts as zero for stresses [rad]."""
 
 RIGHT_ANGLE = np.radians(91)
-"""Angle up to which the outline may have a corner between sides without supports and loads, and needs none [rad]."""
+"""Largest angle of a corner without supports and loads that needs no grading [rad]."""
 
 FEWEST_ALONG = 4
 """Sides of triangles along the extent of a shape, at least."""
@@ -56,12 +56,9 @@ FEWEST_ALONG = 4
 
 @dataclass(frozen=True)
 class Side:
-    """A side of a triangle on the outline, or between two parts.
+    """Side of a triangle on the outline or between parts.
 
-    Attributes
-    ----------
-    span : tuple of float
-        Parameters of the arc at the corner of the lower number and at the other one.
+    `span` is the arc's parameters at the corner of the lower number and at the other one.
     """
 
     groups: tuple[str, ...] = ()
@@ -70,16 +67,9 @@ class Side:
 
 
 class CoarseMesh:
-    """Triangles, and what is known of their sides on the outline and between parts.
+    """Triangles and their sides on the outline and between parts.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    triangles : ndarray of int, shape (n, 3)
-        Counter-clockwise.
-    parts : ndarray of int, shape (n,)
-        Number of the part that each is in.
+    `points` (n_points, 2) [m], `triangles` (n, 3) counter-clockwise, `parts` (n,) numbers of their parts.
     """
 
     def __init__(
@@ -141,13 +131,7 @@ class CoarseMesh:
         self._replace(rows, triangles, parts)
 
     def insert(self, name: str, where: np.ndarray) -> None:
-        """Make a point inside the corner of triangles, and name it.
-
-        Parameters
-        ----------
-        where : ndarray of float, shape (2,)
-            [m]
-        """
+        """Make a point inside, shape (2,) [m], a named corner of triangles."""
         near = np.argsort(np.linalg.norm(self.points - where, axis=1))
         fixed = {end for ends in self.sides for end in ends} | set(self.named.values())
         for point in near[:3]:
@@ -314,14 +298,9 @@ def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[
 def outline_mesh(
     shape: Shape, grouped: GroupedMesh | None, points: Mapping[str, Point], largest_turn: float = LARGEST_TURN
 ) -> CoarseMesh:
-    """Coarse triangles of a shape, by netgen's advancing front.
+    """Make coarse triangles of a shape, by netgen's advancing front.
 
-    Parameters
-    ----------
-    points : mapping of str to tuple of float
-        Named points that are to be corners of triangles [m].
-    largest_turn : float
-        Of the direction of a side along an arc [rad].
+    Named `points` [m] become corners; `largest_turn` limits the turn of a side along an arc [rad].
     """
     if grouped is None:
         names = ("", *shape.parts)
@@ -457,13 +436,7 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
 
 @dataclass(frozen=True)
 class Corner:
-    """A corner of the outline or of parts.
-
-    Attributes
-    ----------
-    rough : bool
-        Whether a solution is not smooth enough there for triangles of even size.
-    """
+    """Corner of the outline or of parts; `rough` where a solution is not smooth enough for even triangles."""
 
     what: str
     rough: bool = True
@@ -476,10 +449,10 @@ def corners_of(
     held: Callable[[Side], bool],
     mirror: Callable[[Side, np.ndarray], bool],
 ) -> dict[int, Corner]:
-    """Corners at which a solution may not be smooth.
+    """Return the corners where a solution may not be smooth.
 
-    Sides that are not held give way to an infinite stress where the outline is re-entrant, at more than half a turn
-    (Williams 1952); a side beyond which the solution goes on as its mirror image doubles the angle.
+    Free sides have infinite stress at re-entrant corners of more than half a turn (Williams 1952); a symmetry side
+    doubles the angle.
     """
     at_sides = mesh.part_sides()
     at_corner: dict[int, list[_Ends]] = {}

@@ -9,23 +9,10 @@ if TYPE_CHECKING:
 
 
 def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Displacements between the points of a grid, by cubic splines.
+    """Interpolate displacements (n_x, n_y, 2) [m] on an ascending grid at points (n, 2) inside [m], by cubic splines.
 
-    Parameters
-    ----------
-    x : ndarray of float, shape (n_x,)
-    y : ndarray of float, shape (n_y,)
-        Coordinates of the grid [m], ascending.
-    displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacements there [m].
-    points : ndarray of float, shape (n, 2)
-        Where they are wanted [m], inside the grid.
-
-    Returns
-    -------
-    ndarray of float, shape (n, 2)
-        With the grid of a `ReferenceSolution` within 1e-5 of the largest displacement, most of it near a clamp's
-        corners.
+    On the grid of a `ReferenceSolution` within 1e-5 of the largest displacement; the error is mostly at a clamp's
+    corners.
     """
     from scipy.interpolate import RectBivariateSpline  # here: whoever wants the outline alone does without
 
@@ -33,18 +20,7 @@ def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points:
 
 
 def outline(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a grid on its outline, in order around it, and their displacements.
-
-    Parameters
-    ----------
-    x, y, displacements
-        As in `interpolate` [m].
-
-    Returns
-    -------
-    points, moved : ndarray of float, shape (n, 2)
-        [m]; the first point is not repeated.
-    """
+    """Return the grid points on the outline, in order around it and not closed, and their displacements (n, 2) [m]."""
     n_x, n_y = len(x), len(y)
     i = np.concatenate([np.arange(n_x), np.full(n_y - 1, n_x - 1), np.arange(n_x - 2, -1, -1), np.zeros(n_y - 2, int)])
     j = np.concatenate([np.zeros(n_x, int), np.arange(1, n_y), np.full(n_x - 1, n_y - 1), np.arange(n_y - 2, 0, -1)])
@@ -52,13 +28,7 @@ def outline(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[np
 
 
 def field_error(mesh: "Mesh", displacements: np.ndarray, reference: np.ndarray) -> float:
-    """Difference of whole displacement fields in L2, over the norm of the reference's [1].
-
-    Parameters
-    ----------
-    displacements, reference : ndarray of float, shape (n_points, 2)
-        Displacements of the particles [m].
-    """
+    """Return the L2 difference of displacement fields (n_points, 2) over the norm of the reference's [1]."""
     difference, size = (
         mesh.particle_areas @ (field**2).sum(axis=1) for field in (displacements - reference, reference)
     )

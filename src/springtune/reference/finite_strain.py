@@ -1,16 +1,17 @@
-r"""Reference at finite strain: a sheet of rubber by quadratic finite elements.
+r"""Reference at finite strain: a rubber sheet by quadratic finite elements.
 
-It is neo-Hookean in plane stress or plane strain, or of Yeoh's law in plane stress. The strain energy of the former is
-that of CalculiX and Abaqus,
+It is neo-Hookean in plane stress or plane strain, or of Yeoh's law in plane stress. The neo-Hookean energy is that of
+CalculiX and Abaqus,
 
 .. math:: W = \tfrac{\mu}{2} (J^{-2/3} I_1 - 3) + \tfrac{K}{2} (J - 1)^2,
 
-with the shear modulus mu and the bulk modulus K of the material at small strain. In plane stress the stretch across
-the sheet is eliminated in every point; an incompressible material, nu = 0.5, has there
-:math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the deformation in the plane, and Yeoh's law is a polynomial of the same
-bracket. Kinds of load are those of `springtune.problem.loads`: where the force acts across the loaded side, half of the
-beam is solved, which does not buckle; where it acts along it, as in bending and shear, the whole, since large rotations
-break the symmetry. Elements shrink towards the corners, and the load grows in steps where it must.
+with mu and K of the material at small strain. In plane stress the stretch across the sheet is eliminated in every
+point; an incompressible material, nu = 0.5, has :math:`W = \mu/2 (I_1 + J^{-2} - 3)` of the in-plane deformation, and
+Yeoh's law is a polynomial of this bracket.
+
+Kinds of load are those of `springtune.problem.loads`. If the force acts across the loaded side, half of the beam is
+solved, which does not buckle; else the whole, since large rotations break the symmetry. Elements shrink towards the
+corners, and the load grows in steps if needed.
 """
 
 from abc import ABC, abstractmethod
@@ -57,11 +58,11 @@ BENT = 0.1
 
 
 class IncompressibleError(ValueError):
-    """A material that displacements alone cannot describe."""
+    """A material that needs more than displacements as unknowns."""
 
 
 class FiniteStrainError(ReferenceNotConvergedError):
-    """A reference that did not converge; the message says how far it came."""
+    """A reference did not converge; the message gives the reached load."""
 
 
 @dataclass(frozen=True)
@@ -75,17 +76,14 @@ class FiniteStrainSolution:
     mean_displacement : float
         Mean displacement of the loaded side along the force [m].
     error_estimate : float
-        Difference to the coarser mesh, relative [1]: several times the error, since errors fall with the mesh; and
-        what Newton's method and rounding leave. Under pressure twice the larger one of the middle and the mean.
-    positions : ndarray of float, shape (n,)
-        Places on the loaded side over its length [1], ascending.
-    profile : ndarray of float, shape (n,)
-        Displacements there along the force [m].
-    x : ndarray of float, shape (n_x,)
-    y : ndarray of float, shape (n_y,)
-        Coordinates at rest of a grid on which the field is given [m]; closer to each other near the corners.
+        Relative difference to the coarser mesh, several times the error, plus the errors of Newton's method and
+        rounding. Under pressure twice the larger one of the middle and the mean.
+    positions, profile : ndarray of float, shape (n,)
+        Places on the loaded side over its length [1], ascending, and displacements there along the force [m].
+    x, y : ndarray of float, shape (n_x,) and (n_y,)
+        Grid of the field at rest [m], denser near the corners.
     displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacement there [m].
+        Displacements on the grid [m].
     """
 
     displacement: float
@@ -98,31 +96,14 @@ class FiniteStrainSolution:
     displacements: np.ndarray
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Displacements at points of the beam; see `springtune.reference.field.interpolate`.
-
-        Parameters
-        ----------
-        points : ndarray of float, shape (n, 2)
-            At rest [m].
-
-        Returns
-        -------
-        ndarray of float, shape (n, 2)
-            [m]
-        """
+        """Return displacements [m] at rest points (n, 2) [m], see `springtune.reference.field.interpolate`."""
         return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_neo_hooke(
     beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "stress", follower: bool = False
 ) -> FiniteStrainSolution:
-    """Displacements of a neo-Hookean beam under a load.
-
-    Parameters
-    ----------
-    force : float
-        Force [N], positive outwards.
-    """
+    """Solve for the displacements of a neo-Hookean beam under a `force` [N], positive outwards."""
     nu = material.poisson_ratio
     if plane == "strain" and nu >= 0.5:
         raise IncompressibleError(
@@ -306,13 +287,11 @@ class _Sheet:
         return np.concatenate([x, 2 * x[-1] - x[-2::-1]]), y, whole
 
     def _newton(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float, bool] | None:
-        """Displacements in equilibrium, what rounding leaves open of the load's, relative, and whether they are stable.
+        """Return the equilibrium, its relative rounding error, and whether it is stable; None if there is none.
 
-        None without any equilibrium.
-
-        Strains in the points of integration are unknowns of their own, which Newton's method meets with those of the
-        displacements in the end (Magisano, Leonetti and Garcea, Int. J. Numer. Meth. Engng 109:1237, 2017): else the
-        turns of a slender beam stretch it on the way, and its steps must be small.
+        Strains at integration points are separate unknowns, which agree with the displacements in the end (Magisano,
+        Leonetti and Garcea, Int. J. Numer. Meth. Engng 109:1237, 2017). Otherwise a slender beam that turns would
+        stretch on the way, and steps would have to be small.
         """
         free, strain = ~self.held.ravel(), None
         for _ in range(MAX_ITERATIONS):
@@ -456,15 +435,8 @@ class _PlaneLaw(ABC):
         """First derivatives by t and d, and second ones by tt, td, dd."""
 
     def response(self, strain: np.ndarray) -> "Response":
-        """Stress and tangent at Green's strains.
+        """Return stress and tangent at Green's strains xx, yy and 2 xy, shape (..., 3) [1].
 
-        Parameters
-        ----------
-        strain : ndarray of float, shape (..., 3)
-            xx, yy and 2 xy [1].
-
-        Notes
-        -----
         The energy is one of the trace t and the determinant d of C = 1 + 2 E in the plane. With the cofactor a of C,
         S = 2 (W_t 1 + W_d a).
         """
@@ -506,13 +478,7 @@ class Yeoh(_PlaneLaw):
 
 
 class NeoHooke(_PlaneLaw):
-    """Neo-Hookean energy of a sheet with E = 1.
-
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio at small strain [1].
-    """
+    """Neo-Hookean energy of a sheet with E = 1; `nu` is Poisson's ratio at small strain."""
 
     def __init__(self, nu: float, plane: str) -> None:
         self.shear = 1 / (2 * (1 + nu))
@@ -566,15 +532,7 @@ class NeoHooke(_PlaneLaw):
 
 @dataclass(frozen=True)
 class Response:
-    """What a law answers to strains.
-
-    Attributes
-    ----------
-    stress : ndarray of float, shape (..., 3)
-        Second Piola-Kirchhoff stresses xx, yy, xy over E [1].
-    tangent : ndarray of float, shape (..., 3, 3)
-        Their derivatives by Green's strains xx, yy, 2 xy.
-    """
+    """Second Piola-Kirchhoff `stress` xx, yy, xy over E, (..., 3), and `tangent` (..., 3, 3) by Green's strains."""
 
     stress: np.ndarray
     tangent: np.ndarray

@@ -1,15 +1,14 @@
-r"""Answers of a unit problem at thousands of beams for tens of solves: a tensor Chebyshev interpolant.
+r"""Tensor Chebyshev interpolant of a unit problem: thousands of beams for tens of solves.
 
-The unit problem (`springtune.reference.similarity`) depends on the aspect ratio a and Poisson's ratio nu alone. In
-:math:`(\log a, \nu)` its answers are analytic: corners stay where they are and their exponents change smoothly. Their
-logarithms are interpolated, since displacements are powers of the aspect ratio towards either end (a cantilever bends
-by its cube, a short one shears by its first power), which are straight lines in :math:`\log a`; no formula of beam
-theory is needed, so any kind of load will do. The coefficients of their Chebyshev series fall geometrically (Trefethen,
-Approximation Theory and Approximation Practice, 2013, theorem 8.2), and with them the error.
+The unit problem (`springtune.reference.similarity`) depends on the aspect ratio a and Poisson's ratio nu alone, and
+is analytic in :math:`(\log a, \nu)`. Logarithms of its answers are interpolated: displacements are powers of the
+aspect ratio towards either end, hence straight lines in :math:`\log a`, for any kind of load. The Chebyshev
+coefficients fall geometrically (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), and
+with them the error.
 
-Nodes are Chebyshev points with both ends of a range: twice as many intervals keep all that were solved before. They are
-doubled along the axis whose coefficients promise the larger error until both are small enough. Then solves at points
-that are no nodes decide: the largest difference there, times a factor, is part of the error estimate.
+Nodes are Chebyshev points with both ends, so twice as many intervals reuse all solves. They are doubled along the
+axis with the larger expected error. Then solves between nodes decide: the largest difference, times a factor, enters
+the error estimate.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,21 +29,22 @@ NODE_SHARE = 0.5
 """Share of the tolerance that the error estimates of nodes may take."""
 
 SAFETY = 3.0
-"""What the largest difference at the checks is multiplied with: the largest of all is hardly met by some tens."""
+"""Factor on the largest difference at the checks, since tens of checks hardly meet the maximum."""
 
 CHECKS_INSIDE, CHECKS_ON_EDGE = 12, 3
-"""Number of points inside the box, and on each of its edges, at which an interpolant is compared with solves. The
-corners are nodes."""
+"""Points inside the box and on each edge where solves check an interpolant; corners are nodes."""
 
 SEED = 20
-"""Of the places of these points."""
+"""Seed of the places of these points."""
 
 MOST_NODES = 65
 """Most nodes along an axis."""
 
 JUDGED_WITHIN = 0.05
-"""Largest difference of rotation and strain at the checks, relative to the larger one. They are read off a grid of
-points that changes with the aspect ratio, so they jump by a per cent; what they decide is no sharper."""
+"""Largest relative difference of rotation and strain at the checks.
+
+They jump by a percent, since their grid changes with the aspect ratio.
+"""
 
 ROUNDING = 1e-9
 """How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
@@ -60,14 +60,10 @@ class NotCertifiedError(RuntimeError):
 
 @dataclass(frozen=True)
 class Answers:
-    """Answers of unit problems, as in `springtune.reference.small_strain.ReferenceSolution`, in its units.
+    """Answers of unit problems, as in `springtune.reference.small_strain.ReferenceSolution`.
 
-    Attributes
-    ----------
-    displacement, mean_displacement, rotation, strain : ndarray of float
-        In units of half the height and of the traction over Young's modulus.
-    error_estimate : float
-        Bound on the relative error of each displacement [1].
+    In units of half the height and of the traction over Young's modulus; `error_estimate` bounds the relative error
+    of each displacement [1].
     """
 
     displacement: np.ndarray
@@ -84,16 +80,15 @@ class Interpolant:
     Attributes
     ----------
     aspect_range, nu_range : tuple of float
-        First and last aspect ratio and Poisson's ratio of the box [1].
+        First and last aspect ratio and Poisson's ratio [1].
     values : ndarray of float, shape (4, n_aspect, n_nu)
-        At the nodes, from the last of a range to its first: logarithms of the displacement, of the mean displacement
-        and of the strain, before it that of 1 plus the rotation over the strain, in the order of `NAMES`. The rotation
-        of a beam in tension is zero at nu = 0.
+        At the nodes, last to first, in the order of `NAMES`: logarithms of displacement and mean displacement, of 1
+        plus rotation over strain (rotation can be zero), and of the strain.
     error_estimate : float
         Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference at the checks, and
         the largest error estimate of the solves.
     solves : int
-        Number of unit problems that were solved, checks included.
+        Number of unit problems solved, with checks.
     """
 
     kind: LoadKind
@@ -113,16 +108,10 @@ class Interpolant:
         most: int | None = None,
         solve: Solver = solve_unit,
     ) -> Self:
-        """Solve as many unit problems as an interpolant over a box needs.
+        """Build an interpolant over a box, with as many solves as it needs.
 
-        Parameters
-        ----------
-        aspect_range : tuple of float
-            First and last aspect ratio [1]; an interpolant of one that is first and last is a function of the other.
-        nu_range : tuple of float
-            First and last Poisson's ratio [1], -1 < nu <= 0.5.
-        tolerance : float, optional
-            Largest relative error estimate to accept [1].
+        `aspect_range` and `nu_range` (-1 < nu <= 0.5) are first and last values [1], equal for a function of the
+        other alone; `tolerance` is the largest accepted relative error estimate [1].
 
         Examples
         --------
@@ -142,18 +131,7 @@ class Interpolant:
         return cls(kind, box.aspect_range, box.nu_range, values, error_estimate, len(box.solved))
 
     def evaluate(self, aspect_ratio: ArrayLike, nu: ArrayLike) -> Answers:
-        """Answers of unit problems.
-
-        Parameters
-        ----------
-        aspect_ratio, nu : float or ndarray of float
-            Aspect ratios and Poisson's ratios [1], broadcast against each other.
-
-        Returns
-        -------
-        Answers
-            Arrays of their shape.
-        """
+        """Return the answers at aspect ratios and Poisson's ratios [1], broadcast against each other."""
         aspects, nus = np.broadcast_arrays(np.asarray(aspect_ratio, float), np.asarray(nu, float))
         places = _place(np.log(aspects), np.log(self.aspect_range)), _place(nus, self.nu_range)
         outside = ~np.all([np.abs(place) <= 1 + ROUNDING for place in places], axis=0)
@@ -191,7 +169,7 @@ class Interpolant:
 
 
 class _Box:
-    """What is solved for an interpolant over a box, and what is known from it."""
+    """Solves and results for an interpolant over a box."""
 
     def __init__(
         self,
@@ -282,13 +260,7 @@ def _well_behaved(answers: np.ndarray) -> np.ndarray:
 
 
 def chebyshev_points(count: int) -> np.ndarray:
-    """Chebyshev points from 1 to -1, both included; one is in the middle.
-
-    Returns
-    -------
-    ndarray of float, shape (count,)
-        Those of twice as many intervals hold the same numbers.
-    """
+    """Return Chebyshev points from 1 to -1, both included, shape (count,); twice the intervals reuse them."""
     if count == 1:
         return np.zeros(1)
     # By the sine: its arguments are the same numbers there, too.
@@ -296,20 +268,9 @@ def chebyshev_points(count: int) -> np.ndarray:
 
 
 def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
-    """Values of the Lagrange polynomials of Chebyshev points, by the barycentric formula.
+    """Return the Lagrange polynomials of Chebyshev points at `places` in [-1, 1], shape (n, count).
 
-    Parameters
-    ----------
-    places : ndarray of float, shape (n,)
-        From -1 to 1.
-
-    Returns
-    -------
-    ndarray of float, shape (n, count)
-
-    Notes
-    -----
-    Berrut and Trefethen, Barycentric Lagrange interpolation, SIAM Review 46:501 (2004), formula 4.2 with weights 5.4.
+    Barycentric formula (Berrut and Trefethen, SIAM Review 46:501, 2004, formula 4.2 with weights 5.4).
     """
     if count == 1:
         return np.ones((len(places), 1))
@@ -325,17 +286,10 @@ def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
 
 
 def _promised(values: np.ndarray) -> float:
-    """Error of an interpolant that the decay of its Chebyshev coefficients along an axis lets expect.
+    """Return the interpolation error expected from the decay of Chebyshev coefficients along the second axis.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (n_functions, n, n_across)
-        At the nodes; the axis is the second one.
-
-    Notes
-    -----
-    Coefficients are taken in pairs, since those of even functions are zero in turn. If the last pair is to the one
-    before as the next one to it, that is about what is left out.
+    Coefficients are taken in pairs, since every other one of an even function is zero. The last pair's ratio to the
+    one before extrapolates what is left out.
     """
     count = values.shape[1]
     if count == 1:

@@ -1,8 +1,8 @@
-r"""How far a reference of small strain applies to a network that deforms at large.
+r"""Limits of a small-strain reference for a network at large deformation.
 
-A cantilever under a dead load at its end is the elastica :math:`\theta'' = -\alpha \cos\theta`,
-:math:`\alpha = F L^2 / (E I)`: its end deflects by :math:`4/35\,\alpha^2` less than in small strain, whose end turns by
-:math:`\alpha/2`, and by the closed form of `elastica` at any load.
+A cantilever under a dead end load is the elastica :math:`\theta'' = -\alpha \cos\theta`, :math:`\alpha = F L^2 / (E
+I)`. Its end deflects by :math:`4/35\,\alpha^2` less than in small strain, where it turns by :math:`\alpha/2`;
+`elastica` has the closed form at any load.
 """
 
 from collections.abc import Callable
@@ -14,23 +14,16 @@ MOST_EFFECT = 0.01
 """Largest effect of finite rotation on a displacement, relative, with which a reference of small strain applies."""
 
 MOST_STRAIN = 0.15
-"""Largest strain with which it applies. Below, what a finite strain does is taken for a matter of the material's law:
-the paper's beams stretch by 5 %, its block by 11 %."""
+"""Largest strain for a small-strain reference; the paper's beams stretch by 5 %, its block by 11 %."""
 
 SHARE = 0.95
 """Share of a body in which rotations and strains are at most those that it is judged by: corners are singular."""
 
 
 def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[float, float]:
-    """Rotation [rad] and principal strain [1] that 95 % of a body do not exceed, in small strain.
+    """Return the rotation [rad] and principal strain [1] that 95 % of a body do not exceed, in small strain.
 
-    Parameters
-    ----------
-    x : ndarray of float, shape (n_x,)
-    y : ndarray of float, shape (n_y,)
-        Coordinates of a grid [m], ascending.
-    displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacements there [m].
+    `x` (n_x,) and `y` (n_y,) are an ascending grid [m], with `displacements` (n_x, n_y, 2) [m].
     """
     middle = [(displacements[:, 1:] + displacements[:, :-1]) / 2, (displacements[1:] + displacements[:-1]) / 2]
     by_x = np.diff(middle[0], axis=0) / np.diff(x)[:, None, None]
@@ -40,14 +33,9 @@ def rotation_and_strain(x: np.ndarray, y: np.ndarray, displacements: np.ndarray)
 
 
 def most_rotation_and_strain(gradients: np.ndarray, areas: np.ndarray) -> tuple[float, float]:
-    """As `rotation_and_strain`, of displacement gradients.
+    """Return `rotation_and_strain` of displacement `gradients` (n, 2, 2) [1] with their `areas` (n,) [m2].
 
-    Parameters
-    ----------
-    gradients : ndarray of float, shape (n, 2, 2)
-        By component of the displacement, then by coordinate [1].
-    areas : ndarray of float, shape (n,)
-        That they stand for [m2].
+    Axes of gradients: component, then coordinate.
     """
     by_x, by_y = gradients[..., 0], gradients[..., 1]
     rotation = np.abs(by_x[..., 1] - by_y[..., 0]) / 2
@@ -65,17 +53,10 @@ def _exceeded_rarely(values: np.ndarray, areas: np.ndarray) -> float:
 
 
 def elastica(load: float) -> float:
-    r"""Deflection of a cantilever's end under a dead load across it, over its length [1].
+    r"""Return the end deflection of a cantilever under a dead load across it, over its length [1].
 
-    Parameters
-    ----------
-    load : float
-        :math:`\alpha = F L^2 / (E I)` [1], at least 0.
-
-    Notes
-    -----
-    With the turn :math:`\psi` of the end, :math:`p^2 = (1 + \sin\psi)/2` and :math:`\sin\varphi = 1/(\sqrt 2 p)`
-    (Bisshopp and Drucker, Quart. Appl. Math. 3:272, 1945)
+    `load` is :math:`\alpha = F L^2 / (E I)` [1], at least 0. With the turn :math:`\psi` of the end, :math:`p^2 = (1 +
+    \sin\psi)/2` and :math:`\sin\varphi = 1/(\sqrt 2 p)` (Bisshopp and Drucker, Quart. Appl. Math. 3:272, 1945)
 
     .. math:: \sqrt\alpha = K(p) - F(p, \varphi), \qquad
         w / L = 1 - \tfrac{2}{\sqrt\alpha} (E(p) - E(p, \varphi)).
@@ -94,25 +75,13 @@ def elastica(load: float) -> float:
 
 
 def rotation_effect(rotation: float) -> float:
-    """Effect of finite rotation on the deflection of a slender cantilever whose end turns so far in small strain [1].
-
-    Parameters
-    ----------
-    rotation : float
-        [rad]
-    """
+    """Return the relative effect of finite rotation on a slender cantilever's deflection; end rotation in rad."""
     load = 2 * abs(rotation)
     return 3 * elastica(load) / load - 1 if load else 0.0
 
 
 def beyond_linear(rotation: float, strain: float) -> str:
-    """Why a reference of small strain does not apply to a network of nonlinear kinematics.
-
-    Parameters
-    ----------
-    rotation, strain : float
-        Of the reference, see `rotation_and_strain` [rad, 1].
-    """
+    """Return why a small-strain reference of this rotation [rad] and strain [1] does not fit nonlinear kinematics."""
     reasons = []
     effect = rotation_effect(rotation)
     if -effect > MOST_EFFECT:
@@ -124,13 +93,7 @@ def beyond_linear(rotation: float, strain: float) -> str:
 
 
 def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
-    """Why a network is not compared with a reference, or not to be fitted to it.
-
-    Parameters
-    ----------
-    force : float
-        Force on the network [N].
-    """
+    """Return why a network under a force [N] is not compared with, or fitted to, a reference."""
     if "displacement" not in result:
         return f"no reference: {result['message']}"
     if kinematics == "linear":

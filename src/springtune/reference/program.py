@@ -1,4 +1,4 @@
-"""The program CalculiX, as far as plans know it."""
+"""Version of the program CalculiX, for plans."""
 
 import shutil
 from pathlib import Path
@@ -7,7 +7,7 @@ PROGRAM = "ccx"
 
 
 def program() -> str:
-    """Which CalculiX is on the machine: another one, or none, gives other results."""
+    """Return which CalculiX is installed: another one, or none, gives other results."""
     found = shutil.which(PROGRAM)
     if found is None:
         return ""

@@ -1,9 +1,8 @@
 r"""Reference for a shape: linear elasticity at small strain, plane stress, by finite elements on the shape itself.
 
-Triangles follow straight and curved sides. Their polynomial degree rises from level to level, and with it the number of
-layers that shrink towards corners at which the solution may be singular: where the outline is re-entrant, supports or
-loads begin or end, materials meet. The error then falls exponentially (hp version), as in
-`springtune.reference.small_strain`.
+Triangles follow straight and curved sides. From level to level their polynomial degree rises, and the number of
+layers that shrink towards possibly singular corners: re-entrant ones, ends of supports and loads, joints of
+materials. The error then falls exponentially (hp version), as in `springtune.reference.small_strain`.
 """
 
 from collections.abc import Callable, Mapping
@@ -53,18 +52,16 @@ class ShapeReference:
     Attributes
     ----------
     values : dict of str to float
-        Quantities of interest, in SI units; exactly zero where the solution does not tell one from zero: where it is
-        less than ten times the bound on its error, as it is by symmetry.
+        Quantities of interest, in SI units; exactly zero if less than ten times their error bound, as by symmetry.
     error_estimates : dict of str to float
-        Bounds on their errors, relative [1]: to the value itself, or to a thousandth of what is largest of its kind in
-        the body where the value is less.
+        Relative error bounds [1]: over the value, or over a thousandth of the body's largest value of its kind if
+        that is larger.
     energy : float
         Strain energy [J].
     rotation, strain : float
-        Rotation [rad] and strain [1] by which the solution is judged, see `springtune.reference.limits`.
+        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.limits`.
     negligible : tuple of str
-        Quantities that are less than a thousandth of what is largest of their kind: an error relative to such a one is
-        large where the solution is good.
+        Quantities below a thousandth of the largest of their kind, whose relative errors are meaningless.
     """
 
     values: dict[str, float]
@@ -80,36 +77,15 @@ class ShapeReference:
     _factor: float = 1.0
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Displacements at points of the body; those a little outside get what its nearest triangle goes on with.
+        """Return displacements [m] at points of the body, (n, 2) [m]; just outside, by extrapolation.
 
-        The estimates are of quantities of interest alone: displacements elsewhere may be off by more, in published
-        benchmarks by up to 4e-4 of the largest one at the tolerance of 1e-4. A smaller tolerance has better ones.
-
-        Parameters
-        ----------
-        points : ndarray of float, shape (n, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (n, 2)
-            [m]
+        Error estimates cover only quantities of interest: in published benchmarks displacements elsewhere are off by
+        up to 4e-4 of the largest one at the tolerance 1e-4.
         """
         return self._factor * self._level.displacements(points)
 
     def stress_at(self, points: np.ndarray) -> np.ndarray:
-        """Stresses at points of the body, see `at`.
-
-        Parameters
-        ----------
-        points : ndarray of float, shape (n, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (n, 3)
-            xx, yy and xy [Pa].
-        """
+        """Return stresses xx, yy and xy [Pa], shape (n, 3), at points of the body, see `at`."""
         return self._factor * self._level.stresses(points)
 
     def scaled(self, factor: float) -> "ShapeReference":
@@ -135,27 +111,22 @@ def solve_shape(
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
 ) -> ShapeReference:
-    r"""Displacements of a shape under a load case, at small strain in plane stress.
+    r"""Solve for the displacements of a shape under a load case, at small strain in plane stress.
 
-    Parameters
-    ----------
-    grouped : GroupedMesh, optional
-        The mesh as read, of a shape whose body is that of a file: the polygon around its cells is then the geometry.
-    tolerance : float
-        Largest relative error estimate to accept [1]; ten times as much of stresses.
+    `grouped` is the mesh of a shape from a file: the polygon around its cells is the geometry. `tolerance` is the
+    largest accepted relative error estimate [1]; ten times as much for stresses.
 
     Notes
     -----
-    A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` there
-    one more layer takes the energy that the innermost triangles cannot represent down by :math:`.2^{2\lambda}`, and one
-    more degree that of the others by much the same, so that steps from level to level fall geometrically: as long as
-    each is at most half of the one before, all later ones together are at most the last one. Quantities other than the
-    energy need not approach their limit from one side and may take a step that is small by chance: the estimate is the
-    last step, or a quarter of the one before it where that is more, and a level is taken only where the steps are seen
-    to halve.
+    A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` one
+    more layer scales the missing energy of the innermost triangles by :math:`.2^{2\lambda}`, and one more degree that
+    of the others similarly. So steps from level to level fall geometrically: while each is at most half of the last,
+    all later ones together are at most the last one. Other quantities than the energy may take a step that is small
+    by chance: the estimate is the larger of the last step and a quarter of the one before, and steps must be seen to
+    halve.
 
-    Curves are followed by polynomials of the level's degree (isoparametric), reactions are the work of the solution on
-    a unit displacement of their group, and stresses are those of the displacements, not smoothed.
+    Curves are polynomials of the level's degree (isoparametric), reactions are the work of the solution on a unit
+    displacement of their group, and stresses are not smoothed.
     """
     by_part = materials if isinstance(materials, Mapping) else {"": materials}
     return converge(shape, load, by_part, grouped, tolerance)
@@ -167,14 +138,9 @@ def solve_each(
     materials: AnyMaterial | Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
 ) -> tuple[list[ShapeReference], dict[str, str]]:
-    """References that between them have all quantities of interest that have one.
+    """Return references that together have every quantity of interest that converges, and the faults of the others.
 
-    One that has none, such as the stress at a corner, does not cost the others theirs.
-
-    Parameters
-    ----------
-    shape, load, materials, grouped
-        As in `solve_shape`.
+    A quantity without a limit, such as the stress at a corner, does not affect the others.
     """
     try:
         return [solve_shape(shape, load, materials, grouped)], {}
@@ -199,13 +165,7 @@ def converge(
     tractions: Mapping[str, Field] | None = None,
     displacements: Mapping[str, Field] | None = None,
 ) -> ShapeReference:
-    """As `solve_shape`, also with tractions [Pa] and displacements [m] that vary along groups: closed forms need them.
-
-    Parameters
-    ----------
-    shape, load, materials, grouped, tolerance
-        As in `solve_shape`.
-    """
+    """Solve as `solve_shape`, with tractions [Pa] and displacements [m] that may vary along groups."""
     problem = _Problem(shape, load, materials, grouped, tractions or {}, displacements or {})
     names = [quantity.name for quantity in load.quantities]
     values: list[dict[str, float]] = []
@@ -259,14 +219,9 @@ def converge(
 
 
 def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
-    """Why an error estimate is not taken, in words; empty where it is.
+    """Return why an error estimate is refused, or an empty string; `before` and `last` are the last two steps.
 
-    Parameters
-    ----------
-    estimate, accepted : float
-        Relative [1].
-    before, last : float
-        Sizes of the last two steps from level to level, over the same [1].
+    All are relative, over the same [1].
 
     Examples
     --------
@@ -435,17 +390,14 @@ class _Problem:
             )
 
     def look_at_reactions(self, level: "_Level") -> None:
-        """Note supports at points that carry a force, under which displacements and energy of a continuum are infinite.
-
-        Held points that only keep a body from moving carry none.
-        """
+        """Note point supports that carry a force: a continuum's displacements and energy are infinite there."""
         least = SMALLEST_REACTION * level.scale("reaction")
         held = [support.group for support in self.load.supports if support.group in self.points]
         self.reacting = [name for name in held if np.abs(level.residual[self.mesh.named[name]]).max() > least]
         self.infinite_energy = bool(self.loaded_points or self.reacting)
 
     def place(self, name: str) -> str:
-        """Of what a quantity is."""
+        """Return the group or point of a quantity."""
         of = self._quantities[name].of if name else ""
         return f" of {of!r}" if of else ""
 
@@ -696,9 +648,9 @@ class _Level:
     def _solve(
         self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Coefficients and residual forces, shape (n_functions, 2), and the strain energy.
+        """Return coefficients and residual forces, shape (n_functions, 2), and the strain energy.
 
-        What is inside of triangles is eliminated triangle by triangle.
+        Inner functions are eliminated triangle by triangle.
         """
         space = self.space
         n, outer = len(space.corners), 2 * space.n_local_outer
@@ -789,7 +741,7 @@ class _Level:
         return (by_x + by_y) * np.sign(determinant) * weights
 
     def scale(self, kind: str) -> float:
-        """What is largest of a kind of quantity."""
+        """Return the largest value of a kind of quantity in the body."""
         mesh = self.space.mesh
         motion = float(np.abs(self.field[: len(mesh.points)]).max())
         if kind == "displacement":

@@ -1,7 +1,7 @@
-"""The unit problem behind a small-strain reference: what of a beam, material and load its answer depends on.
+"""Unit problem of a small-strain reference.
 
-Lengths over half the height and stresses over the traction leave a problem of the aspect ratio, of Poisson's ratio and
-of the kind of load alone. Beams that differ in size or thickness and materials that differ in Young's modulus share it.
+With lengths over half the height and stresses over the traction only the aspect ratio, Poisson's ratio and the kind
+of load remain. Beams that differ in size, thickness or Young's modulus share it.
 """
 
 from ..problem.geometry import Beam
@@ -15,14 +15,9 @@ def unit_problem(beam: Beam, material: Material, kind: LoadKind) -> tuple[float,
 
 
 def unit_scales(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float]:
-    """What lengths and displacements of the unit problem are multiplied with.
+    """Return the scales of lengths and displacements of the unit problem.
 
-    Returns
-    -------
-    length : float
-        Half the height [m].
-    displacement : float
-        Displacement for 1 N [m]: half the height times the traction over Young's modulus.
+    Half the height [m]; and for 1 N half the height times the traction over Young's modulus [m].
     """
     side = kind.side_length(beam)
     return beam.height / 2, beam.height / 2 / (side * beam.thickness * material.young_modulus)

@@ -1,6 +1,6 @@
 """Reference for a beam: linear elasticity at small strain, plane stress, by finite elements.
 
-Kinds of load are those of `springtune.problem.loads`. Of each beam half is solved; the dashed line is its axis of
+Kinds of load are those of `springtune.problem.loads`. Half of each beam is solved; the dashed line is its axis of
 symmetry or antisymmetry::
 
         axial                          bending                            shear
@@ -10,13 +10,12 @@ symmetry or antisymmetry::
         //|__________________|->       //|__________________||          +-------:-------+
                                                                         ///////////////
 
-The kind ``"face"`` is that of shear with a force along y and no rollers, symmetric. Any other kind whose supports are
-symmetric is solved like these: by the upper half where an end is loaded, else by the left half.
+The kind ``"face"`` is shear with a force along y and no rollers. Other kinds with symmetric supports are solved
+alike: the upper half if an end is loaded, else the left half.
 
-The stress is singular where a clamp meets a free edge, the more so the larger Poisson's ratio, and quadratic elements
-of even size creep towards the answer. The elements here are rectangles whose sides shrink geometrically towards the
-corners, and their polynomial degree grows with the number of layers: the error then falls exponentially (hp version),
-to 1e-6 with some thousand unknowns.
+The stress is singular where a clamp meets a free edge, so even quadratic elements converge slowly. Here rectangles
+shrink geometrically towards the corners, and their degree grows with the number of layers. The error then falls
+exponentially (hp version), to 1e-6 with some thousand unknowns.
 """
 
 from dataclasses import dataclass, replace
@@ -83,20 +82,19 @@ class ReferenceSolution:
     Attributes
     ----------
     displacement : float
-        Mean displacement of the loaded side along the force [m]; of a pressed side, that of its middle.
+        Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
     mean_displacement : float
         Mean displacement of the loaded side along the force [m].
     error_estimate : float
         Bound on the relative error of `displacement` [1].
-    x : ndarray of float, shape (n_x,)
-    y : ndarray of float, shape (n_y,)
-        Coordinates of a grid on which the field is given [m]; closer to each other near the outline.
+    x, y : ndarray of float, shape (n_x,) and (n_y,)
+        Grid of the field [m], denser near the outline.
     displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacement there [m].
+        Displacements on the grid [m].
     rotation, strain : float
-        Rotation [rad] and strain [1] by which the solution is judged, see `springtune.reference.limits`.
+        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.limits`.
     unknowns : int
-        Number of unknowns of the finest level, of the half that is solved.
+        Unknowns of the finest level, for the solved half.
     """
 
     displacement: float
@@ -110,67 +108,39 @@ class ReferenceSolution:
     unknowns: int
 
     def scaled(self, factor: float, length: float = 1.0) -> "ReferenceSolution":
-        """The solution of a similar beam: small strain is linear.
-
-        Parameters
-        ----------
-        factor : float
-            What displacements are multiplied with [1].
-        length : float, optional
-            What the sizes of the beam are multiplied with [1].
-        """
+        """Scale displacements by `factor` and the beam by `length` [1]: small strain is linear."""
         names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
         names |= {"rotation": abs(factor) / length, "strain": abs(factor) / length}
         return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Displacements at points of the beam; see `springtune.reference.field.interpolate`.
-
-        Parameters
-        ----------
-        points : ndarray of float, shape (n, 2)
-            [m]
-
-        Returns
-        -------
-        ndarray of float, shape (n, 2)
-            [m]
-        """
+        """Return displacements [m] at points (n, 2) [m] of the beam, see `springtune.reference.field.interpolate`."""
         return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_small_strain(
     beam: Beam, material: Material, force: float, tolerance: float = 1e-4, kind: LoadKind = AXIAL
 ) -> ReferenceSolution:
-    r"""Displacements of a beam under a load.
+    r"""Solve for the displacements of a beam under a load.
 
-    Parameters
-    ----------
-    beam : Beam
-        Rectangle and thickness [m].
-    material : Material
-        Young's modulus [Pa] and Poisson's ratio [1], -1 < nu <= 0.5.
-    force : float
-        Force [N], spread evenly over the loaded side; axial ones are positive in tension.
-    tolerance : float
-        Largest relative error estimate to accept [1].
+    `force` [N] is spread evenly over the loaded side, axial tension positive; -1 < nu <= 0.5. `tolerance` is the
+    largest accepted relative error estimate [1].
 
     Notes
     -----
     The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.similarity`.
 
-    The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive levels
-    are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and what is missing is the sum of all
-    later steps :math:`d_p = J_p - J_{p-1}`. These fall geometrically: with :math:`u \sim r^\lambda` at a corner one
-    more layer takes the energy that the innermost element cannot represent down by :math:`.2^{2\lambda}`, and one more
-    degree that of the other elements by much the same. For a clamped edge that meets a free one at a right angle
-    (Williams 1952)
+    The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive
+    levels are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and the error is the sum of
+    all later steps :math:`d_p = J_p - J_{p-1}`. These fall geometrically: with :math:`u \sim r^\lambda` at a corner
+    one more layer scales the missing energy of the innermost element by :math:`.2^{2\lambda}`, and one more degree
+    that of the others similarly. For a clamped edge that meets a free one at a right angle (Williams 1952)
 
     .. math:: \sin^2(\lambda\pi/2) = \frac{4}{(3-\nu)(1+\nu)} - \frac{1+\nu}{3-\nu}\lambda^2,
 
-    so lambda = .69 at nu = .5 and .76 at .3, factors of .11 and .09; measured .07 to .12. As long as a step is at most
-    half of the one before, all later steps together are at most the last one: that step is the error estimate, and a
-    solution is taken only where the steps are seen to halve. It exceeds the true error some tenfold.
+    so lambda = .69 at nu = .5 and .76 at .3, factors of .11 and .09; measured .07 to .12. While each step is at most
+    half of the last, all later ones together are at most the last one, which is the error estimate; steps must be
+    seen to halve. It exceeds the true error some tenfold.
 
     Examples
     --------
@@ -190,17 +160,7 @@ def solve_small_strain(
 
 
 def solve_unit(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float = 1e-4) -> ReferenceSolution:
-    """Displacements of a beam of height 2 with E = 1 under traction 1; see `springtune.reference.similarity`.
-
-    Parameters
-    ----------
-    aspect_ratio : float
-        Length over height [1].
-    nu : float
-        Poisson's ratio [1].
-    tolerance : float
-        Largest relative error estimate to accept [1].
-    """
+    """Solve a beam of height 2 with E = 1 under traction 1, see `springtune.reference.similarity`."""
     level, estimate = _converge(aspect_ratio, nu, kind, tolerance)
     x, y, field = level.field()
     rotation, strain = rotation_and_strain(x, y, field)
@@ -256,9 +216,9 @@ def _bent(aspect_ratio: float, kind: LoadKind) -> float:
 
 
 def _most_slender(nu: float, degree: int) -> float:
-    """Largest ratio of sides that is solved on a level.
+    """Return the largest ratio of sides that a level can solve.
 
-    A level's smallest elements, and shear that is stiff as nu tends to -1, worsen the condition of the matrix as well.
+    Small elements, and stiff shear as nu tends to -1, worsen the condition of the matrix too.
     """
     return MOST_BENT * min(1.0, 2 * (1 + nu)) ** 0.5 * (2 / 3) ** max(degree - 6, 0)
 
@@ -266,40 +226,25 @@ def _most_slender(nu: float, degree: int) -> float:
 class UnitLevel:
     r"""Half of a beam of height 2 with E = 1 under traction 1, solved on one level.
 
-    Parameters
-    ----------
-    length : float
-        Length over half the height [1].
-    nu : float
-        Poisson's ratio [1].
-
-    Attributes
-    ----------
-    displacement : float
-        Mean displacement of the loaded side along the force [1].
-    measured : float
-        The displacement of the load: as `displacement`, of a pressed side that of its middle.
-    round_off : float
-        Bound on the relative rounding error of both [1].
+    `length` is over half the height [1]. `displacement` is the loaded side's mean along the force, `measured` the
+    displacement of the load, and `round_off` bounds the relative rounding error of both [1].
 
     Notes
     -----
-    On a grid of rectangles the basis is the products of one along x and one along y, and the matrices in the plane are
-    Kronecker products of those on the two lines: milliseconds, for any degree. Each side is held as a whole, so the
-    unknowns of a component are products of those on the lines, too.
+    The basis on a grid of rectangles is a product of one along x and one along y, so matrices are Kronecker products:
+    milliseconds, for any degree. Each side is held as a whole, so the unknowns are products too.
 
-    In double precision a slender cantilever loses digits with the fourth power of its aspect ratio. The solution is
-    therefore refined, by conjugate gradients whose preconditioner is the double-precision factor and whose residuals
-    :math:`r = l - A u` come in extended precision (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
-    chapter 12), not by the matrix :math:`A = B^T C B` but by strains, stresses and forces: large displacements cancel
-    in the strains, once. The energy is
+    In double precision a slender cantilever loses digits with the fourth power of its aspect ratio. So conjugate
+    gradients refine the solution, with the double-precision factor as preconditioner and residuals :math:`r = l - A
+    u` in extended precision (Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 12). These come
+    from strains, stresses and forces, not from the matrix :math:`A = B^T C B`: large displacements then cancel once,
+    in the strains. The energy is
 
     .. math:: l^T A^{-1} l = l^T u + u^T r + r^T A^{-1} r,
 
-    of which the last term is left out; the factor gives its size, over the least part of :math:`A` in it that the
-    iteration has met. A count of operations times the unit round-off bounds each rounding (section 3.1), and so the
-    displacement's by that times the work :math:`|\sigma|^T |B| |u|` of the stresses on the terms of the strains. Both
-    are computed, and their sum is `round_off`.
+    of which the last term is left out; its size follows from the factor, over the least part of :math:`A` in it that
+    the iteration has met. A count of operations times the unit round-off bounds each rounding (section 3.1), and the
+    displacement's by that times the work :math:`|\sigma|^T |B| |u|`. `round_off` is the sum of both.
     """
 
     def __init__(self, length: float, nu: float, degree: int, kind: LoadKind = AXIAL) -> None:
@@ -311,32 +256,11 @@ class UnitLevel:
         self.measured = self.displacement if measured is None else measured
 
     def displacements(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Displacements on a grid.
-
-        Parameters
-        ----------
-        x : ndarray of float, shape (n_x,)
-            From 0 to the length [1].
-        y : ndarray of float, shape (n_y,)
-            From -1 to 1 [1].
-
-        Returns
-        -------
-        ndarray of float, shape (n_x, n_y, 2)
-        """
+        """Return displacements on a grid, shape (n_x, n_y, 2); x from 0 to the length, y from -1 to 1 [1]."""
         return self._sum(self._grid.values(x, y))
 
     def field(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacements on the grid that is handed out.
-
-        Returns
-        -------
-        x : ndarray of float, shape (n_x,)
-            From 0 to the length [1].
-        y : ndarray of float, shape (n_y,)
-            From -1 to 1 [1].
-        displacements : ndarray of float, shape (n_x, n_y, 2)
-        """
+        """Return x from 0 to the length, y from -1 to 1, and displacements (n_x, n_y, 2) on the output grid [1]."""
         x, y = self._grid.plot_points
         return x, y, self._sum(self._grid.plot_values)
 
@@ -353,10 +277,7 @@ def _grid(length: float, degree: int, kind: LoadKind) -> "_Grid":
 
 
 class _Grid:
-    """Elements of one level, and of its matrix and load what does not depend on Poisson's ratio.
-
-    Parameters are those of `UnitLevel`.
-    """
+    """Elements of one level, and the parts of its matrix and load that do not depend on Poisson's ratio."""
 
     def __init__(self, length: float, degree: int, kind: LoadKind) -> None:
         self._length, self._kind = length, kind
@@ -456,10 +377,10 @@ class _Grid:
         shear: np.floating,
         other: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.floating]:
-        """Inner forces in extended precision, and the work that stresses do on the terms of strains, without signs.
+        """Return inner forces in extended precision, and the unsigned work of stresses on the terms of strains.
 
-        Strains come first, then stresses, then forces, none by the matrix: what cancels are the displacements of a
-        slender beam at large, not its forces. The work is that on the strains of other unknowns, if given.
+        Never by the matrix: so only the large displacements of a slender beam cancel, not its forces. The work is on
+        the strains of `other` unknowns, if given.
         """
         u, v = self.fields(solution)
         (x, x_slope), (y, y_slope) = self._x.series, self._y.series
@@ -488,9 +409,9 @@ class _Grid:
         return fields
 
     def values(self, x: np.ndarray, y: np.ndarray) -> _Values:
-        """Signs of the two displacements on a grid, places of its points in the half, matrices along x and y there.
+        """Return signs of the displacements on a grid, places of its points in the half, and matrices along x and y.
 
-        A point and its mirror image have one place: products of matrices round differently from column to column.
+        A point and its mirror image share one place: matrix products round differently from column to column.
         """
         signs = np.ones((2, len(x), len(y)))
         odd = 1 - self._kind.axis
@@ -518,9 +439,9 @@ class _Grid:
 class _Line:
     r"""Polynomials of one degree on the elements of a line, and their matrices, in extended precision.
 
-    Of each element those of its two ends and the integrals of Legendre polynomials (Szabo and Babuska, Finite Element
-    Analysis, 1991, section 3.1): :math:`\sqrt{(2k - 1)/2} \int_{-1}^{\xi} P_{k-1}`, k = 2 to the degree. `mass`,
-    `slope` and `mixed` hold the integrals of v w, v' w' and v' w (v: row, w: column), `integrals` those of v.
+    Those of an element's ends and the integrals of Legendre polynomials (Szabo and Babuska, Finite Element Analysis,
+    1991, section 3.1): :math:`\sqrt{(2k - 1)/2} \int_{-1}^{\xi} P_{k-1}`, k = 2 to the degree. `mass`, `slope` and
+    `mixed` are the integrals of v w, v' w' and v' w (v: row, w: column), `integrals` those of v.
     """
 
     def __init__(self, points: np.ndarray, degree: int) -> None:

@@ -1,8 +1,8 @@
-r"""Polynomials of any degree on triangles, the sides of which may be curved.
+r"""Polynomials of any degree on triangles with straight or curved sides.
 
-Shape functions are hierarchical (Szabo and Babuska, Finite Element Analysis, 1991, chapter 6): one a corner, degree - 1
-a side and the rest inside. Corners of a triangle are numbered upwards, so that neighbours agree on the sense of a side.
-scikit-fem's triangles end at degree four, and its assembly is one call a pair of shape functions.
+Shape functions are hierarchical (Szabo and Babuska, Finite Element Analysis, 1991, chapter 6): one a corner, degree -
+1 a side and the rest inside. Corners are numbered upwards, so that neighbours agree on a side's direction. scikit-fem
+is not used: its triangles end at degree four, and it assembles one pair of functions a call.
 """
 
 from functools import lru_cache
@@ -33,16 +33,9 @@ def _side_kernels(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def side_functions(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions on a side: those of its corners, then its own.
+    """Return shape functions on a side and their slopes, shape (n, degree + 1): its corners', then its own.
 
-    Parameters
-    ----------
-    along : ndarray of float, shape (n,)
-        From -1 at the corner of the lower number to 1.
-
-    Returns
-    -------
-    values, slopes : ndarray of float, shape (n, degree + 1)
+    `along` (n,) runs from -1 at the corner of the lower number to 1.
     """
     kernel, slope = _side_kernels(degree, along)
     bulge = (1 - along[:, None] ** 2) / 4
@@ -53,17 +46,9 @@ def side_functions(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions of the reference triangle: corners, sides, inside.
+    """Return shape functions (n, n_functions) and gradients (n, n_functions, 2): corners, sides, inside.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n, 2)
-        In the triangle of the corners (0, 0), (1, 0) and (0, 1).
-
-    Returns
-    -------
-    values : ndarray of float, shape (n, n_functions)
-    gradients : ndarray of float, shape (n, n_functions, 2)
+    `points` (n, 2) are in the triangle of the corners (0, 0), (1, 0) and (0, 1).
     """
     corners = np.column_stack([1 - points.sum(axis=1), points])
     values, gradients = [corners], [np.broadcast_to(CORNER_GRADIENTS, (len(points), 3, 2))]
@@ -97,14 +82,7 @@ def shape_functions(degree: int, points: np.ndarray) -> tuple[np.ndarray, np.nda
 
 @lru_cache(maxsize=64)
 def triangle_rule(exact: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points and weights of a quadrature in the reference triangle, by Gauss's rules in a square folded onto it.
-
-    Returns
-    -------
-    points : ndarray of float, shape (n, 2)
-    weights : ndarray of float, shape (n,)
-        Sum 1/2.
-    """
+    """Return points (n, 2) and weights, sum 1/2, by Gauss's rules in a square folded onto the reference triangle."""
     nodes, weights = leggauss(exact // 2 + 1)
     across, weights_across = leggauss((exact + 1) // 2 + 1)  # one degree more by the fold
     x, y = (nodes + 1) / 2, (across + 1) / 2
@@ -114,27 +92,17 @@ def triangle_rule(exact: int) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def tabulated(degree: int, exact: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Quadrature points and weights of the reference triangle, and its shape functions and their gradients there.
-
-    Parameters
-    ----------
-    degree, exact : int
-        Of the shape functions, and of what is integrated.
-    """
+    """Return quadrature points and weights, exact to degree `exact`, and shape functions and gradients there."""
     points, weights = triangle_rule(exact)
     return points, weights, *shape_functions(degree, points)
 
 
 @lru_cache(maxsize=64)
 def side_fit(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points on a side at which a curve is met, and what takes the values there to those of the side's functions.
+    """Return the points on a side where a curve is met, and the matrix from values there to side functions.
 
-    Returns
-    -------
-    along : ndarray of float, shape (degree - 1,)
-        From -1 to 1, the inner points of Lobatto's rule.
-    inverse : ndarray of float, shape (degree - 1, degree - 1)
-        Applied to the values less their linear interpolant between the corners.
+    The points (degree - 1,) are the inner ones of Lobatto's rule, from -1 to 1. The matrix (degree - 1, degree - 1)
+    applies to values less the linear interpolant between the corners.
     """
     along = np.real(Legendre.basis(degree).deriv().roots())
     return along, np.linalg.inv(side_functions(degree, along)[0][:, 2:])

@@ -15,8 +15,7 @@ UNFINISHED = ".unfinished"
 """Ending of the name of a file that is being written, after its own and who writes it, `writer`."""
 
 FORGOTTEN = 3600.0
-"""Seconds after which an unfinished file of another machine, whose processes are not to be seen, is left over: each is
-written within seconds."""
+"""Seconds after which another machine's unfinished file counts as left over; writing takes seconds."""
 
 
 def writer() -> str:
@@ -26,9 +25,9 @@ def writer() -> str:
 
 @contextmanager
 def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
-    """Context in which a file is written under another name; it gets its own when all is written.
+    """Context that writes a file under another name and renames it when complete.
 
-    Nothing is left of it after an error, and a file of before stays.
+    After an error nothing is left, and a previous file stays.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -45,7 +44,7 @@ def replacing(path: str | Path, synced: bool = False) -> Iterator[Path]:
 
 
 def check_folder(path: str | Path) -> None:
-    """Refuse a file whose folder is not there: who misspells one is not to get another.
+    """Refuse a file whose folder does not exist, rather than create a misspelled one.
 
     Examples
     --------
@@ -60,9 +59,9 @@ def check_folder(path: str | Path) -> None:
 
 
 def remove_unfinished(folder: str | Path, below: bool = True) -> None:
-    """Remove what writers that were killed have left in a folder; what a process that lives is writing stays.
+    """Remove files in a folder that killed writers left; those of running processes stay.
 
-    Of a process on another machine that is what was written to within the last hour.
+    On another machine a process counts as running if it wrote within the last hour.
 
     Examples
     --------
@@ -94,7 +93,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text in UTF-8; folders are made where they are missing.
+    """Write UTF-8 text atomically; create missing folders.
 
     Examples
     --------
@@ -108,7 +107,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_json(path: str | Path, content: Any) -> None:
-    """Write JSON; the file appears whole or not at all.
+    """Write JSON atomically.
 
     Examples
     --------

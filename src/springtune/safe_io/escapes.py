@@ -1,16 +1,16 @@
-"""Texts that somebody else wrote, put where a terminal, RST, Markdown or matplotlib would read more into them."""
+"""Escape foreign texts for terminals, RST, Markdown and matplotlib."""
 
 import re
 
 UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, line breaks, marks that turn the direction of writing, and halves of characters."""
+"""Control characters, line breaks, bidirectional marks and surrogates."""
 
 PUNCTUATION = re.compile(r"([^\w\s]|_)")
-"""Whatever a markup language may give a meaning to."""
+"""Characters that a markup language may interpret."""
 
 
 def shown(text: object) -> str:
-    r"""Return a text as one line whose control characters can be read and do nothing.
+    r"""Return a text as one line with its control characters escaped.
 
     Examples
     --------
@@ -21,7 +21,7 @@ def shown(text: object) -> str:
 
 
 def rst(text: str) -> str:
-    r"""Return reStructuredText that says a text.
+    r"""Return a text escaped for reStructuredText.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def rst(text: str) -> str:
 
 
 def markdown(text: object) -> str:
-    r"""Return Markdown that says a text, also in a cell of a table.
+    r"""Return a text escaped for Markdown, also in tables.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def markdown(text: object) -> str:
 
 
 def no_mathematics(text: str) -> str:
-    r"""Return a text of a figure in which a dollar sign is one.
+    r"""Return a figure's text with its dollar signs escaped.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Files of others: regular ones of a bounded size are read, within a bounded memory, and nothing beside them."""
+"""Bounded reading of foreign files: regular ones, of limited size, with limited memory."""
 
 import errno
 import mmap
@@ -15,7 +15,7 @@ LARGEST_CSV = 5_000_000
 
 
 _bounds = threading.RLock()
-"""One thread at a time sets a bound, which is one of the process."""
+"""Lock: a memory limit applies to the whole process."""
 
 
 class BeyondSize(ValueError):
@@ -23,7 +23,7 @@ class BeyondSize(ValueError):
 
 
 class DataElsewhere(ValueError):
-    """Data of a file are in another one."""
+    """Data of a file are stored in another one."""
 
 
 class BeyondBound(MemoryError):
@@ -31,7 +31,7 @@ class BeyondBound(MemoryError):
 
 
 def fault(path: str | Path) -> str:
-    """Why a file is not opened: it is not there, or no regular file. A pipe may block, and a device never ends.
+    """Return why a file is not opened: missing, or not a regular file, which may block or never end.
 
     Examples
     --------
@@ -74,11 +74,11 @@ def virtual_memory() -> int:
 
 @contextmanager
 def bounded(memory: float, seconds: float = 0.0) -> Iterator[None]:
-    """Context that takes at most so many bytes on top of what the process has, and so many seconds of the processor.
+    """Context that limits additional memory [bytes] and processor time [s].
 
-    A damaged file may state any number of points. The bound of memory is one of the process, so other threads share
-    it; that of seconds is kept in the main thread alone. Where the system has no such bound there is none, and one of
-    memory that is tighter already stays.
+    A damaged file may state any number of points. The memory limit is the process's, shared by threads; the time
+    limit works only in the main thread. Without support by the system there is no limit, and a tighter memory limit
+    stays.
     """
     with _bounds, _timed(seconds):
         used = virtual_memory()

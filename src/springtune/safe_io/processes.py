@@ -1,14 +1,14 @@
-"""Which processes live, and where."""
+"""Which processes run, and on which machine."""
 
 import os
 import platform
 
 SAME_START = 2.0
-"""Seconds by which two readings of a process's start may differ, since the clock may be set."""
+"""Tolerance [s] of a process's start time, since the clock may be set."""
 
 
 def this_host() -> str:
-    """Name of the machine, or the container, in which a process's number says something."""
+    """Return the name of the machine or container in which process ids are valid."""
     try:
         return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
     except OSError:
@@ -16,7 +16,7 @@ def this_host() -> str:
 
 
 def lives(pid: int, start: float | None = None) -> bool:
-    """Whether a process lives."""
+    """Return whether a process runs."""
     import psutil  # here: hardly ever is there something to ask
 
     try:

@@ -1,10 +1,9 @@
 """Definitions: rules that give every spring of a mesh its stiffness. One module each.
 
-A definition is a function ``springs(mesh, material, thickness)`` that returns `Springs`; where it is told a uniform
-stiffness or cases to match, these come as a fourth argument. It raises `DefinitionError` where it cannot live on a mesh
-or with a material. The decorator `definition` declares it where it stands; `DEFINITIONS` finds all that the modules
-of this package declare, and those of one's own. All modules are imported to be found, so what takes long to import
-(scipy, the network) is imported inside the functions that need it.
+A definition is a function ``springs(mesh, material, thickness)`` that returns `Springs`; a stiffness or cases to
+match come as a fourth argument. It raises `DefinitionError` for meshes or materials that it does not support. The
+decorator `definition` declares it; `DEFINITIONS` finds all that this package's modules and the user declare. All
+modules are imported for that, so slow imports (scipy, the network) belong inside functions.
 
 Examples
 --------

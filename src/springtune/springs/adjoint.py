@@ -1,8 +1,8 @@
 """Stiffness of each spring by exact gradients: the mesh itself in even tension and shear, no reference solution.
 
-Minimises the misfit of `springtune.springs.identification` under tension along x and y and shear, whose displacements
-are known exactly, with L-BFGS-B; the gradient costs one back-substitution a case. Poisson's ratios other than 1/3
-are reached through uneven motion of the particles, at the price of springs of different stiffness. Derived here.
+L-BFGS-B minimises the misfit of `springtune.springs.identification` under tension along x and y and shear, whose
+displacements are known exactly; the gradient costs one back-substitution a case. Uneven motion of the particles
+reaches Poisson's ratios other than 1/3, with uneven stiffnesses. Derived here.
 """
 
 import math
@@ -19,10 +19,7 @@ MAX_EVALUATIONS = 400
 
 @definition("adjoint", order=170, anisotropic=True)
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
-    """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself.
-
-    Parameters, returns and errors as in `springtune.springs.lattice.springs`.
-    """
+    """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself."""
     from scipy.optimize import minimize  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, patch_cases(mesh, material, thickness))

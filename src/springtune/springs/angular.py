@@ -7,9 +7,9 @@ On an equilateral lattice of edge a
           \beta = \frac{a^2 E t (1 - 3 \nu)}{6 \sqrt{3} (1 - \nu^2)}
 
 has the bulk modulus ``sqrt(3) k / 2`` and the shear modulus ``sqrt(3) k / 4 + 3 sqrt(3) beta / (2 a^2)``: exact for
-every nu. beta is negative above 1/3, where the network stays stable. Edges on the outline have half of k; a^2 is that
-of the equilateral triangle of the same area. After Keating and Kirkwood, as reviewed by Ostoja-Starzewski (Appl. Mech.
-Rev. 55:35, 2002); derived and checked here. Assumptions: near-equilateral triangles.
+every nu. beta is negative above 1/3, where the network stays stable. Outline edges have k/2; a is of the equilateral
+triangle of the same area. After Keating and Kirkwood, as reviewed by Ostoja-Starzewski (Appl. Mech. Rev. 55:35,
+2002); derived and checked here. Assumptions: near-equilateral triangles.
 """
 
 import math
@@ -26,7 +26,7 @@ from .lattice import half_weight
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs for the bulk modulus and angular springs for the rest (Keating): any nu on lattices, no tuning.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    Raises DefinitionError on quadrilaterals.
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`
 

@@ -1,7 +1,7 @@
 """Stiffness of each spring by simulated annealing on the displacements of a scene's reference.
 
-As Deussen, Kobbelt and Tuecke (1995) tuned springs: random changes of all stiffnesses, worse ones accepted with falling
-probability. The search is scipy's generalised annealing without its local search, from a fixed seed.
+As Deussen, Kobbelt and Tuecke (1995) tuned springs: random changes of all stiffnesses, worse ones accepted with
+falling probability. Uses scipy's generalised annealing without its local search, from a fixed seed.
 """
 
 import math

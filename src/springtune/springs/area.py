@@ -1,16 +1,15 @@
 r"""Springs at nu = 1/3 that carry the shear modulus, and an area energy that carries the rest: any Poisson's ratio.
 
-A network of central springs obeys Cauchy's relation, so isotropic springs have nu = 1/3 and no choice of stiffness
-changes it. Springs of ``E_s = 8 G / 3`` (see `springtune.springs.lattice`) have the shear modulus G; an energy of the
-area of each cell,
+Central springs obey Cauchy's relation, so isotropic networks have nu = 1/3. Springs of ``E_s = 8 G / 3`` (see
+`springtune.springs.lattice`) have the shear modulus G; an energy of the area of each cell,
 
 .. math:: W_A = \tfrac{1}{2} K_A t (A - A_0)^2 / A_0, \quad K_A = \frac{E (3 \nu - 1)}{2 (1 - \nu^2)},
 
-adds the rest of the bulk modulus. Negative for nu < 1/3, which is harmless: the sum stays positive. Exact in E, nu and
-G on equilateral rows and on rectangles with both diagonals; within 2 or 3 % on free meshes.
+adds the rest of the bulk modulus. K_A is negative for nu < 1/3, but the sum stays positive. E, nu and G are exact on
+equilateral rows and on rectangles with both diagonals, and within 2 or 3 % on free meshes.
 
-The idea is that of Golec and others (The Visual Computer 36, 2020, hal-02124471, abstract read): springs keep the
-Cauchy part, an energy of the volume alone the rest. The plane form is derived here.
+After Golec and others (The Visual Computer 36, 2020, hal-02124471, abstract read): springs keep the Cauchy part, a
+volume energy the rest. The plane form is derived here.
 """
 
 import numpy as np
@@ -23,10 +22,7 @@ from .lattice import COEFFICIENT, half_weight
 
 @definition("area", order=210)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs for the shear modulus and an area energy for the rest (after Golec 2019): any nu, no tuning.
-
-    Parameters, returns and errors as in `springtune.springs.lattice.springs`.
-    """
+    """Springs for the shear modulus and an area energy for the rest (after Golec 2019): any nu, no tuning."""
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 
     nu = material.poisson_ratio

@@ -10,7 +10,7 @@ Rows of isosceles triangles along x, base a and height h with ``nu = (a / 2h)^2`
 
 .. math:: k_{row} = \frac{E t h}{a}, \quad k_{diag} = \frac{E t a d^2}{2 h^3 (1 - \nu^2)}, \quad d^2 = a^2/4 + h^2,
 
-row edges on the outline halved. The shear modulus is 2 nu / (1 - nu) of what it should be in either case. Derived here.
+row edges on the outline halved. In both cases the shear modulus is 2 nu / (1 - nu) times the exact one. Derived here.
 """
 
 import numpy as np
@@ -27,8 +27,7 @@ SHAPE_TOLERANCE = 0.02
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs whose E and nu along x and y are exact, on rectangles or on isosceles rows made for nu; shear pays.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError for nu = 0, on slender
-    rectangles, and on rows of triangles that have another Poisson's ratio than the material.
+    Raises DefinitionError for nu = 0, on slender rectangles, and on rows of triangles made for another nu.
     """
     nu = material.poisson_ratio
     if nu <= 0:

@@ -1,4 +1,4 @@
-"""How a definition is declared, what it returns and how it refuses a mesh."""
+"""Declaration of definitions, their result and their errors."""
 
 import math
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from ..registry import Declared, Registry
 
 
 class DefinitionError(ValueError):
-    """A definition that cannot live on a mesh or with a material; the message says why and what to do.
+    """A definition that does not support a mesh or material; the message gives the reason and the remedy.
 
     Examples
     --------
@@ -39,18 +39,18 @@ class Springs:
     relative : ndarray of float, shape (n_edges,)
         Stiffness of each spring over the reference stiffness [1].
     energies : tuple
-        Energies of `springtune.mechanics.energies` besides the springs', their moduli over the reference stiffness.
+        Other energies of `springtune.mechanics.energies`, with moduli over the reference stiffness.
     lateral : float
-        Stress on the long faces over the axial stress [1] that goes with the springs in uniaxial scenes.
+        Stress on the long faces over the axial stress [1], in uniaxial scenes.
     evaluations : int
         Solves that finding the parameters took.
     linear_springs : ndarray of float, shape (n_edges,), or None
-        Stiffness over the reference stiffness at rest of springs whose law is part of an energy [1].
+        Stiffness at rest over the reference stiffness [1] of springs that belong to an energy.
 
     Raises
     ------
     DefinitionError
-        If the reference stiffness is not above zero, or a stiffness is no finite number.
+        If the reference stiffness is not above zero, or a stiffness is not finite.
 
     Examples
     --------
@@ -87,29 +87,28 @@ class Springs:
 
 @dataclass(frozen=True, eq=False)
 class Definition(Declared):
-    """A definition as a study knows it; made by the decorator `definition`.
+    """A definition of a study; made by the decorator `definition`.
 
     Attributes
     ----------
     name : str
         Label in a study and in the dataset.
     function : callable
-        Its formula: (mesh, material, thickness) and, where it `needs` something, that -> `Springs`.
+        Its formula: (mesh, material, thickness), and what it `needs`, -> `Springs`.
     order : float
         Place in the order of labels.
     uniform : bool
-        Whether all springs have one stiffness, so that it is a number to report.
+        Whether all springs have one stiffness, which is then reported.
     cells : tuple of int
-        Numbers of corners of the cells that it can have.
+        Supported cells, by number of corners.
     uniaxial : bool
-        Whether it is for loads alone that stretch a beam along its length, see `LoadKind.uniaxial`.
+        Whether it supports only loads along the beam, see `LoadKind.uniaxial`.
     needs : str
-        What it is told besides mesh, material and thickness: ``"stiffness"``, ``"cases"`` or nothing.
+        Fourth argument: ``"stiffness"``, ``"cases"`` or none.
     anisotropic : bool
-        Whether it takes materials that are not isotropic; others need Young's modulus and Poisson's ratio.
+        Whether it supports anisotropic materials.
     finite_strain : bool
-        Whether it has the material's law at finite strain, so that in nonlinear kinematics its error is against a
-        reference of that law.
+        Whether it has the material's law at finite strain; its nonlinear error is then against a reference of that law.
 
     Examples
     --------
@@ -129,7 +128,7 @@ class Definition(Declared):
     finite_strain: bool
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
-        """Springs of a mesh.
+        """Return the springs of a mesh.
 
         Parameters
         ----------
@@ -138,7 +137,7 @@ class Definition(Declared):
         thickness : float
             Thickness of the sheet [m].
         given : float or sequence of Case, optional
-            What the definition `needs`: a stiffness [N/m] or cases; not used by others.
+            What the definition `needs`: a stiffness [N/m] or cases; else unused.
 
         Returns
         -------
@@ -147,7 +146,7 @@ class Definition(Declared):
         Raises
         ------
         DefinitionError
-            If the definition cannot live on the mesh or with the material.
+            If the definition does not support the mesh or the material.
 
         Examples
         --------
@@ -186,7 +185,7 @@ class Definition(Declared):
 
 
 NEEDS = ("", "stiffness", "cases")
-"""What a definition may be told besides mesh, material and thickness."""
+"""Possible fourth arguments of a definition."""
 
 Function = TypeVar("Function", bound=Callable[..., Springs])
 
@@ -205,14 +204,14 @@ def definition(
     anisotropic: bool = False,
     finite_strain: bool = False,
 ) -> Callable[[Function], Function]:
-    """Declare a function to be a definition, by a decorator that returns it as it is.
+    """Declare a function as a definition, by a decorator that returns it unchanged.
 
     Parameters
     ----------
     name : str
         Label in a study and in the dataset.
     order : float, optional
-        Place in the order of labels: a number between those of its neighbours; at the end without.
+        Place in the order of labels, between its neighbours' numbers; by default last.
     uniform, cells, uniaxial, needs, anisotropic, finite_strain
         As of `Definition`.
 
@@ -224,7 +223,7 @@ def definition(
     Raises
     ------
     ValueError
-        If another function is the definition of that name; the same one, declared again, replaces the former.
+        If another function has that name; the same function, declared again, replaces the former.
 
     Examples
     --------
@@ -273,13 +272,7 @@ def triangles_only(mesh: Mesh) -> None:
 
 
 def rectangles_only(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Sides of the rectangles of a mesh, refusing any other mesh.
-
-    Returns
-    -------
-    along, across : ndarray of float, shape (n_quads,)
-        Lengths of each quadrilateral's first and second side [m].
-    """
+    """Return the lengths [m] of each rectangle's first and second side, shape (n_quads,); refuse any other mesh."""
     if len(mesh.triangles):
         raise DefinitionError("needs rectangles with both diagonals and the mesh has triangles; use mesh type 'braced'")
     lengths = mesh.edge_lengths[mesh.cell_edges[4]]

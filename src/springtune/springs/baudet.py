@@ -6,15 +6,15 @@ A rectangle of sides l and h gives, per element,
           k_l = \frac{E t ((3 \nu + 2) h^2 - l^2)}{4 l h (1 + \nu)}, \quad
           k_h = \frac{E t ((3 \nu + 2) l^2 - h^2)}{4 l h (1 + \nu)}.
 
-G is exact; the bulk modulus stays 3/4 E t whatever nu is, so Poisson's ratio moves the wrong way, and k_l is negative
-for (l/h)^2 > 3 nu + 2. Source: HAL hal-01493734 and hal-00994456, abstracts read, formulas derived again.
+G is exact; the bulk modulus is always 3/4 E t, so Poisson's ratio moves the wrong way, and k_l is negative for
+(l/h)^2 > 3 nu + 2. Source: HAL hal-01493734 and hal-00994456, abstracts read, formulas derived again.
 
 Baudet's own correction adds forces: here the lateral stress (1 - 3 nu)/2 of the axial one on the long faces, outwards
-for nu < 1/3, derived as the stress that makes E and nu exact. It needs the axial force, so it is for uniaxial scenes.
+for nu < 1/3, which makes E and nu exact (derived). It needs the axial force, so it is for uniaxial scenes.
 
-The incompressibility correction is in the manner of Flechon (2011), whose text could not be read: ours. An area energy
-of modulus ``E (3 nu - 1) / (4 (1 - nu))`` completes the bulk modulus to E / (2 (1 - nu)), so that areas are kept as
-well as they should be under any load; G stays exact, E and nu are not, since the springs are not isotropic.
+The incompressibility correction is ours, after Flechon (2011), whose text could not be read. An area energy of
+modulus ``E (3 nu - 1) / (4 (1 - nu))`` completes the bulk modulus to E / (2 (1 - nu)) under any load. G stays exact;
+E and nu are not, since the springs are not isotropic.
 """
 
 import numpy as np
@@ -28,8 +28,7 @@ from .base import Springs, definition, from_rectangles, not_negative, rectangles
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Rectangles with both diagonals that keep the shear modulus (Baudet 2009); nu moves the wrong way.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on cells other than
-    rectangles, and on rectangles slender enough for a negative stiffness.
+    Raises DefinitionError on other cells, and on rectangles slender enough for a negative stiffness.
     """
     along, across = rectangles_only(mesh)
     nu = material.poisson_ratio
@@ -42,20 +41,14 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 @definition("baudet-corrected", order=110, cells=(4,), uniaxial=True)
 def corrected(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone.
-
-    Parameters, returns and errors as in `springs`.
-    """
+    """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone."""
     plain = springs(mesh, material, thickness)
     return Springs(plain.reference, plain.relative, lateral=(1 - 3 * material.poisson_ratio) / 2)
 
 
 @definition("flechon", order=120, cells=(4,))
 def incompressible(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours).
-
-    Parameters, returns and errors as in `springs`.
-    """
+    """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours)."""
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 
     plain = springs(mesh, material, thickness)

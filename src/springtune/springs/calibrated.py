@@ -1,7 +1,7 @@
 """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
 
 On each curve of the calibration beam, one a mesh size, the best stiffness is where the deformation error of a stable
-equilibrium is zero; the mean over the mesh sizes serves every beam, size and load of that mesh type and material.
+equilibrium is zero. The mean over mesh sizes serves every beam, size and load of that mesh type and material.
 """
 
 import math
@@ -14,17 +14,9 @@ from .base import Springs, definition
 
 
 def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
-    """Calibrated stiffness from the best stiffness of each mesh size.
+    """Return the mean of the best stiffnesses of curves [N/m].
 
-    Parameters
-    ----------
-    curves : iterable of (str, float, str)
-        Name of each curve, its best stiffness [N/m], NaN where there is none, and why there is none.
-
-    Returns
-    -------
-    float
-        Their mean [N/m].
+    Each has a name, its best stiffness [N/m] or NaN, and the reason for NaN.
     """
     curves = list(curves)
     if not curves:
@@ -37,8 +29,5 @@ def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
 
 @definition("calibrated", order=20, uniform=True, needs="stiffness")
 def springs(mesh: Mesh, material: Material, thickness: float, stiffness: float) -> Springs:
-    """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
-
-    Parameters and returns as in `springtune.springs.paper`.
-    """
+    """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves."""
     return paper.springs(mesh, material, thickness, stiffness)

@@ -1,7 +1,7 @@
 r"""Triangular biquadratic springs (Delingette, IEEE TVCG 14(2):329, 2008): linear triangles written as springs.
 
-With ``lambda = E nu / (1 - nu^2)``, ``mu = E (1 - nu) / (1 - nu^2)`` and c_i the cotangent of the angle at corner i of
-a triangle of area A, its side opposite corner i has the tensile and two sides i, j the coupling stiffness
+With ``lambda = E nu / (1 - nu^2)``, ``mu = E (1 - nu) / (1 - nu^2)`` and c_i the cotangent of the angle at corner i
+of a triangle of area A, its side opposite corner i has the tensile and two sides i, j the coupling stiffness
 
 .. math:: k_i = t \frac{2 c_i^2 (\lambda + \mu) + \mu}{16 A}, \quad
           \gamma_{ij} = t \frac{2 c_i c_j (\lambda + \mu) - \mu}{16 A},
@@ -9,17 +9,17 @@ a triangle of area A, its side opposite corner i has the tensile and two sides i
 .. math:: W = \sum_i \tfrac{k_i}{4} (l_i^2 - L_i^2)^2
             + \sum_{i<j} \tfrac{\gamma_{ij}}{2} (l_i^2 - L_i^2) (l_j^2 - L_j^2).
 
-Together they are the St. Venant-Kirchhoff energy of the linear triangle, exactly, on any mesh, for any nu and at any
-strain. At rest side i has the spring constant ``2 L_i^2 k_i``. On an equilateral triangle the coupling vanishes at
-nu = 1/3; without it E is wrong by (10 - 6 nu) / (9 (1 - nu^2)) there.
+Together they are exactly the St. Venant-Kirchhoff energy of the linear triangle, for any mesh, nu and strain. At rest
+side i has the spring constant ``2 L_i^2 k_i``. On an equilateral triangle the coupling vanishes at nu = 1/3; without
+it E is wrong by (10 - 6 nu) / (9 (1 - nu^2)).
 
-The same holds for any anisotropy (derived here): the three strains of Green and Lagrange are linear in the changes q_i
-of the three squared lengths. With n_i the side opposite corner i, turned by a right angle, q_i alone is the strain
+For any anisotropy (derived here): Green's strains are linear in the changes q_i of the squared lengths. With n_i the
+side opposite corner i, turned by a right angle, q_i alone is the strain
 
 .. math:: e_i = - \frac{1}{8 A^2} \left( n_{jx} n_{kx}, \; n_{jy} n_{ky}, \; n_{jx} n_{ky} + n_{jy} n_{kx} \right)
 
-in Voigt's order, so the energy ``A t/2 e^T C e`` is a quadratic form of the q_i, whose six coefficients are one to one
-with the six constants of the material: ``k_i = 2 A t e_i^T C e_i`` and ``gamma_ij = 2 A t e_i^T C e_j``.
+in Voigt's order, so the energy ``A t/2 e^T C e`` has ``k_i = 2 A t e_i^T C e_i`` and ``gamma_ij = 2 A t e_i^T C
+e_j``: six coefficients, one to one with the material's six constants.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ from .base import Springs, definition, membrane_stiffness, triangles_only, zero
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles of any material.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    Raises DefinitionError on quadrilaterals.
     """
     return _springs(mesh, material, thickness, coupled=True)
 
@@ -42,7 +42,7 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
 def tensile(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """The tensile part of Delingette's springs alone: what is left without coupling.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    Raises DefinitionError on quadrilaterals.
     """
     return _springs(mesh, material, thickness, coupled=False)
 

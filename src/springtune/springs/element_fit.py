@@ -3,8 +3,8 @@ r"""Springs fitted to the stiffness matrix of each finite element, none negative
 .. math:: \min_{k \ge 0} \; \Big\| \sum_i k_i B_i - K_{FEM} \Big\|_F
 
 for each cell, with B_i the matrix of a unit spring on its edge i and K_FEM that of the linear triangle or of the
-bilinear rectangle (four Gauss points). After Natsupakpong and Cavusoglu (Graph. Models 72:61, 2010; abstract read). It
-matches the constrained modulus rather than E: on an equilateral triangle E is wrong by 8 / (9 (1 - nu^2)).
+bilinear rectangle (four Gauss points). After Natsupakpong and Cavusoglu (Graph. Models 72:61, 2010; abstract read).
+It matches the constrained modulus rather than E: on an equilateral triangle E is wrong by 8 / (9 (1 - nu^2)).
 """
 
 import numpy as np
@@ -18,10 +18,7 @@ from .fitting import least_squares
 
 @definition("element-fit", order=140, anisotropic=True)
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
-    """Springs fitted by least squares to the stiffness matrix of each finite element, none negative.
-
-    Parameters and returns as in `springtune.springs.lattice.springs`.
-    """
+    """Springs fitted by least squares to the stiffness matrix of each finite element, none negative."""
     if isinstance(material, Material):
         nu = material.poisson_ratio
         elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)

@@ -1,23 +1,21 @@
 r"""Springs alone that are nearest to a material of any anisotropy in the energy of even strains, none negative.
 
-A spring of stiffness k and length L along the unit vector n, in a cell of area A that strains evenly, has the stiffness
-``w m m^T`` with ``w = k L^2 / (A t)`` and, in Voigt's order, ``m = (n_x^2, n_y^2, n_x n_y)``. The springs of a cell are
-those that minimise
+A spring of stiffness k and length L along the unit vector n, in an evenly strained cell of area A, has the stiffness
+``w m m^T`` with ``w = k L^2 / (A t)`` and, in Voigt's order, ``m = (n_x^2, n_y^2, n_x n_y)``. The springs of a cell
+minimise
 
 .. math:: \Big\| S^{1/2} \Big( \sum_i w_i m_i m_i^T - C \Big) S^{1/2} \Big\|_F, \quad S = C^{-1}, \quad w \ge 0,
 
-the sum of squares of the relative errors of their energy: soft and stiff directions of a material count alike. Where no
-spring is zero,
+the squared relative errors of their energy: soft and stiff directions count alike. Where no spring is zero,
 
 .. math:: \sum_j (m_i^T S m_j)^2 w_j = m_i^T S m_i = 1 / E(n_i),
 
-the right side being the inverse of Young's modulus along the spring. Whatever the springs, C12 = C66 (Cauchy). Derived
-here. Exact
+the inverse of Young's modulus along the spring. Springs always have C12 = C66 (Cauchy). Derived here. Exact
 
 - at nu = 1/3 on equilateral triangles, where it is `springtune.springs.lattice`;
 - for orthotropic materials with C12 = C66, axes along the mesh, on rows of isosceles triangles of base a and height
-  ``h = a/2 sqrt(C22 / C12)``, with springs that are never negative, and on rectangles of sides a, b with
-  ``C12 / C22 <= (a/b)^2 <= C11 / C12``.
+  ``h = a/2 sqrt(C22 / C12)``, with springs that are never negative, and on rectangles of sides a, b with ``C12 / C22
+  <= (a/b)^2 <= C11 / C12``.
 """
 
 import numpy as np
@@ -32,8 +30,7 @@ from .fitting import least_squares
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Springs fitted by least squares to the strain energy of any material, none negative: C12 = C66 whatever is asked.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals other
-    than rectangles.
+    Raises DefinitionError on quadrilaterals other than rectangles.
     """
     reference = membrane_stiffness(material, 1.0)
     compliance = np.linalg.inv(material.plane_stress / reference)

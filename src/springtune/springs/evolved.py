@@ -1,7 +1,7 @@
 """Stiffness of each spring by a genetic search on the displacements of a scene's reference.
 
-As Bianchi and others (2003, 2004) did for topology and stiffness, here for stiffness: a population of networks, of
-which mutants and crossings replace the worse ones. The search is scipy's differential evolution, from a fixed seed.
+As Bianchi and others (2003, 2004) did for topology and stiffness, here for stiffness: mutants and crossings replace
+the worse networks of a population. Uses scipy's differential evolution, from a fixed seed.
 """
 
 import math
@@ -22,10 +22,7 @@ POPULATION = 20
 def springs(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
-    """Stiffness of each spring by a genetic search on a scene's reference displacements.
-
-    Parameters and returns as in `springtune.springs.annealed.springs`.
-    """
+    """Stiffness of each spring by a genetic search on a scene's reference displacements."""
     from scipy.optimize import differential_evolution  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)

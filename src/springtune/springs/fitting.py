@@ -6,18 +6,10 @@ import numpy as np
 
 
 def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Non-negative springs of each cell that are nearest to what is wanted: of ``k . products . k - 2 wanted . k``.
+    """Return the non-negative springs k of each cell that minimise ``k . products . k - 2 wanted . k``.
 
-    Parameters
-    ----------
-    products : ndarray of float, shape (n_cells, n_springs, n_springs)
-        Scalar products of what the springs of a cell, each of unit stiffness, do.
-    wanted : ndarray of float, shape (n_cells, n_springs)
-        Their scalar products with what is wanted.
-
-    Returns
-    -------
-    ndarray of float, shape (n_cells, n_springs)
+    `products` (n_cells, n_springs, n_springs) are scalar products of unit springs' effects, `wanted` (n_cells,
+    n_springs) those with the wanted effect.
 
     Examples
     --------

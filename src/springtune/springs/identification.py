@@ -1,12 +1,11 @@
-"""Stiffness of each spring from displacements that the network is to have: what searches minimise.
+"""Stiffness of each spring from wanted displacements: the misfit that searches minimise.
 
-A case is a load and the displacements that it should cause. The misfit of a network is ::
+A case is a load and its wanted displacements. The misfit of a network over all particles is ::
 
     J = 1/2 sum over cases |u - u*|^2 / |u*|^2
 
-over all particles. Unknown are the logarithms of the stiffnesses, from a tenth to ten times those of
-`springtune.springs.lattice`; where the material is not isotropic those of `springtune.springs.energy_fit`, springs that
-are nothing there taken for a tenth of their mean.
+Unknowns are logarithms of the stiffnesses, from a tenth to ten times those of `springtune.springs.lattice`; for an
+anisotropic material those of `springtune.springs.energy_fit`, with a tenth of their mean in place of zeros.
 """
 
 from collections.abc import Sequence
@@ -25,16 +24,9 @@ SPAN = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A load and what it should do.
+    """A load and its wanted displacements.
 
-    Attributes
-    ----------
-    held : ndarray of bool, shape (n_points, 2)
-        Directions that cannot move.
-    forces : ndarray of float, shape (n_points, 2)
-        Forces on the particles [N].
-    displacements : ndarray of float, shape (n_points, 2)
-        Displacements that the network should have [m].
+    `held` (n_points, 2) are fixed directions, `forces` (n_points, 2) in N, `displacements` (n_points, 2) in m.
     """
 
     held: np.ndarray
@@ -43,12 +35,9 @@ class Case:
 
 
 def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Case]:
-    """Tension along x and y and shear of the free mesh under even tractions; what it should do is known exactly.
+    """Return tension along x and y and shear of the free mesh under even tractions; exact displacements are known.
 
-    Parameters
-    ----------
-    thickness : float
-        Thickness of the sheet [m].
+    `thickness` is in m.
     """
     from ..mechanics.moduli import free_body, outline_forces  # here: see `springtune.springs`
 
@@ -104,7 +93,7 @@ def _start(mesh: Mesh, material: AnyMaterial, thickness: float) -> tuple[float, 
 
 
 class Misfit:
-    """Misfit of networks that differ in stiffness, its gradient, and how often it was asked."""
+    """Misfit of networks that differ in stiffness, its gradient, and the number of evaluations."""
 
     def __init__(self, mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]):
         from ..mechanics.network import Network  # here: see `springtune.springs`

@@ -1,15 +1,14 @@
 """Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3.
 
-An equilateral network of springs k has ``E t = 2 k / sqrt(3)`` and nu = 1/3 whatever k is (Cauchy relations of a
-network of central springs). Each triangle contributes ``sqrt(3)/4 E t`` to its edges: an edge inside gets
-``sqrt(3)/2 E t``, one on the outline, which belongs to one triangle, half of it.
+An equilateral network of springs k has ``E t = 2 k / sqrt(3)`` and nu = 1/3 (Cauchy's relation of central springs).
+Each triangle gives ``sqrt(3)/4 E t`` to its edges: an edge inside has ``sqrt(3)/2 E t``, an outline edge half of it.
 
-A rectangle with both diagonals, sides l and h, contributes ``3 E t (3 h^2 - l^2) / (16 l h)`` to those of length l,
-likewise to those of length h, and ``3 E t (l^2 + h^2) / (16 l h)`` to its diagonals: 3/8 E t each on a square. That is
-exact at nu = 1/3 (Baudet's rectangle, see `springtune.springs.baudet`, at that ratio).
+A rectangle with both diagonals, sides l and h, gives ``3 E t (3 h^2 - l^2) / (16 l h)`` to sides of length l,
+likewise to those of length h, and ``3 E t (l^2 + h^2) / (16 l h)`` to its diagonals: 3/8 E t each on a square. This
+is exact at nu = 1/3 (Baudet's rectangle, `springtune.springs.baudet`).
 
-With full stiffness on the outline a beam of height H with edges a is too stiff by ``1 + sqrt(3)/2 a/H`` in tension and,
-to leading order, by ``1 + 3 sqrt(3)/2 a/H`` in bending.
+With full stiffness on the outline a beam of height H with edges a is too stiff by ``1 + sqrt(3)/2 a/H`` in tension
+and, to leading order, by ``1 + 3 sqrt(3)/2 a/H`` in bending.
 
 Assumptions: near-equilateral triangles, or rectangles; exact on equilateral rows and on rectangles.
 """
@@ -32,10 +31,7 @@ COEFFICIENT = math.sqrt(3) / 2
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Closed form of the equilateral lattice, half weight on the outline: exact E with no tuning, nu = 1/3.
 
-    Parameters
-    ----------
-    thickness : float
-        Thickness t of the sheet [m].
+    `thickness` is t [m].
     """
     return Springs(COEFFICIENT * material.young_modulus * thickness, half_weight(mesh))
 
@@ -60,20 +56,10 @@ def uniform(mesh: Mesh) -> np.ndarray:
 
 
 def predicted_stiffness(material: Material, beam: Beam, mesh_size: float, load: str = "traction") -> float:
-    """Uniform stiffness that gives a beam its stiffness under a load, outline included.
+    """Return the uniform stiffness [N/m] that is exact for a beam under a load, outline included; NaN if unknown.
 
-    ``k = sqrt(3)/2 E t / (1 + c sqrt(3)/2 a/H)``, from the excess of the full outline: c = 1 in tension and
-    compression, 3 in bending, where outer fibres count most.
-
-    Parameters
-    ----------
-    mesh_size : float
-        Edge length a [m].
-
-    Returns
-    -------
-    float
-        Stiffness [N/m]; NaN for loads without a closed form.
+    ``k = sqrt(3)/2 E t / (1 + c sqrt(3)/2 a/H)``, with c = 1 in tension and compression, 3 in bending, and
+    `mesh_size` a [m].
     """
     kind = LOADS[load].kind
     known = kind.clamped and kind.normal == 0

@@ -1,7 +1,7 @@
 """Springs matched to finite elements at nu = 1/3: triangle and square.
 
-The linearised spring element is matched to the matrix of the finite element; the match requires nu = 1/3 in the plane
-(Lloyd, Szekely and Harders, IEEE TVCG 13(5):1081, 2007; first page read, formulas derived again).
+The linearised spring element matches the matrix of the finite element, which requires nu = 1/3 in the plane (Lloyd,
+Szekely and Harders, IEEE TVCG 13(5):1081, 2007; first page read, formulas derived again).
 
 - Equilateral triangle: ``sqrt(3)/4 E t`` for each of its edges, which is `springtune.springs.lattice`; exact.
 - Square: ``5/16 E t`` for each side and ``7/16 E t`` for each diagonal, which fits the off-diagonal blocks of the
@@ -25,8 +25,7 @@ SIDE, DIAGONAL = 5 / 16, 7 / 16
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs matched to finite elements at nu = 1/3: equilateral triangle, or square (Lloyd 2007).
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals other
-    than squares.
+    Raises DefinitionError on quadrilaterals other than squares.
     """
     if not len(mesh.quads):
         return lattice.springs(mesh, material, thickness)

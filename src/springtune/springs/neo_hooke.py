@@ -4,17 +4,15 @@ An incompressible sheet in plane stress, nu = 0.5, has the energy
 
 .. math:: W = \tfrac{\mu t}{2} A_0 (tr C + J^{-2} - 3), \quad \mu = E / 3,
 
-on a triangle whose area was A_0 and is J A_0. There ``tr C A_0`` is half the sum over its sides of the opposite
-angle's cotangent times the length squared, so that the energy is that of springs of zero rest length, from each
-triangle ``mu t cot / 2``, and of its area, ``mu t A_0 / 2 (A_0 / A)^2``: exactly linear triangles, on any mesh and at
-any strain. Springs opposite obtuse angles push; no triangle can turn inside out.
+on a triangle of area A_0 at rest and J A_0 now. ``tr C A_0`` is half the sum over its sides of the opposite angle's
+cotangent times the squared length. So the energy is that of springs of zero rest length, ``mu t cot / 2`` from each
+triangle, and of its area, ``mu t A_0 / 2 (A_0 / A)^2``: exactly linear triangles, on any mesh and at any strain.
+Springs opposite obtuse angles push; no triangle can invert.
 
-Below nu = 0.5 it is the law of CalculiX and Abaqus,
-``mu/2 (J_3^(-2/3) I_1 - 3) + K/2 (J_3 - 1)^2`` per volume with mu = E / (2 (1 + nu)) and K = E / (3 (1 - 2 nu)), whose
-stretch across the sheet is eliminated triangle by triangle: a function of tr C and J as well. With nu towards 0.5 it
-becomes the former. It is that of the references at finite strain (`springtune.reference.finite_strain`) for any nu;
-derived here, checked against linear triangles of the deformation gradient. At small strain both are linear triangles,
-as `delingette` is.
+Below nu = 0.5 it is the law of CalculiX and Abaqus, ``mu/2 (J_3^(-2/3) I_1 - 3) + K/2 (J_3 - 1)^2`` per volume with
+mu = E / (2 (1 + nu)) and K = E / (3 (1 - 2 nu)); the stretch across the sheet is eliminated triangle by triangle. The
+references at finite strain (`springtune.reference.finite_strain`) have the same law. Derived here, checked against
+linear triangles of the deformation gradient. At small strain both are linear triangles, as `delingette`.
 """
 
 import numpy as np
@@ -28,7 +26,7 @@ from .base import Springs, definition, triangles_only, zero
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of zero rest length and areas: equal to linear triangles of neo-Hookean rubber, any nu, any strain.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    Raises DefinitionError on quadrilaterals.
     """
     from ..mechanics.energies import NeoHookeEnergy, YeohEnergy  # here: see `springtune.springs`
 

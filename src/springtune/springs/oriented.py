@@ -1,9 +1,9 @@
 """Uniform stiffness from the affine moduli of the mesh along x: density that knows the directions of the springs.
 
-Were all springs to follow the strain of the sheet (Cauchy and Born), the moduli of a uniform network would be
-``C_ijkl = k / (A t) sum L^2 n_i n_j n_k n_l``. The stiffness is the one that makes Young's modulus along x, from the
-inverse of C, that of the material. An upper bound of the modulus of a disordered network, hence a lower one of k; exact
-on a lattice. Derived here.
+If all springs followed the strain of the sheet (Cauchy and Born), a uniform network would have the moduli ``C_ijkl =
+k / (A t) sum L^2 n_i n_j n_k n_l``. The stiffness makes Young's modulus along x, from the inverse of C, the
+material's. This is an upper bound of a disordered network's modulus, so k is a lower bound; exact on a lattice.
+Derived here.
 """
 
 import numpy as np
@@ -18,8 +18,7 @@ from .lattice import uniform
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Uniform stiffness from the affine moduli of the mesh along x, directions of springs and outline included.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError where the springs of the
-    mesh do not carry a load along x.
+    Raises DefinitionError if the springs of the mesh do not carry a load along x.
     """
     x, y = (mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]).T
     parts = np.stack([x * x, y * y, x * y])  # of the strain of each spring: xx, yy and shear

@@ -1,16 +1,16 @@
 r"""Rectangles with both diagonals and an energy of their area: orthotropic sheets, exactly.
 
-With the axes of the material along the sides a and b of a rectangle, the material's stiffness in plane stress C and
-``K = C12 - C66``, the rectangle gives its diagonals, each of its sides a and each of its sides b
+With the material's axes along the sides a and b of a rectangle, its stiffness in plane stress C and ``K = C12 -
+C66``, the rectangle gives its diagonals, each of its sides a and each of its sides b
 
 .. math:: k_d = C_{66} t \frac{a^2 + b^2}{2 a b}, \quad
           k_a = \frac{t b}{2 a} \Big( C_{11} - K - C_{66} \frac{a^2}{b^2} \Big), \quad
           k_b = \frac{t a}{2 b} \Big( C_{22} - K - C_{66} \frac{b^2}{a^2} \Big),
 
-and its area the energy :math:`\tfrac{1}{2} K t (A - A_0)^2 / A_0`. Springs obey Cauchy's relation, so the diagonals,
-which alone resist shear, bring C66 to C12 as well; the area's energy brings K to C11, C22 and C12. On squares
-``k_d = C66 t``, ``k_a = (C11 - C12) t / 2`` and ``k_b = (C22 - C12) t / 2``. All four constants are exact for every
-even strain. Springs alone, K = 0, do for materials with C12 = C66.
+and its area the energy :math:`\tfrac{1}{2} K t (A - A_0)^2 / A_0`. The diagonals, which alone resist shear, add C66
+to C12 as well (Cauchy's relation); the area adds K to C11, C22 and C12. On squares ``k_d = C66 t``, ``k_a = (C11 -
+C12) t / 2`` and ``k_b = (C22 - C12) t / 2``. All four constants are exact for every even strain. For C12 = C66, K =
+0: springs alone suffice.
 
 No spring is negative on squares while C12 <= C11 and C12 <= C22; else on rectangles whose ratio a / b is from
 ``sqrt(C66 / (C22 - K))`` to ``sqrt((C11 - K) / C66)``. Derived here.
@@ -32,8 +32,8 @@ COUPLING = 1e-9
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Rectangles with both diagonals and an area energy: all four constants of an orthotropic sheet, no tuning.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on cells other than
-    rectangles, where the axes of the material are not along their sides, and where a side's spring would be negative.
+    Raises DefinitionError on other cells, if the material's axes are not along their sides, and for a negative side
+    spring.
     """
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 

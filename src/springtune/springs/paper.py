@@ -14,9 +14,6 @@ from .lattice import uniform
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float, stiffness: float) -> Springs:
     """Uniform stiffness as printed: the value that the study states for a mesh type and material.
 
-    Parameters
-    ----------
-    stiffness : float
-        Stiffness of every spring [N/m].
+    `stiffness` is in N/m.
     """
     return Springs(stiffness, uniform(mesh))

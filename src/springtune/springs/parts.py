@@ -1,16 +1,14 @@
 """Springs of a body of several materials: a definition on each part, added up.
 
-Parts of one material are one body, whose springs the definition derives as if it were alone; then
+Parts of one material are one body, derived as if alone; then
 
-- springs that two materials share, on the edges between them, are added: each side gives what it gives to an outline.
-  Definitions that give each cell's share to its edges (half weight on the outline among them) are so derived exactly:
-  with equal materials the sum is what one material gives, to rounding;
-- energies of one kind are one, of the cells of all parts that have it; all are over the first part's reference
-  stiffness;
-- a definition that gives all springs one stiffness gives each part its own, and springs between parts the mean.
+- springs between two materials are the sum of both sides' outline springs. This is exact for definitions that give
+  each cell's share to its edges, such as half weight on the outline: equal materials give what one material gives;
+- energies of one kind are joined over all parts, over the first part's reference stiffness;
+- a definition of one stiffness gives each part its own, and springs between parts the mean.
 
 `patch`, `patch-area` and `adjoint` test each part alone, and `density` and `oriented` count each part's own springs:
-with equal materials they give nearly what one material gives, not exactly.
+with equal materials they give nearly what one material gives.
 """
 
 from collections.abc import Mapping
@@ -38,7 +36,7 @@ CELL_FIELDS = "points", "corners"
 
 
 class Derives(Protocol):
-    """What a definition has to have: one of `springtune.springs.DEFINITIONS`, or of one's own."""
+    """Interface of a definition, the package's or the user's own."""
 
     @property
     def uniform(self) -> bool:
@@ -46,23 +44,18 @@ class Derives(Protocol):
 
     @property
     def uniaxial(self) -> bool:
-        """Whether it is for loads alone that stretch a beam along its length."""
+        """Whether it supports only loads along a beam."""
 
     @property
     def needs(self) -> str:
-        """What it is told besides mesh, material and thickness."""
+        """Its fourth argument, or an empty string."""
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Springs of a mesh."""
 
 
 def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
-    """Cells of each part, the main one's among them.
-
-    Returns
-    -------
-    dict of str to dict of int to ndarray of bool, shape (n_cells,)
-        By part and number of corners; parts without cells are left out.
+    """Return the cells of each part, the main one included, by part and number of corners; empty parts are left out.
 
     Examples
     --------
@@ -85,7 +78,7 @@ def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
 
 
 def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
-    """Refuse materials that do not go with the parts of a body.
+    """Refuse materials that do not match the parts of a body.
 
     Examples
     --------
@@ -115,12 +108,7 @@ def derive_by_parts(
     thickness: float,
     given: object = None,
 ) -> Springs:
-    """Springs of a body whose parts are of several materials.
-
-    Parameters
-    ----------
-    thickness : float
-        Of the sheet [m].
+    """Return the springs of a body with parts of several materials; `thickness` in m.
 
     Examples
     --------
@@ -207,9 +195,9 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
 
 
 def _law(energy: "Energy") -> tuple[object, ...]:
-    """What energies of one kind have to share to be one: numbers of all cells, and how many each cell has.
+    """Return what energies of one kind must share to be joined: numbers of cells, and values a cell.
 
-    Not of laws of rubber, of which one may have more terms than another, and another range of data.
+    Rubber laws may differ in their terms and in their range of data.
     """
     names = [part.name for part in fields(energy) if part.name not in (*CELL_FIELDS, "coefficients", "largest")]  # type: ignore[arg-type]
     values = [getattr(energy, name) for name in names]

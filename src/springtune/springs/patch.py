@@ -1,14 +1,14 @@
 """One scalar from one patch test of the very mesh: Young's modulus exact on any mesh, no reference solution.
 
-``k_e = s k_e,0`` with ``s = E / E_eff``, where E_eff is what the network of `springtune.springs.lattice` (or of
-`springtune.springs.area`) has: one factorization of the mesh, scaled out of all later ones.
+``k_e = s k_e,0`` with ``s = E / E_eff``, where E_eff is that of the network of `springtune.springs.lattice` (or of
+`springtune.springs.area`): one factorization of the mesh, scaled out of all later ones.
 
-A strip between straight faces, such as a beam, is tested between rollers on its ends: E along x. Any other mesh, with
-holes or slanted sides, is tested by three affine displacements of its whole outline, rims of holes included: a
-continuum of any shape has an even strain then. Their forces are a stiffness C, and with ``S = C^-1`` 1/E_eff is the
-mean over all directions of the strain along a unit pull, ``(3 S11 + 3 S22 + 2 S12 + S66) / 8``.
+A strip between straight faces, such as a beam, is tested between rollers on its ends: E along x. Any other mesh is
+tested by three affine displacements of its whole outline, rims of holes included, under which a continuum of any
+shape has an even strain. Their forces are a stiffness C, and with ``S = C^-1`` 1/E_eff is the mean over all
+directions of the strain along a unit pull, ``(3 S11 + 3 S22 + 2 S12 + S66) / 8``.
 
-It repairs what disorder costs in tension; bending, shear and nu stay what the springs make them. Derived here.
+It repairs what disorder costs in tension; bending, shear and nu stay those of the springs. Derived here.
 """
 
 from dataclasses import replace
@@ -21,19 +21,13 @@ from .base import Springs, definition
 
 @definition("patch", order=190)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not.
-
-    Parameters, returns and errors as in `springtune.springs.lattice.springs`.
-    """
+    """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not."""
     return _scaled(lattice.springs(mesh, material, thickness), mesh, material, thickness)
 
 
 @definition("patch-area", order=200)
 def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh.
-
-    Parameters, returns and errors as in `springtune.springs.lattice.springs`.
-    """
+    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh."""
     return _scaled(area.springs(mesh, material, thickness), mesh, material, thickness)
 
 

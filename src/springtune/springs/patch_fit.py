@@ -1,37 +1,33 @@
 r"""Springs fitted, none negative, to patch tests under even, linear, quadratic and cubic stresses; no reference.
 
-A sheet under no body force, whatever its outline and its holes, has displacements known in closed form where its
-stresses are polynomials (Kolosov and Muskhelishov): with z = x + i y and analytic phi, psi
+A sheet under no body force, whatever its outline and its holes, has displacements in closed form for polynomial
+stresses (Kolosov and Muskhelishov): with z = x + i y and analytic phi, psi
 
 .. math:: 2 \mu (u + i v) = \kappa \varphi - z \overline{\varphi'} - \overline{\psi}, \qquad
           \sigma_{xx} + \sigma_{yy} = 4 \, \mathrm{Re} \, \varphi', \qquad
           \sigma_{yy} - \sigma_{xx} + 2 i \sigma_{xy} = 2 (\bar z \varphi'' + \psi'),
 
-kappa = (3 - nu) / (1 + nu), mu = E / (2 (1 + nu)). phi and psi = z^m, i z^m for m = 1 to 4 give 15 tests: tension and
-shear, 3 of even stress; bending and its like, 4 of linear stress; 4 of quadratic, as under shear forces; 4 of cubic.
-They are combined so that the sheet's own energy under test a with the displacements of test b,
-``G_ab = integral of t_a . u_b along the outline``, is the unit matrix.
+kappa = (3 - nu) / (1 + nu), mu = E / (2 (1 + nu)). phi and psi = z^m, i z^m for m = 1 to 4 give 15 tests: 3 of even
+stress (tension, shear), 4 of linear (bending), 4 of quadratic (shear forces), 4 of cubic stress. They are combined so
+that the sheet's energies ``G_ab = integral of t_a . u_b along the outline`` are the unit matrix.
 
-Let F have as columns the forces of their tractions on the particles, K(k) be the stiffness of the free network. What
-these tests measure of the network is ``M = F^T K^-1 F``; of the sheet it is 1, the unit matrix. The springs minimise
+Let F have the tests' forces on the particles as columns, and K(k) be the stiffness of the free network. The network
+has ``M = F^T K^-1 F`` in place of the unit matrix 1. The springs minimise
 
 .. math:: \| M(k) - 1 \|^2 + \frac{\lambda}{n} \sum_e \ln^2 (k_e / k_{e,0})
 
 about those of `springtune.springs.van_gelder`, k0 (form for nu = 0: exact on lattices), with lambda = 0.1. With the
 elongations e = B K^-1 F of a spring, ``d M / d ln k_e = - k_e e e^T``: at most four Gauss-Newton steps, each one
-factorization of the mesh, 15 solves and a system of 120 unknowns. A logarithm keeps every spring above zero, so the
-network of any triangles is stable at rest. Turning, shifting or scaling the mesh leaves the tests' span, hence the
-springs, as they are.
+factorization of the mesh, 15 solves and a system of 120 unknowns. Logarithms keep every spring above zero, so any
+triangles are stable at rest. Turning, shifting or scaling the mesh does not change the springs.
 
-Central springs have nu = 1/3 (Cauchy's relation), so the tests are those of a material of that ratio and of the E
-asked for: the tests say nothing of another nu. Cauchy's relation holds cell by cell where cells repeat: in rows of
-isosceles triangles of base a and height h, whatever their springs are, ``C2222 / C1212 = (2 h / a)^2``, which is 3 if
-isotropic. In rows of h = a, as free meshes of 5 mm have in 20 mm, it is 4: one of the two is off by 1/7 or more, and no
-fit of springs that repeat repairs it. Derived here.
+Central springs have nu = 1/3 (Cauchy's relation), so the tests have that ratio and the wanted E, whatever nu is.
+Where cells repeat, Cauchy's relation holds in each: rows of isosceles triangles of base a and height h have ``C2222 /
+C1212 = (2 h / a)^2`` with any springs, which is 3 if isotropic. In rows of h = a, as in free meshes of 5 mm in 20 mm,
+it is 4: one of the two is off by 1/7 or more. Derived here.
 
-Kind of tests, lambda and steps are chosen, not derived: by what they give on the beams and shapes of
-docs/which-definition.md, which also names where they fail, in curved beams above all. Assumptions: triangles, in one
-part.
+The tests, lambda and steps are chosen by results on the beams and shapes of docs/which-definition.md, which names
+where they fail, in curved beams above all. Assumptions: triangles, in one part.
 """
 
 from collections.abc import Iterator
@@ -53,22 +49,20 @@ TESTS = 4 * TEST_DEGREE - 1
 """Polynomial solutions up to that degree that are no rigid motion."""
 
 LEAST_TOLD = 1e-12
-"""Energy of a test over the largest one's below which rounding is all that it tells, as in very slender sheets [1]."""
+"""Energy of a test over the largest one's below which it is rounding, as in very slender sheets [1]."""
 
 CHANGE_WEIGHT = 0.1
 """lambda: weight of the mean squared logarithm of a spring's change against the squared misfit of the tests [1]."""
 
 STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.3
-"""Gauss-Newton steps at most; largest change of a logarithm in one of them, and that below which it is the last [1]:
-the next would be some tenth of it."""
+"""Most Gauss-Newton steps; largest change of a logarithm in one, and that below which it is the last [1]."""
 
 
 @definition("patch-fit", order=195, cells=(3,))
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs fitted to 15 patch tests of the mesh itself, from even to cubic stresses: none negative, nu = 1/3.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals and on
-    meshes of several parts.
+    Raises DefinitionError on quadrilaterals and on meshes of several parts.
     """
     from ..mechanics.moduli import free_body  # here: see `springtune.springs`
     from ..mechanics.network import Network
@@ -108,13 +102,10 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 
 def outline_tests(mesh: Mesh) -> np.ndarray:
-    """Forces on the particles of tests under polynomial stresses, each of unit work, none on the others' displacements.
+    """Return forces on the particles of at most `TESTS` tests with polynomial stresses, (n_tests, n_points, 2).
 
-    Returns
-    -------
-    ndarray of float, shape (n_tests, n_points, 2)
-        At most `TESTS`. For E t = 1: times the square root of E t they are forces [N] whose work on the sheet's own
-        displacements is 1 J.
+    For E t = 1: times the square root of E t they are forces [N] whose work on their own displacements in the sheet
+    is 1 J, and 0 on those of the others.
     """
     x, y = (mesh.points - mesh.points.mean(axis=0)).T
     places = (x + 1j * y) / np.hypot(x, y).max()

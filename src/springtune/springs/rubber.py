@@ -1,10 +1,9 @@
 """One law for all springs of a lattice, fitted to a uniaxial test of rubber: springs alone.
 
-`SpringLaw` is for springs alone, on a lattice of equilateral triangles pulled along a row: there the oblique springs
-keep their length, and the springs of the row alone carry. So their law is the test's, whatever that is, up to a stretch
-of 2, at which the lattice lies flat. What is then left is no matter of the law: in equibiaxial tension all three
-directions carry, 1.5 times the uniaxial stress at the same stretch, where an incompressible sheet has 2 times at small
-and up to 1 times at large stretches.
+On a lattice of equilateral triangles pulled along a row the oblique springs keep their length, and only the row's
+springs carry. So `SpringLaw` is the test's law, up to a stretch of 2, at which the lattice lies flat. The remaining
+error does not depend on the law: in equibiaxial tension all three directions carry, 1.5 times the uniaxial stress,
+where an incompressible sheet has 2 times at small and up to 1 times at large stretches.
 """
 
 from dataclasses import dataclass
@@ -23,16 +22,10 @@ FLAT = 2.0
 
 @dataclass(frozen=True)
 class SpringLaw:
-    """One law for all springs of an equilateral lattice, alone, and what the lattice then does in the three tests.
+    """One law for all springs of an equilateral lattice, and its response in the three tests.
 
     A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per cross-section of its rows, p of `LAW_POWERS`.
-
-    Attributes
-    ----------
-    coefficients : tuple of float
-        a_p [Pa], for as many of `LAW_POWERS`.
-    largest : float
-        Largest stretch of a spring in the data that it was fitted to [1], below `FLAT`.
+    `coefficients` are a_p [Pa]; `largest` is the largest stretch in the fitted data [1], below `FLAT`.
 
     Examples
     --------

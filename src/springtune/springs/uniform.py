@@ -1,8 +1,8 @@
 """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline.
 
-What the paper tuned by hand, without the tuning. Outline springs belong to one triangle only and carry too much: in
-tension the network is too stiff by ``1 + sqrt(3)/2 a/H``, in bending by ``1 + 3 sqrt(3)/2 a/H`` to leading order, with
-a the edge length and H the height. Any Poisson's ratio gives nu = 1/3.
+What the paper tuned by hand, without tuning. Outline springs belong to one triangle only and carry too much: the
+network is too stiff by ``1 + sqrt(3)/2 a/H`` in tension and by ``1 + 3 sqrt(3)/2 a/H`` in bending to leading order,
+with edge length a and height H. Always nu = 1/3.
 """
 
 from ..mesh import Mesh
@@ -13,8 +13,5 @@ from .lattice import COEFFICIENT, uniform
 
 @definition("uniform", order=30, uniform=True)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline.
-
-    Parameters and returns as in `springtune.springs.lattice.springs`; lives on any mesh.
-    """
+    """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline."""
     return Springs(COEFFICIENT * material.young_modulus * thickness, uniform(mesh))

@@ -9,14 +9,14 @@ in general
 .. math:: k_c = \sum_T \frac{E t}{1 + \nu} \frac{A_T}{|c|^2}
           + \frac{E t \nu}{1 - \nu^2} \frac{|a|^2 + |b|^2 - |c|^2}{8 A_T}
 
-with a, b the other sides of triangle T. The second term is half the cotangent of the opposite angle: negative where
-that is obtuse.
+with a, b the other sides of triangle T. The second term is half the cotangent of the opposite angle: negative for an
+obtuse one.
 
-The nu of the general form does not become the network's, which stays 1/3 on a lattice and what the mesh makes it
-elsewhere; it scales E wrongly: by (3 - nu) / (3 (1 - nu^2)) on a lattice. The form for nu = 0 is exact there.
+The network's nu stays that of the mesh, 1/3 on a lattice; the general form's nu scales E wrongly, by (3 - nu) / (3 (1
+- nu^2)) on a lattice, where the form for nu = 0 is exact.
 
-The form for nu = 0 stands in public code that cites the article; the general one is derived from its abstract.
-Assumptions: triangles.
+Public code that cites the article has the form for nu = 0; the general one is derived from its abstract. Assumptions:
+triangles.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ def _shapes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the form for nu = 0 (Van Gelder 1998): exact on lattices with no tuning.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals.
+    Raises DefinitionError on quadrilaterals.
     """
     areas, squares = _shapes(mesh)
     return Springs(material.young_modulus * thickness, mesh.sum_to_edges({3: areas / squares}))
@@ -46,8 +46,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 def general(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the general form (Van Gelder 1998), whose nu only scales E.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`; raises DefinitionError on quadrilaterals, and
-    where the opposite angles of an edge are so obtuse that its stiffness is negative.
+    Raises DefinitionError on quadrilaterals, and for angles so obtuse that a stiffness is negative.
     """
     areas, squares = _shapes(mesh)
     nu = material.poisson_ratio

@@ -1,15 +1,15 @@
 r"""Sheets of rubber that was tested: linear triangles of Yeoh's law, written as springs of zero rest length and areas.
 
 The law of a `springtune.Rubber`, which `springtune.fit_rubber` fits to a uniaxial test (O. H. Yeoh, Rubber Chem.
-Technol. 63:792, 1990),
+Technol. 63:792, 1990), is
 
-.. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2},
+.. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2}.
 
-is one of edges and areas: ``tr C A_0`` of a triangle is half the sum over its sides of the opposite angle's cotangent
-times the length squared, and J its area over the one at rest. So springs of zero rest length, stiffer or softer with
-I_1, and areas are linear triangles of this law exactly, on any mesh and at any strain, see
-`springtune.mechanics.energies.YeohEnergy`. With one term it is `neo-hooke` of an incompressible sheet. Where triangles
-are stretched beyond the test's I_1 the law is extrapolated, and the answer's message says so.
+``tr C A_0`` of a triangle is half the sum over its sides of the opposite angle's cotangent times the squared length,
+and J its area over the one at rest. So springs of zero rest length, whose stiffness depends on I_1, and areas are
+exactly linear triangles of this law, on any mesh and at any strain, see `springtune.mechanics.energies.YeohEnergy`.
+One term is `neo-hooke` of an incompressible sheet. Beyond the test's I_1 the law is extrapolated, and the answer's
+message says so.
 """
 
 import numpy as np
@@ -23,8 +23,7 @@ from .base import DefinitionError, Springs, definition, triangles_only, zero
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of zero rest length and areas: equal to linear triangles of rubber fitted to a uniaxial test.
 
-    Parameters and returns as in `springtune.springs.lattice.springs`, the material a `springtune.Rubber`; raises
-    DefinitionError on quadrilaterals and for other materials.
+    The material must be a `springtune.Rubber`. Raises DefinitionError for others and on quadrilaterals.
     """
     from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
     from .neo_hooke import zero_length
