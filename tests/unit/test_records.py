@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from springtune.studies.runs import checked_json, records, run_tasks, store
 from springtune.studies.runs.damage import ASIDE, DamagedError
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.task_limits import Watch
 
 JSON = st.recursive(
@@ -121,7 +121,7 @@ class TestStore:
         assert store.stored(path) == {"one"}
 
     def test_what_was_lost_to_limits_is_computed_again_when_they_change(self, tmp_path):
-        store.lose(tmp_path, "one", {"message": "not done within 1 s"}, "1 s")
+        store.add(tmp_path / "one.h5", {"one": {"message": "not done within 1 s", store.LIMITS: "1 s"}})
         path = tmp_path / "one.h5"
         assert store.stored(path, "1 s") == {"one"} == store.stored(path)
         assert store.stored(path, "2 s") == set()
@@ -186,8 +186,8 @@ class TestRunTasks:
     @pytest.fixture
     def study(self, tmp_path):
         folder = tmp_path / "results/mine"
-        content = {"folder": str(folder / "references"), "finite": []}
-        content["references"] = [{"key": "one", "problem": [5.0, 0.3, "axial"]}]
+        task = {"key": "one", "cost": ["reference", 0], "problem": [5.0, 0.3, "axial"]}
+        content = {"folder": str(folder / "references"), "files": [{"name": "one", "tasks": [task]}]}
         note = {"digest": "digest", "module": "studies.kinds.scenes.reference", "content": content}
         note |= {"limits": {"seconds": 60, "memory": 4e9}, "products": [str(folder / "references/one.h5")]}
         checked_json.write(folder / "tasks/reference_0.json", note)
@@ -214,7 +214,7 @@ class TestRunTasks:
             path.unlink()
         else:
             path.write_bytes(changed[how])
-        found = run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
+        found = run_tasks.with_repair(lambda: store.read_one(study / "references", "one"), study)
         assert {name: found[name] for name in ("displacement", "strain")} == {
             name: before[name] for name in ("displacement", "strain")
         }
@@ -228,12 +228,15 @@ class TestRunTasks:
         """One that is lost to the same limits stays lost, however its neighbours are mended."""
         tasks, done = study / "tasks/reference_0.json", study / "done/reference_0.json"
         note = checked_json.read(tasks)
-        note["content"]["references"].append({"key": "lost", "problem": [5.0, 0.3, "axial"]})
+        task = {"key": "lost", "cost": ["reference", 0], "problem": [5.0, 0.3, "axial"]}
+        note["content"]["files"].append({"name": "lost", "tasks": [task]})
         note["products"].append(str(study / "references/lost.h5"))
         checked_json.write(tasks, note)
-        store.lose(study / "references", "lost", {"message": "not done", "seconds": 0.0}, Watch(note["limits"]).words)
+        limits = Watch(note["limits"]).words
+        failed = {"message": "not done", "seconds": 0.0, store.LIMITS: limits}
+        store.add(study / "references/lost.h5", {"lost": failed})
         (study / "references/one.h5").unlink()
-        run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
+        run_tasks.with_repair(lambda: store.read_one(study / "references", "one"), study)
         assert store.read_one(study / "references", "lost")["message"] == "not done"
         assert checked_json.read(done)["work"]["reference"][0] == 1
 
@@ -248,11 +251,11 @@ class TestRunTasks:
 
     def test_what_no_job_makes_ends_the_reader(self, study):
         with pytest.raises(SystemExit, match="no job makes it"):
-            run_tasks.mended(lambda: store.read_one(study / "references", "other"), study)
+            run_tasks.with_repair(lambda: store.read_one(study / "references", "other"), study)
 
     def test_what_stays_damaged_ends_the_reader(self, study):
         with pytest.raises(SystemExit, match="did not help"):
-            run_tasks.mended(lambda: store.read(study / "references/one.h5", ["another"]), study)
+            run_tasks.with_repair(lambda: store.read(study / "references/one.h5", ["another"]), study)
 
 
 class TestAttempt:
@@ -260,7 +263,7 @@ class TestAttempt:
         def task():
             raise error
 
-        spent = Spent()
+        spent = TaskCosts()
         return spent.attempt("key", task, lambda why: {"message": why}), spent.broken
 
     @pytest.mark.parametrize(

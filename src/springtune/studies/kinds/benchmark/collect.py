@@ -1,16 +1,16 @@
 """Errors and seconds, gathered in the group ``/benchmark``."""
 
-from ...runs import store
-from . import plan
+from ...runs.stages import results
+from .kind import STAGE
 from .variables import BENCHMARK
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     data = BENCHMARK.empty(study.axes)
-    for case, key, _ in plan.cases(study):
+    for task, result in results(STAGE, study, folder, BENCHMARK.variables):
+        case = task.of
         data.attrs["second_beam"] = case.second_beam.name if case.second_beam else ""
-        result = store.read_one(folder / "benchmark", key, BENCHMARK.variables)
         place = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
         for name, values in result.items():
             array = data[name]

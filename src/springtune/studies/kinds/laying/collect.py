@@ -8,26 +8,25 @@ from springtune.problem.compare import band
 from springtune.problem.status import Status
 
 from ...output.dataset import Filler
-from ...runs import store
-from . import plan
+from ...runs.stages import results
+from .kind import STAGE
 from .variables import LAYING
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    part, results = study.parts["laying"], {}
-    for one in (*part.strips, *part.references):
-        results[one] = store.read_one(folder / "laying", plan.laying_key(one), ["outline"])
-    points = max(len(result.get("outline", ())) for result in results.values())
+    part = study.parts["laying"]
+    found = {task.of: result for task, result in results(STAGE, study, folder, ["outline"])}
+    points = max(len(result.get("outline", ())) for result in found.values())
     axes = study.axes | {"outline_point": tuple(range(points)), "corner": tuple(range(4))}
     laid = Filler(LAYING.empty(axes))
     for one in part.strips:
-        _strip(one, results[one], laid)
+        _strip(one, found[one], laid)
     meshes = defaultdict(list)
     for one in part.references:
-        meshes[one.loading, one.friction].append(results[one])
-    for (loading, friction), found in meshes.items():
-        _reference(found, {"loading": loading, "friction": friction}, laid)
+        meshes[one.loading, one.friction].append(found[one])
+    for (loading, friction), solved in meshes.items():
+        _reference(solved, {"loading": loading, "friction": friction}, laid)
     corners = np.array(part.strips[0].trapezoid.corners)
     laid.put({"trapezoid_x": corners[:, 0], "trapezoid_y": corners[:, 1]})
     return {LAYING.name: laid.data}

@@ -1,6 +1,6 @@
 """Strips laid on a trapezoid: every combination of the values of a study's section ``laying``."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Annotated
 
@@ -14,8 +14,9 @@ from ...config.checks import check_beam_material, check_for_triangles, check_kno
 from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ...config.kind import Kind
 from ...config.sections import Section
+from ...runs.keys import definition_key, material_key, mesh_type_key
+from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
-from .plan import STAGES
 
 LOADINGS = ("pressure", "gravity", "ends")
 """What lays a strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
@@ -163,6 +164,17 @@ def _axes(laying):
     }
 
 
+def _tasks(study):
+    laying = study.parts["laying"]
+    for one in (*laying.strips, *laying.references) if laying else ():
+        values = asdict(one) | {"material": material_key(one.material), "support": material_key(one.support)}
+        # The trapezoid is of Delingette's springs.
+        also = mesh_type_key("structured"), definition_key(one.definition), definition_key("delingette")
+        yield Task(values, also, of=one, costs=[("laying", (1e-3 / one.mesh_size) ** 3)])
+
+
+STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks)
+
 KIND = Kind(
     "laying",
     study_fields={
@@ -174,7 +186,7 @@ KIND = Kind(
     check=_check,
     expand=_expand,
     axes=_axes,
-    stages=STAGES,
+    stages=(STAGE,),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
     costs={"laying": (0.0, 1.5)},

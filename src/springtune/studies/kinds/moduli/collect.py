@@ -1,10 +1,8 @@
 """Moduli, gathered in the group ``/moduli``."""
 
-from collections import defaultdict
-
 from ...output.dataset import Filler
-from ...runs import store
-from . import plan
+from ...runs.stages import results
+from .kind import STAGE
 from .variables import MODULI
 
 
@@ -14,12 +12,6 @@ def groups(study, folder):
     moduli = Filler(MODULI.empty(study.axes))
     box = {"patch_length": part.patch.length, "patch_height": part.patch.height}
     moduli.data.attrs = {"comment": "of the mesh that a beam of this length and height [m] gets"} | box
-    patches = defaultdict(dict)
-    for one in part.measurements:
-        patches[plan.patch_name(one)][plan.moduli_key(study, one)] = one
-    for patch, names in patches.items():
-        for name, result in store.read(folder / "moduli" / f"{patch}.h5", names).items():
-            one = names[name]
-            labels = {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "poisson_ratio": one.poisson_ratio}
-            moduli.put(result, definition=one.definition, **labels)
+    for task, result in results(STAGE, study, folder):
+        moduli.put(result, **task.labels)
     return {MODULI.name: moduli.data}

@@ -4,8 +4,8 @@ import numpy as np
 
 from ...output.dataset import Filler
 from ...runs import store
-from . import plan
 from .batches import crossings, refine, value_key
+from .kind import file_key
 from .names import SPACINGS, VARIED
 from .variables import COORDINATES, refinement_group
 
@@ -25,7 +25,7 @@ OF_A_VALUE = (
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     part = study.parts["refinement"]
-    found = [_read(one, folder / "refinement" / f"{plan.file_key(one)}.h5") for one in part]
+    found = [_read(one, folder / "refinement" / f"{file_key(one)}.h5") for one in part]
     lengths = {
         "point": max(len(places) for places, *_ in found),
         "crossing": max(1, *(len(where) for *_, where in found)),

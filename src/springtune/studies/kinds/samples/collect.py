@@ -19,7 +19,7 @@ from .designs import roles
 from .indices import LEVEL, RESAMPLES, main_effect, sobol_indices
 from .interpolate import problem_key
 from .names import DROP, MOST_SOLVED, PARAMETERS, QUANTITIES, SOBOL_INDICES, blocks
-from .stage import DRAWN
+from .solve import DRAWN
 from .variables import EFFECTS, SAMPLES, SOBOL
 
 MOST_BINS, BIN_POINTS = 16, 16

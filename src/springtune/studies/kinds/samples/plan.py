@@ -1,13 +1,13 @@
 """Stages of samples: what their jobs are to do, and the keys of what they store."""
 
 from functools import cache
-from pathlib import Path
 
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Stage
 from ...runs.hashing import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
+from ...runs.stages import products
 from ..scenes.interpolated import expected_solves
 from .names import MOST_SOLVED, blocks, rows_each
 
@@ -47,7 +47,7 @@ def block_key(sample, first, last):
 
 @cache
 def _solved_with(mesh_type, definition):
-    return hash_of(stage_key("studies.kinds.samples.stage"), mesh_type_key(mesh_type), definition_key(definition))
+    return hash_of(stage_key("studies.kinds.samples.solve"), mesh_type_key(mesh_type), definition_key(definition))
 
 
 def result_key(sample, load, definition):
@@ -68,21 +68,21 @@ def _reference_members(study, costs):
     return {kind.name: (seconds, kind) for kind in load_kinds(sample)}
 
 
+def _reference(sample, kind):
+    key = reference_key(sample, kind)
+    return {"name": key, "key": key, "kind": kind.name, "box": reference_box(sample)}
+
+
 def _references(study, folder, kinds):
-    sample = study.parts["samples"]
-    box, drawn = reference_box(sample), None
+    sample, drawn = study.parts["samples"], None
     if sample.rows <= MOST_SOLVED:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
         drawn |= {"first": 0, "last": sample.size}
     return {
         "folder": str(folder / "samples"),
-        "references": [{"key": reference_key(sample, kind), "kind": kind.name, "box": box} for kind in kinds],
+        "files": [_reference(sample, kind) for kind in kinds],
         "sample": drawn,
     }
-
-
-def _reference_products(content):
-    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["references"]]
 
 
 def _members(study, costs):
@@ -123,14 +123,15 @@ def _content(study, folder, members):
         "parameters": sample.parameters,
         "mesh_type": sample.mesh_type,
         "kinematics": sample.kinematics,
-        "meshed": hash_of(stage_key("studies.kinds.samples.stage"), mesh_type_key(sample.mesh_type)),
+        "meshed": hash_of(stage_key("studies.kinds.samples.solve"), mesh_type_key(sample.mesh_type)),
         "results": results,
-        "blocks": [{"key": block_key(sample, *ends), "first": ends[0], "last": ends[1]} for ends in members],
+        "files": [_block(sample, *ends) for ends in members],
     }
 
 
-def _products(content):
-    return [Path(content["folder"]) / f"{block['key']}.h5" for block in content["blocks"]]
+def _block(sample, first, last):
+    key = block_key(sample, first, last)
+    return {"name": key, "key": key, "first": first, "last": last}
 
 
 STAGES = (
@@ -139,15 +140,17 @@ STAGES = (
         "studies.kinds.samples.interpolate",
         "Interpolating the references of samples",
         _references,
-        _reference_products,
+        products,
         _reference_members,
+        folder="samples",
     ),
     Stage(
         "sample",
-        "studies.kinds.samples.stage",
+        "studies.kinds.samples.solve",
         "Solving the networks of samples",
         _content,
-        _products,
+        products,
         _members,
+        folder="samples",
     ),
 )

@@ -2,19 +2,17 @@
 
 import numpy as np
 
-from ...runs import store
-from . import plan
+from ...runs.stages import results
+from .kind import STAGE
 from .variables import STABILITY
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    results = {}
-    for one in study.parts["stability"]:
-        results[one] = store.read_one(folder / "stability", plan.experiment_key(one), STABILITY.variables)
-    there = {name for result in results.values() for name in result} | {"experiment_seconds", "experiment_message"}
+    found = {task.of: result for task, result in results(STAGE, study, folder, STABILITY.variables)}
+    there = {name for result in found.values() for name in result} | {"experiment_seconds", "experiment_message"}
     data = STABILITY.empty(study.axes, there)
-    for one, result in results.items():
+    for one, result in found.items():
         place = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
         result["experiment_seconds"] = result.pop("seconds", np.nan)
         result["experiment_message"] = result.pop("failure", "")
