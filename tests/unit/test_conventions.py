@@ -19,7 +19,7 @@ VAGUE = {"asked", "whole", "race", "laid", "tasks", "work", "code", "files", "so
 
 
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
-OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGES", "VIEWS"}
+OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGE", "STAGES", "VIEWS"}
 """Constants that say the same of each solver or each study kind, and that each has its own value of."""
 
 

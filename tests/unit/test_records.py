@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import sys
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.studies.runs import checked_json, records, run_tasks, store
+from springtune.studies.runs import checked_json, driver, records, run_tasks, store
 from springtune.studies.runs.damage import ASIDE, DamagedError
 from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.task_limits import Watch
@@ -120,14 +122,17 @@ class TestStore:
         store.add(path, {"one": self.RESULT})
         assert store.stored(path) == {"one"}
 
-    def test_what_was_lost_to_limits_is_computed_again_when_they_change(self, tmp_path):
+    def test_what_was_lost_to_limits_is_computed_again_when_they_change(self, tmp_path, monkeypatch):
         store.add(tmp_path / "one.h5", {"one": {"message": "not done within 1 s", store.LIMITS: "1 s"}})
         path = tmp_path / "one.h5"
         assert store.stored(path, "1 s") == {"one"} == store.stored(path)
         assert store.stored(path, "2 s") == set()
         assert store.read_one(tmp_path, "one") == {"message": "not done within 1 s"}
-        assert [task["key"] for _, task in store.missing(tmp_path, [{"key": "one"}], "2 s")] == ["one"]
-        assert not list(store.missing(tmp_path, [{"key": "one"}], "1 s"))
+        monkeypatch.setitem(sys.modules, "springtune.tested_stage", SimpleNamespace(solve=lambda task: {"message": ""}))
+        content = {"folder": tmp_path, "files": [{"name": "one", "tasks": [{"key": "one"}]}]}
+        for limits, message in (("1 s", "not done within 1 s"), ("2 s", "")):
+            driver.run("tested_stage", content, Limited(limits))
+            assert store.read_one(tmp_path, "one") == {"message": message}
 
 
 class TestRecords:
@@ -178,6 +183,18 @@ class TestRecords:
         assert records.fault(record, "digest", [never]) == ""
         never.write_text("somebody's")
         assert records.fault(record, "digest", [never])
+
+
+class Limited(TaskCosts):
+    """Tasks within limits of these words."""
+
+    def __init__(self, words):
+        super().__init__()
+        self.words = words
+
+    @property
+    def limits(self):
+        return self.words
 
 
 class TestRunTasks:

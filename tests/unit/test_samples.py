@@ -701,7 +701,7 @@ class TestRefusals:
             content = sampling().content(study, here, [(0, 8)])
             solve.run(content, TaskCosts())
             key = next(key for key, scene in content["results"].items() if scene["definition"] == "stiffening")
-            path = here / "samples" / f"{content['blocks'][0]['key']}.h5"
+            path = here / "samples" / f"{content['files'][0]['name']}.h5"
             found = store.read(path, [key], ("status",))[key]
             assert (found["status"] == Status.FAILED).all()
             assert "not in proportion" in found["messages"]["0"]

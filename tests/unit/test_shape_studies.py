@@ -449,7 +449,13 @@ def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
         "other": grid | {"shape": "a_b", "material": "c"},
     }
     jobs = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
-    tasks = [task for job in jobs if job.stage.name == "shape_reference" for task in job.content["references"]]
+    tasks = [
+        task
+        for job in jobs
+        if job.stage.name == "shape_reference"
+        for file in job.content["files"]
+        for task in file["tasks"]
+    ]
     assert len({task["key"] for task in tasks}) == 2
 
 

@@ -30,13 +30,13 @@ from . import store
 if TYPE_CHECKING:
     from .task_costs import TaskCosts
 
-NAME = "studies.runs.driver"
+DRIVER = "studies.runs.driver"
 """This module, which all keys of results depend on."""
 
 REFUSED = "without mesh"
 """Name under which tasks are counted that could not be prepared."""
 
-FURTHER = "fields"
+ONLY_PARTS = "fields"
 """Name under which a task is counted of which only further parts were missing."""
 
 Task = Mapping[str, Any]
@@ -150,7 +150,7 @@ class _File:
                 for number, row in enumerate(
                     self._own("cost", _cost)(task, *shared, result, time.perf_counter() - begin)
                 ):
-                    costs.add(FURTHER if number == 0 and task["key"] in self.present else row[0], *row[1:])
+                    costs.add(ONLY_PARTS if number == 0 and task["key"] in self.present else row[0], *row[1:])
                 for key, part in self.parts(task, result).items():
                     keeper[key] = part
 

@@ -56,7 +56,7 @@ class Task:
 
     def key_of(self, module: str) -> str:
         """Key of its result, computed by a module."""
-        return self.key or hash_of(self.values, stage_key(module, driver.NAME), self.also)
+        return self.key or hash_of(self.values, stage_key(module, driver.DRIVER), self.also)
 
     def seconds(self, costs: "Costs") -> float:
         """What it is expected to take."""

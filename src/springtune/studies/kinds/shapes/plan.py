@@ -70,7 +70,7 @@ def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
         _parameters(mesh_source(part, one)),
-        stage_key("studies.kinds.shapes.mesh", driver.NAME),
+        stage_key("studies.kinds.shapes.mesh", driver.DRIVER),
         _reader(part.shape[one.shape]),
     )
 
@@ -93,7 +93,7 @@ def _case(part, shape, material, name):
 def reference_task(part, shape, material, name):
     """Task of a reference."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
-    code = stage_key("studies.kinds.shapes.reference", driver.NAME), _reader(part.shape[shape])
+    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER), _reader(part.shape[shape])
     key = hash_of(task | {"shape": _parameters(task["shape"])}, code)
     return {"key": key} | task
 
