@@ -11,8 +11,8 @@ from springtune.problem.materials import Material
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.stability import experiments as stability
+from springtune.studies.kinds.stability.collect import STABILITY
 from springtune.studies.kinds.stability.names import AXES, EXPERIMENTS, ONCE
-from springtune.studies.kinds.stability.variables import STABILITY
 from springtune.studies.output.dataset import DIMENSIONS
 from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store

@@ -170,10 +170,11 @@ class Kind:
         Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
     costs : dict of str to tuple
         Seconds of a task by its name in records, in any case and per unit, before any was measured.
-    division : str
-        Module of its package with ``pieces(study, costs, division)``, seconds of each piece that a part of a study may
-        have of it, by name, and ``take(study, names)``, the study with these pieces alone; see
-        `springtune.studies.kinds.division`. A kind without is in one part as a whole.
+    pieces : callable, optional
+        Of a study, `springtune.studies.runs.bundles.Costs` and a `springtune.studies.kinds.division.Division`: seconds
+        of each piece that a part of a study may have of it, by name. A kind without is in one part as a whole.
+    take : callable, optional
+        Of a study and names of pieces: the study with these alone.
     """
 
     name: str
@@ -190,7 +191,8 @@ class Kind:
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
-    division: str = ""
+    pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
+    take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
 
     def module(self, name: str) -> ModuleType:
         """A module of its package."""

@@ -12,8 +12,7 @@ from springtune.safe_io.atomic import write_text
 from ...output.dataset import STATUS, most_requested
 from ...output.selection import unswept
 from ..scenes.variables import SCENE
-from .outputs import TABLES
-from .variables import PATCH
+from .outputs import PATCH, TABLES
 
 SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
 MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulus_error", "spring_ratio")

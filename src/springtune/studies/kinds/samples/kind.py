@@ -21,7 +21,7 @@ from ...config.sections import Section
 from .distributions import Distributed
 from .names import DESIGNS, DROP, FAILURES, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, rows_each
 from .outputs import OUTPUTS
-from .plan import STAGES
+from .plan import STAGES, pieces, take
 
 Drawn = dict[str, Any]
 
@@ -291,7 +291,8 @@ KIND = Kind(
     summary=_summary,
     stages=STAGES,
     outputs=OUTPUTS,
-    division="division",
+    pieces=pieces,
+    take=take,
     tables=lambda study: ["sobol"] if _has_indices(study) else [],
     costs={"sampled": (0.05, 6e-4)},
 )

@@ -1,5 +1,6 @@
 """Stages of samples: what their jobs are to do, and the keys of what they store."""
 
+from dataclasses import replace
 from functools import cache
 
 from springtune.problem.loads import LOADS
@@ -132,6 +133,19 @@ def _content(study, folder, members):
 def _block(sample, first, last):
     key = block_key(sample, first, last)
     return {"name": key, "key": key, "first": first, "last": last}
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece of a sample: of a task's base samples, or of all."""
+    sample = study.parts["samples"]
+    return division.of_section({ends: seconds_of(sample, ends, costs) for ends in drawn_blocks(sample)})
+
+
+def take(study, names):
+    """The study with some of its pieces alone; what is estimated from all rows of a sample is left to the whole one."""
+    sample, wanted = study.parts["samples"], set(names)
+    blocks = tuple(ends for ends in drawn_blocks(sample) if ends in wanted)
+    return replace(study, parts=study.parts | {"samples": replace(sample, blocks=blocks) if blocks else ()})
 
 
 STAGES = (

@@ -2,8 +2,10 @@
 
 import hashlib
 from collections import defaultdict
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...config.kind import Stage
 from ...runs import driver
@@ -12,6 +14,11 @@ from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, products, stage
 from .names import OWN_FILE
 from .outputs import DRAWING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from ...config.model import Study
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
@@ -189,6 +196,44 @@ def _solve(study, folder, members):
         for scenes in members
     ]
     return {"folder": str(folder / "shape_solutions"), "meshes": str(folder / "shape_meshes"), "files": files}
+
+
+# -- parts of a study --------------------------------------------------------------------------------------------------
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids."""
+    part = study.parts["shapes"]
+    found = defaultdict(float)
+    for one in part.scenes:
+        count = particles(part, one)
+        found[one.shape, one.load] += costs.of("shape_scene", count) + costs.of(one.definition, count)
+    for shape, _, load in part.referred:
+        found[shape, load] += costs.of("shape_reference")
+    return division.of_section(found)
+
+
+def take(study, names):
+    """The study with some of its pieces alone."""
+    wanted = set(names)
+    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
+
+
+def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
+    """A study of a few scenes of shapes of another one, and of what these need."""
+    part = study.parts["shapes"]
+    scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
+    if not scenes:
+        return replace(study, parts=study.parts | {"shapes": ()})
+    cases = {(one.shape, one.material, one.load) for one in scenes}
+    names = {one.shape for one in scenes}
+    found = replace(
+        part,
+        shapes=tuple(shape for shape in part.shapes if shape.name in names),
+        scenes=scenes,
+        referred=tuple(case for case in part.referred if case in cases),
+    )
+    return replace(study, parts=study.parts | {"shapes": found})
 
 
 STAGES = (

@@ -15,6 +15,7 @@ from ...config.kind import Kind
 from ...config.sections import Section
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
+from ..division import by_task
 from .names import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
 
@@ -137,7 +138,7 @@ KIND = Kind(
     axes=_axes,
     stages=(STAGE,),
     outputs=OUTPUTS,
-    division="division",
+    **by_task("stability", _tasks, lambda one: (one.name, one.definition)),
     costs={
         "limits": (10.0, 0.0),
         "maps": (8.0, 0.0),
