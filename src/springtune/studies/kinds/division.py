@@ -1,8 +1,7 @@
-"""Parts of a study for several sites: dealt out by what they are expected to cost, each scene to one of them.
+"""Parts of a study for several sites, dealt out by their expected cost: each scene is in one of them.
 
-A part is found from the whole study and its number alone, whatever the machine has measured: all sites agree on it.
-What depends on all scenes of a study, such as the range of its interpolants, is that of the whole study in each part:
-results have the same keys and the same bits as in one place.
+A part follows from the whole study and its number alone, so that all sites agree on it. Keys and numbers are those of
+the whole study.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -26,15 +25,7 @@ Name = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Division:
-    """How a study is divided.
-
-    Attributes
-    ----------
-    by : str
-        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
-    most : float
-        Seconds that a piece of several tasks should not exceed.
-    """
+    """How a study is divided: what stays together (``by``, see `DEALT_BY`), and the most seconds of a piece."""
 
     by: str
     most: float

@@ -137,7 +137,7 @@ def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
 
 
 def line(panel: Axes, x: np.ndarray, y: np.ndarray, look: Mapping[str, Any], name: str, end: str = "") -> list[End]:
-    """Draw a line: its last point with ``end``, by default its name, for `name_lines`; none of a line without points."""
+    """Draw a line that has points: where it ends, with its name or another text, for `name_lines`."""
     known = np.flatnonzero(np.isfinite(y))
     if not len(known):
         return []

@@ -87,17 +87,7 @@ class BenchmarkConfig(Section):
 
 @dataclass(frozen=True)
 class Case:
-    """A scene of the benchmark, see `springtune.studies.kinds.benchmark.measure`.
-
-    Attributes
-    ----------
-    force : float
-        Force on the loaded side, tension positive [N].
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    finest : tuple of float
-        The shortest edge of each approach [m].
-    """
+    """A scene of the benchmark; sizes are edges [m], ``finest`` has one for each approach, tension is positive [N]."""
 
     name: str
     beam: Beam

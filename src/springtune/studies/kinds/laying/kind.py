@@ -71,17 +71,7 @@ class LayingConfig(Section):
 
 @dataclass(frozen=True)
 class LayingScene:
-    """A strip to lay on a trapezoid, see `springtune.studies.kinds.laying.lay`.
-
-    Attributes
-    ----------
-    mesh_size : float
-        Length of an edge [m].
-    pressure : float
-        Pressure on the strip, or its weight over its upper face [Pa].
-    friction : float
-        Coulomb's coefficient [1].
-    """
+    """A strip to lay on a trapezoid, its pressure or its weight over its upper face [Pa]; see `lay`."""
 
     strip: Strip
     trapezoid: Trapezoid
@@ -96,13 +86,7 @@ class LayingScene:
 
 @dataclass(frozen=True)
 class Laying:
-    """What a study lays.
-
-    Attributes
-    ----------
-    references : tuple of LayingScene
-        Strips of finite elements that the others are compared with, on several meshes a loading and friction.
-    """
+    """Strips of a study, and those of finite elements that they are compared with, on several meshes."""
 
     strips: tuple[LayingScene, ...]
     references: tuple[LayingScene, ...]

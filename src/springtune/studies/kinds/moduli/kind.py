@@ -32,15 +32,7 @@ class PatchConfig(Section):
 
 @dataclass(frozen=True)
 class Measurement:
-    """Effective moduli of a definition on a patch.
-
-    Attributes
-    ----------
-    mesh_size : float
-        Length of an edge [m].
-    poisson_ratio : float
-        Poisson's ratio that the definition is asked for [1].
-    """
+    """Effective moduli of a definition on a patch, for the Poisson's ratio that it is asked for."""
 
     definition: str
     mesh_type: str
@@ -50,13 +42,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Measurements:
-    """What a study measures.
-
-    Attributes
-    ----------
-    patch : Beam
-        Box on whose meshes moduli are measured; its thickness does not matter.
-    """
+    """Measurements of a study, and the box on whose meshes they are made; its thickness does not matter."""
 
     patch: Beam
     measurements: tuple[Measurement, ...]

@@ -119,10 +119,7 @@ def _range(errors, flags):
 
 
 def decision(tree: xr.DataTree) -> str:
-    """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells.
-
-    Every figure is a cell of the dataset, or the range, median or largest one of cells that the table names.
-    """
+    """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells."""
     root, moduli = unswept(tree.to_dataset()), tree["moduli"].to_dataset()
     advice = _advice(root)
     parts = ["### In short", "", *advice, ""] if advice else []

@@ -108,17 +108,7 @@ class RefinementConfig(Section):
 
 @dataclass(frozen=True)
 class Refinement:
-    """A refinement of one definition.
-
-    Attributes
-    ----------
-    force : float
-        With its sign [N]; that of the load where it is the parameter, and its size elsewhere.
-    mesh_size : float
-        Length of an edge [m]; zero where it is the parameter.
-    parameter : str
-        Key of `springtune.studies.kinds.refinement.names.VARIED`.
-    """
+    """A refinement of one definition; ``force`` [N] has its sign, ``mesh_size`` [m] is 0 where it is the parameter."""
 
     name: str
     beam: Beam

@@ -1,7 +1,7 @@
 """Stage `refinement`: values of a parameter, added where the error changes its sign or crosses a tolerance.
 
-The loop is here, so that a plan stays a plan: which values there are depends on results. Each is stored under a key of
-its own; what is there is not solved again, so a run that was stopped goes on where it ended.
+The loop is here, since further values depend on results. Each value has a key of its own, so a run that was stopped
+goes on where it ended.
 """
 
 import time

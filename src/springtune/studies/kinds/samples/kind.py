@@ -120,15 +120,7 @@ class SamplesConfig(Section):
 
 @dataclass(frozen=True)
 class Sample:
-    """What a study samples.
-
-    Attributes
-    ----------
-    parameters : dict of str to dict
-        Distributions in the order of `PARAMETERS`, see `springtune.studies.kinds.samples.designs.quantile`.
-    blocks : tuple of tuple of int
-        First base sample, and that after the last, of each task that a part of a study asks for; none where it is all.
-    """
+    """What a study samples; ``blocks`` are the tasks of a part of a study, none where it has all."""
 
     design: str
     size: int

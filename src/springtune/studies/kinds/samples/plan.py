@@ -52,10 +52,7 @@ def _solved_with(mesh_type, definition):
 
 
 def result_key(sample, load, definition):
-    """Key of the scenes of a load and definition, in the file of any base samples.
-
-    Of linear kinematics they are for 1 N, which loads of a kind share.
-    """
+    """Key of the scenes of a load and definition in the file of any base samples; linear ones are for 1 N."""
     linear = sample.kinematics == "linear"
     how = LOADS[load].kind.name if linear else [LOADS[load].kind.name, LOADS[load].sign, LOADS[load].follower]
     return hash_of(how, sample.mesh_type, sample.kinematics, _solved_with(sample.mesh_type, definition))

@@ -1,8 +1,8 @@
 """Stage `sample`: the networks of sampled scenes.
 
-A scene's network is that of E t = 1 under a force over E t: with linear kinematics thickness, Young's modulus and force
-only scale an answer, and rows of a design that differ in these alone are solved once. Meshes of as many cells and rows
-follow each other, since networks on them share numbering, sparsity and symbolic factorization.
+A scene's network is that of E t = 1 under a force over E t: in linear kinematics thickness, modulus and force only
+scale an answer, and rows that differ in these alone are solved once. Meshes of as many cells and rows follow each
+other, since their networks share numbering, sparsity and symbolic factorization.
 """
 
 import time
@@ -204,10 +204,7 @@ def _failed(why, **limits):
 
 
 def _objection(sheet, scene, drawn, row):
-    """Why answers of a definition do not scale as samples make use of; empty where they do, on the mesh of a row.
-
-    None where there is no answer: that is said scene by scene.
-    """
+    """Why answers of a definition do not scale on the mesh of a row, or an empty string; None without an answer."""
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
     own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
     answers = [_solved(sheet, scene, ratio, load, "linear"), _solved(own, scene, ratio, 1.0, "linear", modulus=modulus)]

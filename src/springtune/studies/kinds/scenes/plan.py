@@ -100,11 +100,7 @@ def interpolant_key(kind, box):
 
 @cache
 def solved_reference(beam, material, load):
-    """Reference that is solved by itself.
-
-    Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
-    kind.
-    """
+    """Reference that is solved by itself, under the key of its unit problem, which scaled beams share."""
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
     code = stage_key(
         "studies.kinds.scenes.reference", without=("reference.finite_strain", "studies.kinds.scenes.stored_interpolant")

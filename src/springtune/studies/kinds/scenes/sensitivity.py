@@ -1,10 +1,8 @@
 """Stage `sensitivity`: displacement against uniform stiffness.
 
-Loads of a mesh have their network, its factor at rest and the series about it in common. Each curve follows a path of
-its own from there: where a path takes its steps depends on the loads that it is asked for, and a result may not depend
-on which others are computed along with it.
-
-Here, where equilibria are at hand, the stiffness at which a curve meets its reference is solved for, too.
+Loads of a mesh share their network, its factor at rest and the series about it. Each curve follows a path of its own
+from there, since a result may not depend on which others are computed along with it. The stiffness at which a curve
+meets its reference is solved for here, too, where equilibria are at hand.
 """
 
 import time

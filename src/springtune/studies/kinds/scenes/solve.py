@@ -89,20 +89,9 @@ def cost(scene, shared, result, seconds):
 
 
 def solved(sheet, scene, reference=None):
-    """Result of a scene, ready to be stored.
+    """Result of a scene, ready to be stored: lengths [m], stiffnesses [N/m], forces [N].
 
-    Parameters
-    ----------
-    reference : callable, optional
-        Displacements of the scene's reference for 1 N at the particles [m]; None without.
-
-    Returns
-    -------
-    dict
-        ``status`` (a `springtune.problem.status.Status`), ``message``, ``displacement`` [m], ``stiffness`` [N/m],
-        ``field_error``, ``iterations``, ``residual``, ``negative_pivots``, ``seconds``, those of the definition:
-        ``definition_seconds``, ``definition_evaluations``, ``spring_ratio``, and ``displacements`` [m] of the
-        particles, ``spring_stiffnesses`` [N/m] and ``spring_forces`` [N] where they are kept.
+    ``reference`` returns the displacements of the scene's reference for 1 N at the particles [m], or None.
     """
     begin, derived = time.perf_counter(), sheet.deriving
     try:

@@ -1,6 +1,6 @@
-"""Stored interpolants of references: how they are made, and read, for grids and for samples.
+"""Stored interpolants of references, of grids and of samples.
 
-The file of one that meets no tolerance has, beside the reason, unit problems that were asked of it, solved one by one.
+The file of one that meets no tolerance has the reason and, solved one by one, the unit problems that were asked of it.
 """
 
 import time

@@ -1,6 +1,6 @@
-"""Stored meshes: a VTU file each, and a note beside it with its key, its checksum and what is known of it.
+"""Stored meshes: a VTU file each, and a note with its key, its checksum and its quality.
 
-A mesh that cannot be made has no VTU file, and its note says why: it costs its own scenes and no others.
+A mesh that cannot be made has no VTU file, and its note says why.
 """
 
 from pathlib import Path

@@ -14,13 +14,7 @@ PACKED = "fields"
 
 
 def calibrated_key(key: str, stiffness: float | None) -> str:
-    """Key of a calibrated scene.
-
-    Parameters
-    ----------
-    stiffness : float or None
-        What was calibrated [N/m]; None where there is nothing.
-    """
+    """Key of a scene with a calibrated stiffness [N/m], or None."""
     return hash_of(key, stiffness)
 
 

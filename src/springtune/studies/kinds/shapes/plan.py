@@ -121,11 +121,7 @@ def draws(study):
 
 
 def shown(part):
-    """Scenes whose networks are drawn.
-
-    Of each shape and load those of the finest mesh that is not too large to be drawn, of the first material and
-    kinematics.
-    """
+    """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
     cases = defaultdict(list)
     for one in part.scenes:
         cases[one.shape, one.load].append(one)

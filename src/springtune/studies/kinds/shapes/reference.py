@@ -63,12 +63,7 @@ def _rounds(shape, grouped):
 
 
 def rounds_of(edges):
-    """Closed rounds of points that edges join, each point of two of them.
-
-    Parameters
-    ----------
-    edges : ndarray of int, shape (n, 2)
-    """
+    """Closed rounds of points that edges, shape (n, 2), join; each point has two of them."""
     beside = {}
     for one, other in edges.tolist():
         beside.setdefault(one, []).append(other)

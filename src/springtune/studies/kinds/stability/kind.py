@@ -45,17 +45,7 @@ class StabilityConfig(Section):
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment on numerical stability, see `springtune.studies.kinds.stability.experiments`.
-
-    Attributes
-    ----------
-    name : str
-        Key of `springtune.studies.kinds.stability.names.EXPERIMENTS`.
-    force : float
-        Traction [N].
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    """
+    """An experiment on numerical stability, under a traction [N], on ascending edge lengths [m]."""
 
     name: str
     beam: Beam
