@@ -133,7 +133,7 @@ def run(scene, approaches, sizes, finest, most_seconds, second_beam=None):
                 continue
             if approach in beyond:
                 size, why = beyond[approach]
-                found = _hole(f"not run: at {1e3 * size:g} mm it was {why}")
+                found = _failed(f"not run: at {1e3 * size:g} mm it was {why}")
             else:
                 found = _case(scene, approach, sizes[j], meshes, most_seconds)
             if found.get("beyond"):
@@ -151,7 +151,7 @@ def _blank(shape):
     return np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
 
 
-def _hole(message, status=Status.FAILED):
+def _failed(message, status=Status.FAILED):
     return {"status": status, "message": message}
 
 
@@ -185,7 +185,7 @@ def _second(scene, beam, approaches, sizes, solved, most_seconds):
 def _case(scene, approach, size, meshes, most_seconds, once=False):
     """Result of a case; the mesh of a definition is made before, and its time counted."""
     if approach.startswith("calculix") and not installed():
-        return _hole("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
+        return _failed("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
     mesh, meshing = None, 0.0
     if approach not in APPROACHES:
         mesh_type = approach.partition("/")[2]
@@ -216,8 +216,8 @@ def in_process(function, most_seconds, *arguments):
         if process.exitcode == -signal.SIGPROF:
             own = not left or left > most_seconds + BESIDE
             limits = _limit(most_seconds) if own else f"{_limit(most_seconds)}, or what is left of the study's `limits`"
-            return _hole(f"not done within {limits}") | {"beyond": True}
-        return _hole("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
+            return _failed(f"not done within {limits}") | {"beyond": True}
+        return _failed("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
     finally:
         process.join()
 
@@ -228,18 +228,18 @@ def _child(send, function, alarm, arguments):
         alarm.set()
         send.send(function(alarm, *arguments))
     except DefinitionError as error:
-        send.send(_hole(str(error)))
+        send.send(_failed(str(error)))
     except MemoryError:
-        send.send(_hole("not enough memory: the limits of the study, or the machine's") | {"beyond": True})
+        send.send(_failed("not enough memory: the limits of the study, or the machine's") | {"beyond": True})
     except Exception as error:  # the other cases shall still be measured
         others = resource.getrusage(resource.RUSAGE_CHILDREN)
         why = own_reason(error)
         if why and others.ru_utime + others.ru_stime >= alarm.most:
-            send.send(_hole(f"not done within {_limit(alarm.most)} ({why})") | {"beyond": True})
+            send.send(_failed(f"not done within {_limit(alarm.most)} ({why})") | {"beyond": True})
             return
         if not why:
             traceback.print_exc()
-        send.send(_hole(why, Status.NOT_CONVERGED) if why else error)
+        send.send(_failed(why, Status.NOT_CONVERGED) if why else error)
 
 
 def _repeat(alarm, scene, approach, size, mesh, meshing, once):
@@ -322,7 +322,7 @@ def solvers(scene, sizes, most_seconds):
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
         for i, name in enumerate(SOLVERS):
             if name == "Cholesky" and not factors.CHOLESKY:
-                found = _hole("CHOLMOD is not installed; install springtune[cholesky]")
+                found = _failed("CHOLMOD is not installed; install springtune[cholesky]")
             else:
                 found = in_process(_solver, most_seconds, scene, mesh, name)
             _note(found, arrays, status, message, (i, j))
